@@ -25,7 +25,7 @@ namespace {
 
 struct Options {
   SubjectOptions subject;
-  std::vector<std::string> decompositions = NamesOf(Decompositions()), splits = {"voxels", "occupied"};
+  std::vector<std::string> decompositions, splits = {"voxels", "occupied"};
   Policy policy{.groups = 1, .balance = std::string(kDynamicBalance)};
   int workers = 16, repeats = 3, frames = 5, views = 4;
   bool verbose = false;
@@ -118,7 +118,7 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
     const ResolvedRequest resolved = ResolveRequest(view.request, 1, subject.summary).value();
     const FrameSetup of_view = MakeFrameSetup(resolved).value();
     const auto measure = [&](std::shared_ptr<const Layout> layout) {
-      FramePlan plan = PlanFrame(of_view, *resolved.policy, RosterOf(std::uint32_t(options.workers)), std::move(layout)).value();
+      FramePlan plan = PlanFrame(of_view, resolved.policy, RosterOf(std::uint32_t(options.workers)), std::move(layout)).value();
       return Measure(subject, std::move(plan), options.workers, options.repeats);
     };
     MeasuredLayouts layouts(options.workers);
@@ -168,14 +168,14 @@ Status Run(const Options& options) {
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
   Options options;
-  CLI::App app("How even partitions are, and how much more work they are than the whole volume", "balance_bench");
+  const BenchProgram app("How even partitions are, and how much more work they are than the whole volume", "balance_bench");
   AddSubjectOptions(app, options.subject);
-  AddList(app, "--decomposition", options.decompositions, CLI::IsMember(options.decompositions), "Partitions to compare");
-  AddList(app, "--balance-by", options.splits, CLI::IsMember({"voxels", "occupied"}), "What boxes have equal shares of");
-  app.add_option("--assignment", options.policy.assignment, "Which worker owns which box")
-      ->check(CLI::IsMember(NamesOf(Assignments())).description(""))
-      ->type_name("NAME");
-  app.add_flag_callback(
+  const std::vector<std::string_view> decompositions = NameList(Decompositions());
+  options.decompositions.assign(decompositions.begin(), decompositions.end());
+  AddList(app, "--decomposition", options.decompositions, OneOf(decompositions), "Partitions to compare");
+  AddList(app, "--balance-by", options.splits, OneOf({"voxels", "occupied"}), "What boxes have equal shares of");
+  AddParsed(app, "--assignment", options.policy.assignment, OneOf(NameList(Assignments())), "Which worker owns which box").TypeName("NAME");
+  app.AddFlag(
       "--along-view", [&options] { options.policy.axis = AxisChoice::kView; },
       "Cut along the axis on which the view's slices are traversed");
   AddInteger(app, "--workers", options.workers, 1, 4096, "Workers that share a frame");
@@ -183,6 +183,6 @@ int main(int argc, char** argv) {
   AddInteger(app, "--frames", options.frames, 0, 1000, "Of dynamic balance");
   AddInteger(app, "--views", options.views, 1, 1000, "Azimuths, all round");
   AddInteger(app, "--repeats", options.repeats, 1, 1000, "Renderings of each box");
-  app.add_flag("--verbose", options.verbose, "Print the imbalance frame by frame; * where boxes changed");
-  return RunProgram(app, argc, argv, [&options] { return Run(options); });
+  app.AddFlag("--verbose", options.verbose, "Print the imbalance frame by frame; * where boxes changed");
+  return app.Run(argc, argv, [&options] { return Run(options); });
 }

@@ -52,18 +52,15 @@ def run_program(name: str, main, interrupted: str = "interrupted; the same comma
 
 
 class Service:
-    """A coordinator on the first host, a client on the second, a worker on each of the others. `link`: the links between them as real time
-    sees them, which the coordinator predicts frames with; none: its default."""
+    """A coordinator on the first host, a client on the second, a worker on each of the others."""
 
-    def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path, link: str | None = None):
+    def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path):
         self._programs, self._folder = programs, folder
         self._coordinator, self._client, *self._workers = hosts
         self._keys = folder / "keys"
         self._processes: dict[str, subprocess.Popen] = {}
         data = [text for name, path in data.items() for text in ("--data", f"{name}={path}")]
         listen = ["--listen", f"tcp://{self._coordinator.address}:7420", "--keys", str(self._keys)]
-        if link is not None:
-            listen += ["--link", link]
         self._start(self._coordinator, "coordinator", ["slabstream-coordinator", *listen, *data])
         self._wait("the coordinator listens", lambda: "ready" in (folder / "coordinator.log").read_text(encoding="utf-8"))
         for host in self._workers:

@@ -34,7 +34,7 @@
 #include "common/wire/payload.h"
 #include "laboratory/measure/statistics.h"
 #include "tests/support/temporary_directory.h"
-#include "worker/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 namespace {
@@ -420,24 +420,21 @@ Status Run(const Options& options) {
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
   Options options;
-  CLI::App app("Times combining among worker processes of this host", "combining_bench");
-  const CLI::Validator scheme([](const std::string& text) { return ParseCombining(text).status().message(); }, "");
-  AddList(app, "--ranks", options.ranks, CLI::Range(1, 64), "Numbers of workers");
-  AddList(app, "--size", options.sizes, CLI::Range(8, 8192), "Pixels a side, multiples of 8");
+  const BenchProgram app("Times combining among worker processes of this host", "combining_bench");
+  const auto scheme = [](const std::string&, const std::string& text) { return TextIf(ParseCombining(text).status(), text); };
+  AddList(app, "--ranks", options.ranks, Integers<Rank>(1, 64), "Numbers of workers");
+  AddList(app, "--size", options.sizes, Integers(8, 8192), "Pixels a side, multiples of 8");
   AddList(app, "--schemes", options.schemes, scheme, "Combining schemes, separated by semicolons", ';');
-  AddList(app, "--images", options.images, CLI::IsMember({"full", "sparse"}), "What the pictures fill");
-  AddList(app, "--links", options.links, CLI::IsMember({"shared", "ipc", "tcp", "sealed"}), "How images travel; sealed: tcp, encrypted");
-  app.add_option("--color", options.color, "Coding of colours that are sent: float32, half or fixed16")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, ColorCoding>{
-                                      {"float32", ColorCoding::kFloat32}, {"half", ColorCoding::kHalf}, {"fixed16", ColorCoding::kFixed16}})
-              .description(""))
-      ->type_name("NAME");
+  AddList(app, "--images", options.images, OneOf({"full", "sparse"}), "What the pictures fill");
+  AddList(app, "--links", options.links, OneOf({"shared", "ipc", "tcp", "sealed"}), "How images travel; sealed: tcp, encrypted");
+  AddChoice<ColorCoding, 3>(app, "--color", options.color, {"float32", "half", "fixed16"},
+                            {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16},
+                            "Coding of colours that are sent: float32, half or fixed16");
   const auto compression = [](const std::string&, const std::string& text) -> Result<Compression> {
     if (const auto parsed = ParseCompression(text)) return *parsed;
     return Status::InvalidArgument(fmt::format("--compress is '{}', but must be auto, on or off", text));
   };
-  AddParsed(app, "--compress", options.compression, compression, "Whether images are packed: auto, on or off")->type_name("NAME");
+  AddParsed(app, "--compress", options.compression, compression, "Whether images are packed: auto, on or off").TypeName("NAME");
   AddInteger(app, "--repeats", options.repeats, 1, 100000, "Frames of each scheme");
-  return RunProgram(app, argc, argv, [&options] { return Run(options); });
+  return app.Run(argc, argv, [&options] { return Run(options); });
 }

@@ -31,10 +31,8 @@ struct LargeCase {
   const char* decomposition;
   const char* small_dataset;
 };
-constexpr LargeCase kLargeCases[] = {{"mip", "mip", "slab", "other"},
-                                     {"kd-tree", "splat", "kd-tree", "other"},
-                                     {"auto", "splat", "auto", "other"},
-                                     {"same", "mip", "slab", "sphere"}};
+constexpr LargeCase kLargeCases[] = {
+    {"mip", "mip", "slab", "other"}, {"kd-tree", "splat", "kd-tree", "other"}, {"same", "mip", "slab", "sphere"}};
 
 FrameRequest SmallFrame(const char* dataset, int frame) {
   FrameRequest request;
@@ -51,7 +49,7 @@ FrameRequest LargeFrame(const LargeCase& of, const FairLoadOptions& options, int
   request.renderer = of.renderer;
   request.size = {options.size, options.size};
   request.policy.decomposition = of.decomposition;
-  if (of.decomposition == std::string("auto")) request.policy.assignment = request.policy.combine = request.policy.balance_by = "auto";
+  if (of.renderer == std::string("splat")) request.policy.balance_by = "occupied";
   if (of.renderer == std::string("mip")) request.parameters["sampling-rate"] = std::to_string(options.samples);
   request.transfer.choice = TransferFunction{.colors = {{0, {0, 0, 0}}, {255, {1, 1, 1}}},
                                              .opacities = {{0, 0}, {20, 0}, {60, 0.2 + 0.0001 * number}, {255, 0.5}}};

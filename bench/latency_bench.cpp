@@ -133,14 +133,14 @@ Status Run(const Options& options) {
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
   Options options;
-  CLI::App app("The latency of a frame beside its rendering", "latency_bench");
+  const BenchProgram app("The latency of a frame beside its rendering", "latency_bench");
   AddInteger(app, "--volume", options.volume, 2, 1024, "Voxels a side of the sphere");
   AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side");
   AddInteger(app, "--frames", options.frames, 1, 100000, "Measured frames");
   AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
   AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
   AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
-  app.add_flag("--straight8", options.straight8, "Ask for the codes of a PNG of 8 bits, a quarter of the bytes");
+  app.AddFlag("--straight8", options.straight8, "Ask for the codes of a PNG of 8 bits, a quarter of the bytes");
   AddRenderer(app, options.renderer);
-  return RunProgram(app, argc, argv, [&options] { return Run(options); });
+  return app.Run(argc, argv, [&options] { return Run(options); });
 }

@@ -153,7 +153,7 @@ class Load {
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
   Options options;
-  CLI::App app("A service under the load of many clients, one of which never reads", "load_bench");
+  const BenchProgram app("A service under the load of many clients, one of which never reads", "load_bench");
   AddInteger(app, "--clients", options.clients, 3, 1000, "Clients, with the one that never reads and the one that asks for large pictures");
   AddInteger(app, "--seconds", options.seconds, 20, 86400, "Duration; a quarter of it without those two");
   AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
@@ -163,10 +163,10 @@ int main(int argc, char** argv) {
   AddInteger(app, "--large", options.large, 1, 16384, "Pixels a side of the large pictures");
   bool fair = false;
   int samples = FairLoadOptions{}.samples;
-  app.add_flag("--fair", fair, "Instead: small frames beside large requests of another client, of --volume and --large");
+  app.AddFlag("--fair", fair, "Instead: small frames beside large requests of another client, of --volume and --large");
   AddInteger(app, "--samples", samples, 1, 16, "With --fair: samples in each voxel length of the large intensity projection");
   AddInteger(app, "--memory", options.memory_mebi, 256, 1 << 20, "MiB for the coordinator, and for each worker");
-  return RunProgram(app, argc, argv, [&] {
+  return app.Run(argc, argv, [&] {
     if (!fair) return Load(options).Run();
     return MeasureFairLoad(
         {.volume = options.volume, .size = options.large, .workers = options.workers, .threads = options.threads, .samples = samples});

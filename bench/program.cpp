@@ -1,10 +1,9 @@
 #include "bench/program.h"
 
-#include "common/base/parse_number.h"
 #include "common/base/version.h"
-#include "common/cli/program.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/count_drawn.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {
@@ -27,21 +26,23 @@ Result<BenchCase> ParseSubject(const SubjectOptions& options, const std::string&
 
 }  // namespace
 
-int RunProgram(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
-  SetUp(app, std::string(Version()));
-  return RunMain(app.get_name(), [&] { return ParseAndRun(app, argc, argv, run); });
+BenchProgram::BenchProgram(const std::string& description, const std::string& program)
+    : Program(description, program, std::string(Version())) {}
+
+int BenchProgram::Run(int argc, const char* const* argv, const std::function<Status()>& run) const {
+  return RunMain(name(), [&] { return ParseAndRun(*this, argc, argv, run); });
 }
 
-CLI::Option* AddRenderer(CLI::App& app, const RendererKind*& target, const std::string& help) {
+Option AddRenderer(const Command& app, const RendererKind*& target, const std::string& help) {
   const auto parse = [](const std::string&, const std::string& text) { return RequireRenderer(text); };
   return AddParsed(app, "--renderer", target, parse, fmt::format("{}: {}", help, fmt::join(RendererNames(), ", ")))
-      ->type_name("NAME")
-      ->default_str(target == nullptr ? "" : std::string(target->name()));
+      .TypeName("NAME")
+      .Default(target == nullptr ? "" : std::string(target->name()));
 }
 
-void AddSubjectOptions(CLI::App& app, SubjectOptions& options) {
-  app.add_option("VOLUME", options.volumes, "Standard cases of `slabstream bench`, FILE[:TRANSFER], or sphere1:N and sphere2:N[:PRESET]")
-      ->required();
+void AddSubjectOptions(const Command& app, SubjectOptions& options) {
+  app.AddTexts("VOLUME", options.volumes, "Standard cases of `slabstream bench`, FILE[:TRANSFER], or sphere1:N and sphere2:N[:PRESET]")
+      .Required();
   AddRenderer(app, options.renderer);
   AddInteger(app, "--size", options.size, 1, kMaxImageSide, "Pixels a side");
   AddNumber(app, "--azimuth", options.azimuth, {-360, 360}, "Degrees that the eye turns about +z");

@@ -5,13 +5,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "client/cli/option_groups.h"
+#include "common/cli/add_option.h"
+#include "common/cli/program.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/registry.h"
 #include "common/volume/occupancy_grid.h"
@@ -19,30 +22,40 @@
 
 namespace slabstream {
 
-// Parses the command line and runs; returns the exit status. For main alone.
-int RunProgram(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);
+// A program of this folder.
+struct BenchProgram : Program {
+  BenchProgram(const std::string& description, const std::string& name);
+  // Parses the command line and runs; returns the exit status. For main alone.
+  int Run(int argc, const char* const* argv, const std::function<Status()>& run) const;
+};
 
-// A list in one argument: "A,B". CLI11 checks each entry.
-template <class T>
-CLI::Option* AddList(CLI::App& app, const std::string& name, std::vector<T>& target, const CLI::Validator& check, const std::string& help,
-                     char delimiter = ',') {
-  return app.add_option(name, target, help)
-      ->delimiter(delimiter)
-      ->check(check.description(""))
-      ->type_name("LIST")
-      ->default_str(fmt::format("{}", fmt::join(target, std::string(1, delimiter))));
+// A list in one argument: "A,B". `parse` as in AddParsed.
+template <class T, class Parse>
+Option AddList(const Command& app, const std::string& name, std::vector<T>& target, Parse parse, const std::string& help,
+               char separator = ',') {
+  const std::string standard = fmt::format("{}", fmt::join(target, std::string(1, separator)));
+  return AddParsedList(app, name, target, std::move(parse), help, separator).Default(standard);
+}
+
+// For AddList: integers in [min, max].
+template <class T = int>
+auto Integers(int min, int max) {
+  return [min, max](const std::string& option, const std::string& text) -> Result<T> {
+    const Result<int> number = ParseInteger(option, text, min, max);
+    return number.ok() ? Result<T>(T(*number)) : Result<T>(number.status());
+  };
 }
 
 // The names in a list such as Decompositions().
 template <class Entries>
-std::vector<std::string> NamesOf(const Entries& entries) {
-  std::vector<std::string> names;
-  for (const auto& entry : entries) names.emplace_back(entry.name);
+std::vector<std::string_view> NameList(const Entries& entries) {
+  std::vector<std::string_view> names;
+  for (const auto& entry : entries) names.push_back(entry.name);
   return names;
 }
 
 // --renderer. Null stays if it is not given.
-CLI::Option* AddRenderer(CLI::App& app, const RendererKind*& target, const std::string& help = "How voxels become a picture");
+Option AddRenderer(const Command& app, const RendererKind*& target, const std::string& help = "How voxels become a picture");
 
 // A volume under a transfer function, and a view of it.
 struct Subject {
@@ -51,7 +64,7 @@ struct Subject {
   std::shared_ptr<const VolumeSummary> summary;
   std::shared_ptr<const OccupancyGrid> occupied;
   FrameRequest request;
-  FrameSetup setup;  // of the request
+  FrameSetup setup;  // the request's setup
 };
 
 struct SubjectOptions {
@@ -60,7 +73,7 @@ struct SubjectOptions {
   int size = 512;  // pixels a side
   double azimuth = 30, elevation = 20, zoom = 1;
 };
-void AddSubjectOptions(CLI::App& app, SubjectOptions& options);
+void AddSubjectOptions(const Command& app, SubjectOptions& options);
 
 // `text`: as ParseBenchCase takes it, or "sphere1:N[:PRESET]" or "sphere2:N[:PRESET]", one of the paper's classes. Errors also of
 // LoadBenchVolume, ResolveRequest and MakeFrameSetup.

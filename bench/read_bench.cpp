@@ -5,12 +5,11 @@
 #include <iostream>
 #include <list>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/json/json.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 
 namespace slabstream {
@@ -73,7 +72,7 @@ int Run(const std::string& path) {
     std::cerr << "read_bench: " << bytes.status().message() << '\n';
     return 1;
   }
-  std::cout << nlohmann::json{{"seconds", seconds}, {"bytes", *bytes}} << '\n';
+  std::cout << Json{{"seconds", seconds}, {"bytes", *bytes}} << '\n';
   return 0;
 }
 

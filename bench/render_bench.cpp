@@ -7,7 +7,6 @@
 // Time is of a frame. Counters of stages are milliseconds a frame, summed over threads and boxes; `finish` is making the picture from the
 // frame.
 #include <benchmark/benchmark.h>
-#include <tbb/task_arena.h>
 
 #include <atomic>
 #include <chrono>
@@ -15,6 +14,7 @@
 #include <memory>
 
 #include "common/decomposition/decomposition.h"
+#include "common/parallel/task_arena.h"
 #include "common/planning/frame_plan.h"
 #include "laboratory/bench/bench_cases.h"
 #include "worker/renderers/renderer.h"
@@ -43,11 +43,11 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
   RenderControl control;
-  tbb::task_arena arena(threads);
+  TaskArena arena(threads);
   std::chrono::duration<double, std::milli> finish{};
   std::size_t frame = 0;
   const auto render = [&](RankReport& report) {
-    arena.execute([&] {
+    arena.Run([&] {
       const FrameSetup& setup = setups[frame++ % setups.size()];
       LocalImage image;
       for (std::size_t i = 0; i < data.size(); ++i) {
@@ -130,7 +130,7 @@ void EmptySpace(benchmark::State& state) {
   const auto side = std::int32_t(state.range(0));
   const Volume volume = Surround(MakeSphere({SphereClass::kHollow, kObject, 0.05}).value(), side);
   const ViewParameters view{.azimuth_degrees = 30, .elevation_degrees = 20, .zoom = double(side) / kObject};
-  Render(state, volume, KindAt(state.range(1)), {view}, 1, tbb::task_arena::automatic);
+  Render(state, volume, KindAt(state.range(1)), {view}, 1, DefaultThreads());
 }
 BENCHMARK(EmptySpace)
     ->ArgNames({"side", "renderer"})

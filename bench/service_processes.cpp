@@ -5,9 +5,9 @@
 
 #include "client/service/service_state.h"
 #include "common/base/check.h"
-#include "common/base/program_beside.h"
+#include "common/files/program_beside.h"
 #include "common/volume/sphere.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {

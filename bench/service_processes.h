@@ -13,9 +13,9 @@ namespace slabstream {
 
 struct ServiceProcessesOptions {
   std::string directory;                       // for the volume, the log and ipc files
-  std::string listen = "tcp://127.0.0.1:*";    // of the coordinator
+  std::string listen = "tcp://127.0.0.1:*";    // where the coordinator listens
   int volume = 64;                             // voxels a side of the sphere
-  int other_volume = 0;                        // of the other one; 0: there is none
+  int other_volume = 0;                        // voxels a side of a second sphere; 0: there is none
   int workers = 2, threads = 1;                // threads: of each worker
   bool keys = false;                           // connections are encrypted; keys are made in the directory
   std::vector<std::string> arguments_of_each;  // further ones, of the coordinator and of each worker
@@ -32,7 +32,7 @@ class ServiceProcesses {
 
   // Connects once all workers have registered.
   Client Connect(Context& context, bool direct_pictures = true) const;
-  const std::string& endpoint() const { return endpoint_; }  // of clients
+  const std::string& endpoint() const { return endpoint_; }  // where clients connect
   std::vector<std::pair<std::string, pid_t>> pids() const;   // by name: "coordinator", "worker 1"
 
  private:

@@ -70,12 +70,12 @@ Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  CLI::App app("Frames of the service beside simulated ones", "simulation_bench");
+  const BenchProgram app("Frames of the service beside simulated ones", "simulation_bench");
   Options options;
-  app.add_option("CASE", options.cases, "Standard cases of `slabstream bench`, or FILE[:TRANSFER]")->required();
+  app.AddTexts("CASE", options.cases, "Standard cases of `slabstream bench`, or FILE[:TRANSFER]").Required();
   AddInteger(app, "--size", options.size, 16, 2048, "Pixels a side");
   AddInteger(app, "--views", options.views, 1, 1000, "Azimuths over a turn");
   AddInteger(app, "--turns", options.turns, 1, 1000, "Frames of each view, measured and simulated");
   AddRenderer(app, options.renderer, "Instead of the case's");
-  return RunProgram(app, argc, argv, [&options] { return Run(options); });
+  return app.Run(argc, argv, [&options] { return Run(options); });
 }

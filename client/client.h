@@ -44,7 +44,7 @@ struct ServiceAddress {
   ServiceAddress(const char* at) : endpoint(at) {}  // NOLINT(google-explicit-constructor)
 
   std::string endpoint;
-  std::optional<ClientKeys> keys;  // of role client or admin; none: the service has no keys
+  std::optional<ClientKeys> keys;  // the keys of a client or an admin; none: the service has no keys
   bool direct_pictures = true;     // with keys, workers that can reach this host send it pictures; else all come through the coordinator
 };
 
@@ -74,7 +74,7 @@ class Client {
   // A question about what a dataset holds; its nonce is filled in. It ends with a QuestionReply or a Status. If its dataset is not loaded,
   // it is loaded first.
   RequestId Submit(Question question, Duration deadline = kAnswerTime);
-  void Cancel(RequestId request);  // of a question: nothing is heard of it any more
+  void Cancel(RequestId request);  // cancels a question, too: nothing more is heard of it
 
   // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
   // service stops answering, every open request gets an Unavailable event. A request that the service has lost, because it was started

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "client/client.h"
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/socket.h"
 #include "common/wire/client_messages.h"
 
@@ -39,7 +39,7 @@ class DirectPictures {
 
   struct Reply {
     FrameReply message;
-    std::vector<Bytes> runs;  // of each share; empty: they are direct and have not come, or there are none
+    std::vector<Bytes> runs;  // the runs of each share; empty: they are direct and have not come, or there are none
   };
   // A reply without some of its runs. They are lost if they do not come until then.
   void Await(Reply reply, Time until) { awaited_.push_back({std::move(reply), until}); }

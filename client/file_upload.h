@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/client.h"
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/wire/volume_messages.h"
 
 namespace slabstream {
@@ -43,7 +43,7 @@ class FileUpload {
 
   const AddVolume order_;
   const Events events_;
-  // Of the thread.
+  // Used by the upload's thread alone.
   std::uint64_t allowed_ = 0, sent_ = 0;
   std::uint64_t pings_ = 0;
   // Shared.

@@ -5,11 +5,12 @@
 #   client-runtime      libslabstream.so.N, and the module that writes EXR, TIFF, PDF and SVG
 #   client-development  header, CMake package, pkg-config file, examples; needs client-runtime
 #   python              the Python client
-#   lab                 slabstream-lab, the pages of experiments
+#   lab                 slabstream-laboratory, which `slabstream bench` and `slabstream experiment` start, and slabstream-lab, the pages of experiments
 include(CMakePackageConfigHelpers)
 
 # Programs look for each other beside themselves.
-foreach(program slabstream-coordinator:server slabstream-worker:server slabstream-dicom-decoder:server slabstream:cli slabstream-gateway:gateway)
+foreach(program slabstream-coordinator:server slabstream-worker:server slabstream-dicom-decoder:server slabstream:cli slabstream-gateway:gateway
+    slabstream-laboratory:lab)
   string(REPLACE ":" ";" program ${program})
   list(GET program 0 name)
   list(GET program 1 component)
@@ -19,7 +20,9 @@ endforeach()
 # The client library in C++.
 install(TARGETS slabstream_api EXPORT SlabstreamTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT client-runtime NAMELINK_COMPONENT client-development)
-install(TARGETS slabstream_pictures LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/slabstream COMPONENT client-runtime)
+if(SLABSTREAM_PICTURES)
+  install(TARGETS slabstream_pictures_module LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/slabstream COMPONENT client-runtime)
+endif()
 install(FILES ${CMAKE_SOURCE_DIR}/client/api/slabstream/client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/slabstream COMPONENT client-development)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT client-development USE_SOURCE_PERMISSIONS)
 

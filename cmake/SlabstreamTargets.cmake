@@ -28,14 +28,7 @@ endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(slabstream_options INTERFACE "SHELL:--param ggc-min-heapsize=524288")
 endif()
-# No SSSE3 on x86: processors that have it but not SSE4 were made in 2006 and 2007, and run the kernels for SSE2.
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  target_compile_definitions(slabstream_options INTERFACE HWY_DISABLED_TARGETS=HWY_SSSE3)
-endif()
-# Kernels keep vectors in arrays and structs, which those of SVE, whose size no compiler knows, cannot be kept in: NEON on all of Arm.
-if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
-  target_compile_definitions(slabstream_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
-endif()
+target_compile_definitions(slabstream_options INTERFACE ${SLABSTREAM_SIMD_DEFINITIONS})
 if(SLABSTREAM_WERROR)
   target_compile_options(slabstream_options INTERFACE -Werror)
   # g++ 12 reports these two inside its own std::string, where code that holds strings is inlined; they stay warnings.
@@ -63,11 +56,17 @@ function(slabstream_library name)
   add_library(slabstream::${name} ALIAS ${target})
 endfunction()
 
-# slabstream_cold(LEVEL target...): code that frames do not wait for compiles sooner with less optimisation. Programs need -O2: the linker may
-# take their copies of inline functions for those of hot code, and -O1 keeps the loop that destroys each float of an image.
-function(slabstream_cold level)
+# slabstream_hot_folder(): frames wait for the loops in this folder and below. They are compiled file by file, with -O3; all others several at
+# a time, with -O2.
+macro(slabstream_hot_folder)
+  set(CMAKE_UNITY_BUILD OFF)
+  add_compile_options($<$<CONFIG:Release,RelWithDebInfo>:-O3>)
+endmacro()
+
+# slabstream_cold(target...): code of tests. Programs need -O2: -O1 keeps the loop that destroys each float of an image.
+function(slabstream_cold)
   foreach(target IN LISTS ARGN)
-    target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:${level}>)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
   endforeach()
 endfunction()
 
@@ -82,14 +81,15 @@ function(slabstream_program name)
 endfunction()
 
 # slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...] [COST seconds] [WAITS]): a GoogleTest program in
-# build/tests, one ctest. COST: long ones begin first. WAITS: it leaves the processors to others most of the time.
+# build/tests, one ctest. COST: long ones begin first. WAITS: it leaves the processors to others most of the time. A test without labels and
+# cost is quick: the target quick_tests builds all of these, and ctest -L quick runs them.
 function(slabstream_test name)
   cmake_parse_arguments(ARG "WAITS" "TIMEOUT;COST" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} slabstream_test_main FOLDER tests)
-  slabstream_cold(-O1 ${name})
+  slabstream_cold(${name})
   if(SLABSTREAM_UNITY) # as for unity builds: the files compile without it, too
     target_precompile_headers(${name} REUSE_FROM slabstream_test_main)
   endif()
@@ -98,6 +98,10 @@ function(slabstream_test name)
   set(processors 2)
   if(ARG_WAITS)
     set(processors 1)
+  endif()
+  if(NOT ARG_COST AND NOT ARG_LABELS)
+    set(ARG_LABELS quick)
+    set_property(GLOBAL APPEND PROPERTY SLABSTREAM_QUICK_TESTS ${name})
   endif()
   if(NOT ARG_COST)
     set(ARG_COST 0)

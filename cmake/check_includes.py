@@ -6,13 +6,23 @@
 TARGETS is written by SlabstreamIncludeCheck.cmake. A file may use what its target links, what those targets link publicly, and so
 on. A header that other targets include may use only what its target links publicly. A header belongs to the target that compiles
 the source of the same name; if none does, to the targets of its folder, or of the next folder above that has any. Headers without
-a source below tests/ belong to whoever includes them. A renderer is a folder of common/renderers or worker/renderers. Prints a line for each violation; exit status 1 if there is any.
+a source below tests/ belong to whoever includes them. Headers of SEALED libraries, which take long to compile, are for one target. A
+renderer is a folder of common/renderers or worker/renderers. Prints a line for each violation; exit status 1 if there is any.
 """
 import re
 import sys
 from pathlib import Path
 
 INCLUDE = re.compile(r'\s*#\s*include\s*"([^"]+)"')
+# Folder of headers: the target that may include them.
+SEALED = {
+    "CLI": "slabstream_cli",
+    "boost/beast": "slabstream_http",
+    "nlohmann": "slabstream_json",
+    "oneapi/tbb": "slabstream_parallel",
+    "tbb": "slabstream_parallel",
+}
+SEALED_INCLUDE = re.compile(rf'\s*#\s*include\s*<(({"|".join(SEALED)})[/.][^>]*)>')
 GENERATED = "slabstream/v1/"  # headers made from the folder proto
 
 
@@ -71,6 +81,13 @@ class Check:
             elif match and (self.root / match.group(1)).is_file():
                 yield number, match.group(1), self.owners(Path(match.group(1)))
 
+    def sealed(self):
+        for file in self.files:
+            for number, line in enumerate((self.root / file).read_text().splitlines(), 1):
+                match = SEALED_INCLUDE.match(line)
+                if match and SEALED[match.group(2)] not in self.owners(file):
+                    yield f"{file}:{number}: {match.group(1)} is for {SEALED[match.group(2)]} alone"
+
     def linked_renderers(self):
         halves = {name: target for name, target in self.targets.items() if target.renderer()}
         for name, target in halves.items():
@@ -80,6 +97,7 @@ class Check:
 
     def violations(self):
         yield from self.linked_renderers()
+        yield from self.sealed()
         shared = {text for file in self.files for _, text, of in self.includes(file) if not self.owners(file) & of}
         for file in self.files:
             own = self.owners(file)

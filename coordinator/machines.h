@@ -21,10 +21,10 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/log.h"
 #include "common/base/read_share.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/planning/levels.h"
 #include "common/planning/resolved_request.h"
 #include "common/wire/client_messages.h"
@@ -47,7 +47,7 @@ struct Note {
 };
 
 // ---- from FrameMachine to DatasetMachine
-using UseId = std::uint64_t;  // of a request's dataset; from 1, never given twice
+using UseId = std::uint64_t;  // a request's dataset; from 1, never given twice
 struct SeekDataset {
   UseId use = 0;
   std::shared_ptr<const FrameRequest> request;  // never null
@@ -75,19 +75,20 @@ using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetCl
 // ---- from DatasetMachine to FrameMachine
 struct DatasetAwaited {
   bool loading = false;  // else it is not known yet whether there is such a dataset
-  ReadShare read;        // of its samples, as far as is known
+  ReadShare read;        // how much of its samples has been read, as far as is known
 };
 struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
-  // Of a dataset with several levels; null: it has one. The voxels are those of the finest one that is drawn (AtLevel).
+  // The levels of a dataset that has several; null: it has one. The voxels are those of the finest one that is drawn
+  // (AtLevel).
   std::shared_ptr<const VolumeLevels> levels = nullptr;
-  std::optional<ViewParameters> view = {};  // of such a dataset: the view that the levels were chosen for (ChooseView)
+  std::optional<ViewParameters> view = {};  // with several levels: the view that they were chosen for (ChooseView)
   std::vector<int> drawn = {0};             // numbers of levels, finest first
   // If there are several of these: which parts, and those beside the finest one (ResolvedRequest).
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
-  std::optional<CoarserVolume> light = {};  // of such a dataset, if the request needs it (ResolvedRequest)
+  std::optional<CoarserVolume> light = {};  // with several levels: the light volume, if the request needs it (ResolvedRequest)
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

@@ -9,10 +9,8 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/frame_window.h"
-#include "common/planning/hosted_worker.h"
 #include "common/planning/levels.h"
 #include "common/planning/worker_memory.h"
-#include "common/stats/prediction.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
 #include "coordinator/peer_token.h"
@@ -25,14 +23,14 @@ struct PlanRequest {
   PlanId plan = 0;
   PeerToken client = 0;
   std::shared_ptr<const ResolvedRequest> resolved;  // never null; every plan of a request has the same one
-  // Of its volume; null: the policy does not need it (NeedsOccupancy), or begins without it.
-  std::shared_ptr<const OccupancyGrid> occupied;
-  Roster roster;  // of the frame's team, with a worker in it
+  std::shared_ptr<const OccupancyGrid> occupied;    // of its volume; null: the policy does not need it (NeedsOccupancy)
+  Roster roster;                                    // the frame's team; it has a worker
   Turn turn;
-  std::uint64_t share_pixels = 0;          // as in ClientTakes
-  std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
-  std::vector<WorkerLimit> limits = {};    // of all of them, and of those that are leaving
-  // Of a dataset with several levels: what the client asked for, and the level that `resolved` is of. Null: it has one.
+  std::uint64_t share_pixels = 0;        // ClientTakes::share_pixels
+  std::uint64_t worker_memory = 0;       // bytes: the least limit of the workers that stay; 0: none has stated one
+  std::vector<WorkerLimit> limits = {};  // the limits of all workers, and of those that are leaving
+  // For a dataset with several levels: what the client asked for, its levels, and the level that `resolved` is of.
+  // Null: the dataset has one level.
   std::shared_ptr<const FrameRequest> frame = nullptr;
   std::shared_ptr<const VolumeLevels> levels = nullptr;
   int level = 0;
@@ -41,16 +39,13 @@ struct PlanRequest {
 
 struct PlannedFrame {
   PlanRequest asked;
-  ResolvedPolicy policy = {};  // policy that the plan was made by
-  // None: the policy was not open or is not chosen yet, or the frame is too much to simulate.
-  std::optional<FramePrediction> prediction = {};
-  double render_scale = 1;  // used for the prediction (PolicyTable)
   FramePlan plan = {};
   Result<int> fit = kMostInWindow;  // FramesThatFit
-  // If it does not fit: the finest of the coarser levels that does. Of a dataset that has one level: that slabstream convert would make.
+  // If the frame does not fit: the finest of the coarser levels that does. If the dataset has one level: the level that
+  // slabstream convert would make.
   std::optional<int> level_that_fits = {};
 
-  bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames
+  bool teaches() const { return asked.occupied != nullptr; }  // render times help to plan coming frames
 };
 
 // A finished frame: how it was planned and how long its boxes took to render, for the planner to learn from.

@@ -6,16 +6,19 @@
 # The time of all files in what is made, so that the same input makes the same bytes: SOURCE_DATE_EPOCH, or that of the last commit.
 epoch() { printf '%s' "${SOURCE_DATE_EPOCH:-$(git -C "$repository" log -1 --format=%ct 2> /dev/null || echo 0)}"; }
 
-# The programs, into $work/programs. The one place that knows where they come from.
+# The programs, into $work/programs: those of dist/*.deb, else those of build/ if they run on every processor, else of packages that are made
+# now. The one place that knows where they come from.
 install_programs() {
-  local folder="$work/programs" packages=("$repository"/dist/*.deb) package
+  local folder="$work/programs" package
   mkdir -p "$folder"
-  if [[ -e "${packages[0]}" ]]; then
-    for package in "${packages[@]}"; do dpkg-deb --extract "$package" "$folder"; done
-  else
-    [[ -x "$repository/build/bin/slabstream-worker" ]] || fail "there are no programs: deploy/build makes them"
-    cmake --install "$repository/build" --prefix "$folder/usr" --strip > /dev/null
+  if ! compgen -G "$repository/dist/*.deb" > /dev/null; then
+    if [[ -x "$repository/build/bin/slabstream-worker" && "$(configured SLABSTREAM_NATIVE)" != ON ]]; then
+      cmake --install "$repository/build" --prefix "$folder/usr" --strip > /dev/null
+      return
+    fi
+    "$repository/deploy/debian-packages"
   fi
+  for package in "$repository"/dist/*.deb; do dpkg-deb --extract "$package" "$folder"; done
 }
 
 # Arguments: a root, and programs that come into it.

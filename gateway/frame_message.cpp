@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "client/picture_codec/picture_codec.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/frame_json.h"
 #include "client/report/frame_spans.h"
 #include "client/report/frame_summary.h"
@@ -88,12 +88,11 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
       view.format.annotations.any() ? PixelBounds{0, 0, view.size.width, view.size.height} : view.image.ContentBounds();
   EncodedView encoded{.seq = view.seq, .header = {}, .bytes = nullptr, .encoding = {}, .type = final ? "png" : "jpeg"};
   std::vector<std::byte> bytes;
-  if (!bounds.empty() && final) {
-    std::optional<std::vector<std::byte>> png = EncodePng(*picture, bounds, given_up);
-    if (!png) return Status::Cancelled("a newer view has come");
-    bytes = *std::move(png);
-  } else if (!bounds.empty()) {
-    bytes = EncodeJpeg(*picture, bounds, quality);
+  if (!bounds.empty()) {
+    const PictureFileType type = final ? PictureFileType::kPng : PictureFileType::kJpeg;
+    std::optional<std::vector<std::byte>> part = EncodePart(type, *picture, bounds, quality, given_up);
+    if (!part) return Status::Cancelled("a newer view has come");
+    bytes = *std::move(part);
   }
   const StraightColor& background = view.format.background;
   Json statistics = StatisticsJson(view.statistics, view.latency, view.timeline);
@@ -120,7 +119,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
 std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip) {
   header["frame"] = frame;
   header["statistics"]["round_trip_ms"] = Milliseconds(round_trip.count());
-  const std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = header.dump();
   std::string head;
   for (int byte = 0; byte < 4; ++byte) head += char((text.size() >> (8 * byte)) & 0xFF);
   return head + text;

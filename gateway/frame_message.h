@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "common/base/status.h"
 
@@ -19,13 +19,13 @@ namespace slabstream {
 struct RenderedView {
   std::uint64_t seq = 0;
   double scale = 1;
-  double coarseness = 1;  // of what is shown: 1 if a smaller one would change nothing
-  ImageSize size;         // of the whole picture
+  double coarseness = 1;  // how coarse the picture is; 1: a smaller number would change nothing
+  ImageSize size;         // the size of the whole picture
   PictureImage image;
   PictureFormat format;
   PictureKey key;
-  std::vector<PictureGeometry> panes;  // of the pictures side by side
-  FrameStatistics statistics;          // of the leftmost
+  std::vector<PictureGeometry> panes;  // one for each of the pictures side by side
+  FrameStatistics statistics;          // the statistics of the leftmost picture
   Duration latency{};
   bool timeline = false;
 };

@@ -206,11 +206,11 @@ class Gateway::Impl : public HttpApplication {
                             return HttpReply{.type = "text/plain; version=0.0.4", .body = metrics_.Text(*news_, traces)};
                           })};
     routes["/api/v1/openapi.json"] = {.open = true, .handle = answer([] {
-                                                      static const std::string text = JsonText(OpenApi());
+                                                      static const std::string text = OpenApi().dump() + "\n";
                                                       return HttpReply{.body = text};
                                                     })};
     routes["/api/v1/options"] = {.open = true, .handle = answer([] {
-                                                 static const std::string text = JsonText(OfferedOptions());
+                                                 static const std::string text = OfferedOptions().dump() + "\n";
                                                  return HttpReply{.body = text};
                                                })};
     routes["/api/v1/status"] = {

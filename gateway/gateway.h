@@ -32,14 +32,14 @@ namespace slabstream {
 struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
-  std::string proxy_origin;                // of --behind-proxy, as ParseOrigin gives it; empty: none
-  std::vector<std::string> frame_sources;  // whose pages may show the viewer in a frame, as ParseFrameSource gives them
+  std::string proxy_origin;                // --behind-proxy, as ParseOrigin gives it; empty: there is no proxy
+  std::vector<std::string> frame_sources;  // origins whose pages may show the viewer in a frame, as ParseFrameSource gives them
   std::string token;                       // CheckToken
-  std::optional<HttpUrl> collector;        // of OpenTelemetry, which gets traces of requests; none: there are no traces
+  std::optional<HttpUrl> collector;        // OpenTelemetry's collector, which gets traces of requests; none: there are no traces
   HttpLimits limits;
   int max_sessions = 64;
   int max_renders = 16;                           // pictures over HTTP under way
-  std::uint64_t max_upload_bytes = kUploadBytes;  // of a file that a page sends; 0: none are taken
+  std::uint64_t max_upload_bytes = kUploadBytes;  // the most bytes of a file that a page sends; 0: no file is taken
 };
 
 class Gateway {

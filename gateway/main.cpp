@@ -1,17 +1,17 @@
 // slabstream-gateway: pictures of a service over HTTP and WebSockets (docs/http.md). It ends on SIGINT or SIGTERM.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <string>
 
 #include "client/service/service_choice.h"
 #include "client/service/service_state.h"
 #include "common/base/notify_ready.h"
-#include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/http/address.h"
+#include "common/kernels/simd_target.h"
 #include "common/otlp/trace_sender.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/context.h"
 #include "common/volume/memory_budget.h"
 #include "gateway/gateway.h"
@@ -31,6 +31,7 @@ Result<std::uint64_t> ParseUploadLimit(const std::string& option, const std::str
 }
 
 Status Serve(Options options) {
+  if (Status simd = LimitSimdTargetByEnvironment(); !simd.ok()) return simd;
   BlockStopSignals();
   const Result<ServiceAddress> service = ResolveService(options.service);
   if (!service.ok()) return service.status();
@@ -58,39 +59,39 @@ Status Serve(Options options) {
 
 int Run(int argc, char** argv) {
   Options options;
-  CLI::App app("Slabstream gateway: serves pictures to browsers and scripts, over HTTP and WebSockets.", "slabstream-gateway");
-  SetUp(app, std::string(Version()));
+  const Program app("Slabstream gateway: serves pictures to browsers and scripts, over HTTP and WebSockets.", "slabstream-gateway",
+                    std::string(Version()));
   AddService(app, options.service);
   AddParsed(app, "--listen", options.gateway.listen, ParseListenAddress,
             "Address of this machine to listen at; port 0 takes any free port. Addresses that are not loopback need TLS or a proxy")
-      ->type_name("HOST:PORT")
-      ->default_str("127.0.0.1:0");
-  CLI::Option* const certificate =
-      app.add_option("--tls-cert", options.tls.certificate, "Certificate for TLS, with its chain (PEM)")->type_name("FILE");
-  CLI::Option* const key = app.add_option("--tls-key", options.tls.key, "Private key of the certificate (PEM)")->type_name("FILE");
-  certificate->needs(key);
-  key->needs(certificate);
+      .TypeName("HOST:PORT")
+      .Default("127.0.0.1:0");
+  const Option certificate =
+      app.AddText("--tls-cert", options.tls.certificate, "Certificate for TLS, with its chain (PEM)").TypeName("FILE");
+  const Option key = app.AddText("--tls-key", options.tls.key, "Private key of the certificate (PEM)").TypeName("FILE");
+  certificate.Needs(key);
+  key.Needs(certificate);
   AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
             "Public address of a proxy that ends TLS, such as https://viewer.example.org")
-      ->type_name("ORIGIN");
+      .TypeName("ORIGIN");
   AddParsedList(
       app, "--frame-in", options.gateway.frame_sources, ParseFrameSource,
       "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
       "vscode-webview: for notebooks of VS Code")
-      ->type_name("ORIGIN");
+      .TypeName("ORIGIN");
   AddParsed(app, "--max-upload", options.gateway.max_upload_bytes, ParseUploadLimit,
             "Largest file that a page may send to the service as a dataset; 0: none may")
-      ->type_name("SIZE")
-      ->default_str(MemoryText(kUploadBytes));
-  app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
-      ->type_name("FILE")
-      ->default_str("a new random one at each start");
+      .TypeName("SIZE")
+      .Default(MemoryText(kUploadBytes));
+  app.AddText("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
+      .TypeName("FILE")
+      .Default("a new random one at each start");
   AddParsed(
       app, "--otlp", options.gateway.collector, ParseCollector,
       "Send a trace of each picture and question to an OpenTelemetry collector, by OTLP over HTTP without TLS; the path is /v1/traces "
       "unless given")
-      ->type_name("URL")
-      ->default_str("$OTEL_EXPORTER_OTLP_ENDPOINT, or no traces");
+      .TypeName("URL")
+      .Default("$OTEL_EXPORTER_OTLP_ENDPOINT, or no traces");
   return RunService(app, argc, argv, "gateway", [&] { return Serve(std::move(options)); });
 }
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <utility>
 
-#include "client/image_io/annotations.h"
 #include "client/movie/movie_encoder.h"
 #include "client/movie/turntable.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/camera_file.h"
 #include "client/request/request_options.h"
 #include "common/base/printable.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "client/image_io/picture_file_type.h"
 #include "client/movie/turntable.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/picture_fields.h"
 #include "common/base/version.h"
 #include "gateway/movie_requests.h"

@@ -36,7 +36,7 @@ Result<PageMessage> ParsePageMessage(std::string_view text);
 // A parsed view, as frames to be rendered, from left to right in the picture.
 struct PictureJob {
   std::vector<FrameRequest> frames;  // at least one, all of one size
-  ImageSize size;                    // of the whole picture
+  ImageSize size;                    // the size of the whole picture
   PictureFormat format;
 };
 // InvalidArgument: as ParseRenderFields.

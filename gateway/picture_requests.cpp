@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/picture_record.h"
 #include "common/classification/transfer_function.h"
 

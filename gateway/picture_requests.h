@@ -1,7 +1,7 @@
 // Requests for pictures in files of any type, and for the command that makes one. All calls on the io thread.
 #pragma once
 
-#include "client/image_io/picture_file_type.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/picture_fields.h"
 #include "gateway/request_trace.h"
 #include "gateway/requests_under_way.h"

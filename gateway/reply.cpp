@@ -20,10 +20,12 @@ unsigned HttpStatus(StatusCode code) {
 
 }  // namespace
 
-std::string JsonText(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"; }
-
-HttpReply JsonReply(const Json& json) { return {.body = JsonText(json)}; }
-HttpReply Failure(unsigned status, std::string_view message) { return {.status = status, .body = JsonText({{"error", message}})}; }
+HttpReply JsonReply(const Json& json) { return {.body = json.dump() + "\n"}; }
+HttpReply Failure(unsigned status, std::string_view message) {
+  HttpReply reply = JsonReply({{"error", message}});
+  reply.status = status;
+  return reply;
+}
 HttpReply Failure(const Status& status) { return Failure(HttpStatus(status.code()), status.message()); }
 
 }  // namespace slabstream

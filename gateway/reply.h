@@ -12,8 +12,6 @@ namespace slabstream {
 
 using ReplyFunction = std::function<void(HttpReply)>;
 
-// Text that is not UTF-8 is repaired.
-std::string JsonText(const Json& json);
 HttpReply JsonReply(const Json& json);
 HttpReply Failure(unsigned status, std::string_view message);
 HttpReply Failure(const Status& status);  // never of Ok

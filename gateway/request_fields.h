@@ -19,7 +19,7 @@ Result<std::string> Take(PictureFields& fields, const std::string& name, std::st
 // The same, but `usual` if it is missing.
 Result<std::string> TakeOr(PictureFields& fields, const std::string& name, std::string_view usual);
 
-// Of fields that name a dataset and nothing else.
+// The dataset that these fields name. InvalidArgument: they name anything else.
 Result<std::string> OnlyDataset(PictureFields fields);
 
 }  // namespace slabstream

@@ -15,7 +15,7 @@ class io_context;
 
 namespace slabstream {
 
-inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // of the service
+inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // how long the service may take
 
 class RequestsUnderWay {
  public:

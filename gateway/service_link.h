@@ -15,8 +15,7 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/image_io/annotations.h"
-#include "client/image_io/picture_key.h"
+#include "client/pictures/picture_writer.h"
 #include "common/base/status.h"
 
 namespace slabstream {
@@ -26,8 +25,8 @@ class ServiceLink {
   using Ticket = std::uint64_t;
   using AnswerHandler = std::function<void(Result<QuestionReply>)>;
   struct Rendered {
-    std::vector<Picture> pictures;  // of each frame
-    PictureKey key;                 // of the first frame, if it was asked for
+    std::vector<Picture> pictures;  // one for each frame
+    PictureKey key;                 // the key of the first frame, if it was asked for
   };
   struct Handlers {
     std::function<void(const FrameProgress&)> progress;  // may be empty
@@ -61,11 +60,11 @@ class ServiceLink {
   };
   struct OpenTask {
     Handlers handlers;
-    std::vector<RequestId> requests;  // of each frame, and of the question
+    std::vector<RequestId> requests;  // one for each frame, and that of the question
     FrameRequest first;               // frame
     Rendered rendered;
     std::size_t left = 0;    // requests that are not finished
-    AnswerHandler answered;  // of a question alone, instead of `handlers`
+    AnswerHandler answered;  // instead of `handlers`, if there is a question alone
   };
 
   Ticket Post(Task task);
@@ -79,7 +78,7 @@ class ServiceLink {
 
   Context& context_;
   const ServiceAddress address_;
-  // Of the link's thread.
+  // Used by the link's thread alone.
   std::map<Ticket, OpenTask> open_;
   std::map<RequestId, Ticket> requests_;
   Status reason_;  // why there is no client

@@ -20,7 +20,7 @@ std::string_view NameOf(ServiceHealth health);  // "ready", "no-workers", "gone"
 struct ServiceNews {
   ServiceHealth health = ServiceHealth::kGone;
   std::string reason = "not asked yet";  // empty if it is ready
-  StatusReply status;                    // of the last answer, also if it is gone since
+  StatusReply status;                    // the last answer, kept when the service is gone
 };
 
 class ServiceMonitor {
@@ -42,7 +42,7 @@ class ServiceMonitor {
   const ServiceAddress address_;
   const Listener listener_;
   std::mutex mutex_;
-  std::unique_ptr<Client> client_;  // of the thread; others use its wakeup only, under the mutex
+  std::unique_ptr<Client> client_;  // made and used by the monitor's thread; others use its wakeup only, under the mutex
   std::condition_variable stop_;
   bool stopping_ = false;
   std::thread thread_;

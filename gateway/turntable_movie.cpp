@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "gateway/requests_under_way.h"
 
 namespace slabstream {

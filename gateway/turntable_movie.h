@@ -23,7 +23,7 @@
 namespace slabstream {
 
 struct TurntableRequest {
-  RenderRequest render;  // of the first frame
+  RenderRequest render;  // the request of the first frame
   int frames = 0;
   CameraMove move = {};
   double frames_per_second = 25;
@@ -58,8 +58,8 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   const ServiceAddress service_;
   Metrics& metrics_;
   const TurntableRequest request_;
-  // Of the io thread.
-  boost::asio::posix::stream_descriptor output_;  // of the encoder, while it is open
+  // Used by the io thread alone.
+  boost::asio::posix::stream_descriptor output_;  // the encoder's output, while it is open
   std::function<void(Result<std::string>)> next_;
   std::optional<Status> end_;
   std::string part_;
@@ -67,8 +67,8 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   std::mutex mutex_;
   std::condition_variable changed_;
   std::unique_ptr<MovieEncoder> encoder_;                  // made and ended by Make's thread
-  std::map<int, Result<ServiceLink::Rendered>> pictures_;  // that have come, and were not taken yet
-  std::optional<Result<QuestionReply>> answer_;            // likewise
+  std::map<int, Result<ServiceLink::Rendered>> pictures_;  // pictures that have come, and were not taken yet
+  std::optional<Result<QuestionReply>> answer_;            // an answer that has come, and was not taken yet
   bool abandoned_ = false;
 };
 

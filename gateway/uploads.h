@@ -28,8 +28,9 @@ namespace slabstream {
 
 inline constexpr std::size_t kMaxUploadsKept = 16;
 inline constexpr Duration kUnseen = std::chrono::minutes(10);
-inline constexpr Duration kStalled = std::chrono::minutes(1);          // between the parts of a file: the service takes few files at a time
-inline constexpr std::uint64_t kUploadBytes = std::uint64_t{1} << 30;  // of a file, unless the gateway is told another limit
+inline constexpr Duration kStalled = std::chrono::minutes(1);  // between the parts of a file: the service takes few files at a time
+// The most bytes of a file, unless the gateway is told another limit.
+inline constexpr std::uint64_t kUploadBytes = std::uint64_t{1} << 30;
 
 // The name of a file that a browser tells, as the service takes it: with the file's ending.
 std::string FileNameForService(std::string_view name);
@@ -50,11 +51,12 @@ class Uploads {
  private:
   struct Upload {
     std::string dataset;
-    std::uint64_t bytes = 0, received = 0, sent = 0;  // of the file; of those that have come; of those that have gone on
-    bool there = false;                               // the dataset
-    std::optional<Status> failure;                    // nobody has been told yet
-    ReplyFunction waiting;                            // for the end of the last part; empty: nobody waits
-    std::uint64_t requests = 0;                       // with parts
+    // The file's size; bytes that have come; bytes that have gone on to the service.
+    std::uint64_t bytes = 0, received = 0, sent = 0;
+    bool there = false;             // the dataset
+    std::optional<Status> failure;  // nobody has been told yet
+    ReplyFunction waiting;          // for the end of the last part; empty: nobody waits
+    std::uint64_t requests = 0;     // with parts
     Time used;
     std::unique_ptr<FileUpload> sender;
   };

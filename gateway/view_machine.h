@@ -10,9 +10,8 @@
 //   picture is given up for a newer view.
 // - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly. If a picture with
 //   shadows or ambient occlusion takes longer than 50 ms, those that move have neither.
-// - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size and of the level
-// that
-//   the view asks for. If rendering takes long, pictures of levels between these come before it.
+// - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size
+//   and of the level that the view asks for. If rendering takes long, pictures of levels between these come before it.
 #pragma once
 
 #include <cstdint>
@@ -66,7 +65,7 @@ class ViewMachine {
   // When OnTime is due; nullopt: nothing waits for a time.
   std::optional<Time> wake_time() const { return wake_; }
   Duration round_trip() const { return round_trip_; }
-  // Of a moving picture, by the measured round trip.
+  // The JPEG quality of a moving picture, by the measured round trip.
   int Quality() const;
 
  private:
@@ -106,12 +105,12 @@ class ViewMachine {
   std::uint64_t frames_ = 0;
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
   bool small_ = false;                     // pictures while moving have half the size, for the connection's sake
-  double scale_ = 1;                       // likewise, for the service's sake
+  double scale_ = 1;                       // the scale of pictures while moving, below 1 for the service's sake
   Duration wider_time_{};                  // what the last picture of twice the scale took
   Time whole_until_{};                     // scale_ stays 1
-  double coarseness_ = kFirstCoarseness;   // of pictures while moving
+  double coarseness_ = kFirstCoarseness;   // the coarseness of pictures while the view moves
   bool plain_ = false;                     // pictures while moving have no shadows
-  double still_coarseness_ = 1;            // of the next picture of a view that stands still
+  double still_coarseness_ = 1;            // the coarseness of the next picture of a view that stands still
   std::optional<Time> wake_;
 };
 

@@ -5,10 +5,9 @@
 #include <chrono>
 #include <utility>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
 #include "common/base/version.h"
-#include "common/view/view_ahead.h"
 
 namespace slabstream {
 namespace {
@@ -19,7 +18,7 @@ constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to
 constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
 constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
-std::string TextOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string TextOf(const Json& json) { return json.dump(); }
 
 std::string_view NameOf(FramePhase phase) {
   switch (phase) {
@@ -162,7 +161,6 @@ void ViewSession::Render(const ViewAction& action) {
     });
     return;
   }
-  PrefetchAhead(job->frames);
   const bool shadowed = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return frame.shading.needs_light_volume(); });
   for (FrameRequest& frame : job->frames) {
     frame.straight8 = HoldsStraight8(job->format);
@@ -191,28 +189,6 @@ void ViewSession::Render(const ViewAction& action) {
                                           });
                                         }});
   rendering_ = std::move(rendering);
-}
-
-void ViewSession::PrefetchAhead(const std::vector<FrameRequest>& frames) {
-  constexpr Duration kEvery = std::chrono::milliseconds(250), kAhead = std::chrono::milliseconds(500), kMoving = std::chrono::seconds(1);
-  const Time now = MonotonicNow();
-  const bool moves = moved_ && now - moved_->at < kMoving && moved_->frames.size() == frames.size() && moved_->frames != frames;
-  if (moves && now - moved_->at < kEvery) return;
-  const std::optional<Moved> before = std::exchange(moved_, Moved{now, frames});
-  if (!moves || prefetching_ > 0 || frames.front().dataset == not_fetched_) return;
-  const double steps = double(kAhead.count()) / double((now - before->at).count());
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    FrameRequest ahead = frames[i];
-    ahead.view = ViewAhead(before->frames[i].view, frames[i].view, steps);
-    ++prefetching_;
-    const auto answered = [self = shared_from_this(), dataset = ahead.dataset](Result<QuestionReply> reply) {
-      asio::post(self->around_.io, [self, dataset, fetches = !reply.ok() || std::get<PrefetchReply>(*reply).fetches] {
-        --self->prefetching_;
-        if (!fetches) self->not_fetched_ = dataset;
-      });
-    };
-    link_->Ask(PrefetchQuery{.frame = std::move(ahead)}, kMoving, answered);
-  }
 }
 
 void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress) {

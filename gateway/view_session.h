@@ -1,4 +1,4 @@
-// ViewSession: one WebSocket with one view. It carries out what its ViewMachine decides. Of the io thread.
+// ViewSession: one WebSocket with one view. It carries out what its ViewMachine decides. Used by the io thread alone.
 #pragma once
 
 #include <atomic>
@@ -42,15 +42,12 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
   void End();                        // the gateway stops
-  std::string_view dataset() const;  // of the latest view; empty: none has come
+  std::string_view dataset() const;  // the dataset of the latest view; empty: no view has come
 
  private:
   void Handle(ViewMessage view);
   void Do(const ViewMachine::Actions& actions);
   void Render(const ViewAction& action);  // kRender
-  // While the view moves: asks the service to fetch what it will probably show. `frames` of the view, as they are asked for when it stands
-  // still.
-  void PrefetchAhead(const std::vector<FrameRequest>& frames);
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void Encode(bool final, int quality);
@@ -73,19 +70,12 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
     std::uint64_t order = 0;
     ServiceLink::Ticket ticket = 0;
     RenderedView view;      // what is known before the pictures are there
-    ImageSize size;         // of each frame
+    ImageSize size;         // the size of each frame
     bool shadowed = false;  // the view asks for shadows or ambient occlusion
   };
   std::optional<Rendering> rendering_;
-  struct Moved {
-    Time at;
-    std::vector<FrameRequest> frames;
-  };
-  std::optional<Moved> moved_;  // the view when PrefetchAhead asked last, or it came anew
-  int prefetching_ = 0;         // questions that are not answered
-  std::string not_fetched_;     // a dataset of which the service fetches nothing ahead
   std::shared_ptr<const RenderedView> rendered_;
-  std::shared_ptr<std::atomic<bool>> given_up_;  // of what is being encoded
+  std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;
   Time sent_at_{};

@@ -8,9 +8,9 @@
 #include <optional>
 #include <variant>
 
-#include "coordinator/frame_machine.h"
+#include "coordinator/frames/frame_machine.h"
 #include "simulator/worker_lanes.h"
-#include "worker/worker_machine.h"
+#include "worker/machine/worker_machine.h"
 
 namespace slabstream {
 
@@ -18,12 +18,12 @@ namespace slabstream {
 // be a million, and each is looked at when the others have filled the caches.
 struct alignas(64) Job {
   Node node = 0;                 // its worker
-  std::uint8_t copies = 0;       // of the message that it sends: that have not arrived
+  std::uint8_t copies = 0;       // copies of the message that it sends, which have not arrived
   bool cancelled = false;        // its rendering, in time
-  Node to = 0;                   // of a message to another worker
+  Node to = 0;                   // the worker to which its message goes
   WorkerId receiver = 0;         // that worker, as the sender knows it
-  double bytes = 0, pixels = 0;  // of that message: what links carry; pixels that are not empty
-  Rare<Bytes> payload;           // of the message that it sends; none: it has no bytes
+  double bytes = 0, pixels = 0;  // what links carry for that message; its pixels that are not empty
+  Rare<Bytes> payload;           // what the message that it sends carries; none: it has no bytes
   std::variant<StartRender, StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> action;
 };
 

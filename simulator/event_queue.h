@@ -82,7 +82,7 @@ class EventQueue {
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   std::vector<Stream> streams_;
   std::uint32_t last_action_ = 0;
-  std::unordered_map<std::uint32_t, std::function<void()>> actions_;  // that wait
+  std::unordered_map<std::uint32_t, std::function<void()>> actions_;  // actions that wait
 };
 
 }  // namespace slabstream

@@ -175,8 +175,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   CHECK_LT(frame, inputs_.size()) << "a frame is planned twice";
   timeline_.frames[frame].planned = service_.coordinator_free() - origin_;
   frames_.emplace(frame, Frame{{}, FrameAccount(ids_.size())});
-  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{
-      .asked = action, .policy = *action.resolved->policy, .prediction = {}, .plan = PlanForMachines(plan(frame), frame, ids_)});
+  auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = action, .plan = PlanForMachines(plan(frame), frame, ids_)});
   Threads& threads = service_.threads();
   planner_free_ = std::max(planner_free_, threads.Begin(Threads::kPlanner, service_.coordinator_free())) + machine_.plan_seconds;
   threads.Active(Threads::kPlanner, planner_free_);

@@ -29,7 +29,7 @@ class FrameSimulation : private Conditions {
  private:
   struct Group {
     UnionCoverage coverage;
-    std::uint32_t steps = 0;      // of its schedule
+    std::uint32_t steps = 0;      // steps of its schedule
     std::size_t shares_left = 1;  // not done as far as the coordinator knows
   };
   struct Frame {
@@ -80,7 +80,7 @@ class FrameSimulation : private Conditions {
   const std::span<const FrameInput> inputs_;
   const MachineModel& machine_;
   const SimulationOptions options_;
-  const std::vector<WorkerId> ids_;  // of the plans, ascending. The machines know worker i as i + 1
+  const std::vector<WorkerId> ids_;  // the workers of the plans, ascending. The machines know worker i as i + 1
   Network network_;
   SimulatedService service_;
   double origin_ = 0;  // when the timeline begins: workers have registered before
@@ -88,7 +88,7 @@ class FrameSimulation : private Conditions {
 
   std::uint32_t submitted_ = 0, planned_ = 0, received_ = 0;  // frames
   std::map<FrameId, std::uint32_t> frame_of_;
-  std::map<std::uint32_t, Frame> frames_;  // that are under way
+  std::map<std::uint32_t, Frame> frames_;  // frames that are under way
   double render_seconds_ = 0;
   double coordinator_passed_ = 0, client_passed_ = 0;  // they are done with the pictures so far
   Timeline timeline_;

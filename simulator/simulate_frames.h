@@ -24,9 +24,9 @@ namespace slabstream {
 
 // The cost and the image of one box, in one view.
 struct RenderCost {
-  double seconds = 0;                     // of one thread of a worker of speed 1
-  const CoverageMap* coverage = nullptr;  // of its image, in the frame's grid; null: it shows nothing
-  double voxel_bytes = 0;                 // that its worker must fetch before it renders; 0: it holds them
+  double seconds = 0;                     // time of one thread of a worker of speed 1
+  const CoverageMap* coverage = nullptr;  // what its image covers, in the frame's grid; null: it shows nothing
+  double voxel_bytes = 0;                 // bytes that its worker must fetch before it renders; 0: it holds them
 };
 
 struct FrameInput {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

@@ -24,7 +24,7 @@ namespace slabstream {
 
 class SimulatedService {
  public:
-  // Both outlive the object. Of the machine it uses the speeds, the cores, the wake-ups, serial_share and message_seconds.
+  // Both outlive the object. It uses the machine's speeds, the cores, the wake-ups, serial_share and message_seconds.
   SimulatedService(const MachineModel& machine, Conditions& conditions);
 
   EventQueue& queue() { return queue_; }
@@ -91,7 +91,7 @@ class SimulatedService {
 
   void Perform(TellWorkers& action);
   void SendWorker(PeerToken to, CoordinatorToWorker sent);
-  void Perform(AnyOf<DropPlan, ClientLeft, DropClient, Note> auto&) {}
+  void Perform(AnyOf<DropPlan, DropClient, Note> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 
@@ -128,7 +128,7 @@ class SimulatedService {
   WorkerLanes lanes_;
   std::unique_ptr<FrameMachine> coordinator_;
   bool coordinator_runs_ = false;
-  std::uint64_t generation_ = 0;  // of the coordinator
+  std::uint64_t generation_ = 0;  // the coordinator's generation
   double coordinator_free_ = 0, coordinator_alarm_ = kNever;
   double coordinator_held_ = 0;
   Duration coordinator_ahead_{};             // its clock's

@@ -20,8 +20,8 @@ namespace slabstream {
 using Node = std::uint32_t;  // a worker process of a simulation: 0, 1, ... in the order in which they began
 
 struct WorkCost {
-  double seconds = 0;        // of one thread of a worker of speed 1
-  std::int32_t threads = 1;  // that share the work
+  double seconds = 0;        // time of one thread of a worker of speed 1
+  std::int32_t threads = 1;  // threads that share the work
   bool direct = false;       // the thread that owns the sockets does it itself: nothing is handed over
 };
 
@@ -60,11 +60,11 @@ class WorkerLanes {
   };
   struct LaneState {
     bool taken = false;    // by a task that was handed over and has not ended
-    bool running = false;  // that task has begun
+    bool running = false;  // whether that task has begun
     LaneTask task;         // the one that has taken it
     std::deque<Waiting> waiting;
   };
-  static constexpr std::size_t kLanes = 3;  // of a worker, by Lane
+  static constexpr std::size_t kLanes = 3;  // lanes of a worker, by Lane
 
   struct Start {
     double time = 0;
@@ -84,7 +84,7 @@ class WorkerLanes {
   const MachineModel& machine_;
   Threads& threads_;
   Processors processors_;
-  std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // of tasks that were handed over
+  std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // when tasks that were handed over start
   std::uint64_t wake_ups_ = 0;
   std::vector<LaneTask> paused_;
   std::vector<LaneState> lanes_;  // worker by worker. Their numbers are the names of what they run on processors

@@ -3,25 +3,24 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <string>
 
-#include "common/base/large_buffers.h"
-#include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
+#include "common/memory/large_buffers.h"
 #include "common/metrics/metrics_listener.h"
 #include "common/service/service_file.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
-#include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/open/open_source.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
-#include "worker/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 namespace {
@@ -48,39 +47,38 @@ int Run(int argc, char** argv) {
   bool frames_only = false;
   static constexpr Duration kLongestDrain = std::chrono::hours(24);
 
-  CLI::App app("Slabstream worker: renders boxes and combines images for a coordinator.", "slabstream-worker");
-  SetUp(app, std::string(Version()));
-  CLI::Option* coordinator =
-      app.add_option("--coordinator", options.coordinator_endpoint, "The coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
-          ->type_name("ENDPOINT");
-  app.add_option("--service", service, "The service file worker.json of a service with keys, which names the coordinator")
-      ->type_name("FILE")
-      ->default_str("$SLABSTREAM_SERVICE, if there is no --coordinator")
-      ->excludes(coordinator);
-  app.add_option("--listen", options.images_endpoint, "Address for images from other workers")
-      ->type_name("ENDPOINT")
-      ->default_str("any port, at the address that reaches the coordinator");
+  const Program app("Slabstream worker: renders boxes and combines images for a coordinator.", "slabstream-worker", std::string(Version()));
+  const Option coordinator =
+      app.AddText("--coordinator", options.coordinator_endpoint, "The coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
+          .TypeName("ENDPOINT");
+  app.AddText("--service", service, "The service file worker.json of a service with keys, which names the coordinator")
+      .TypeName("FILE")
+      .Default("$SLABSTREAM_SERVICE, if there is no --coordinator")
+      .Excludes(coordinator);
+  app.AddText("--listen", options.images_endpoint, "Address for images from other workers")
+      .TypeName("ENDPOINT")
+      .Default("any port, at the address that reaches the coordinator");
   AddInteger(app, "--threads", options.machine.threads, 1, int(kMaxThreads), "Render threads");
   options.machine.memory_bytes = DefaultMemory().worker;
   AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
             "Memory limit for voxels and images. The worker gets no frame that needs more")
-      ->type_name("SIZE")
-      ->default_str(fmt::format("half of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
-  AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames")->default_str("what --memory leaves");
+      .TypeName("SIZE")
+      .Default(fmt::format("half of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
+  AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames").Default("what --memory leaves");
   AddCacheOption(app, cache);
   AddOptionalValue(app, "--compress", compress, "on", OneOf({"auto", "on", "off"}),
                    "Pack images with zstd. auto: for workers behind links that are slower than zstd. on (--compress alone): "
                    "all images, and the pictures for clients. off: none")
-      ->type_name("[=MODE]")
-      ->default_str(compress);
+      .TypeName("[=MODE]")
+      .Default(compress);
   AddParsed(
       app, "--drain", options.machine.drain,
       [](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongestDrain); },
       "Time to finish begun work after SIGTERM or SIGINT. The worker gets no new work, and ends as soon as no frame needs it. 0s, or a "
       "second signal: at once")
-      ->type_name("TIME")
-      ->default_str("30s");
-  app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host over sockets, too");
+      .TypeName("TIME")
+      .Default("30s");
+  app.AddFlag("--no-shared-memory", frames_only, "Send images to workers of this host over sockets, too");
   AddMetricsOptions(app, metrics);
   return RunService(app, argc, argv, "worker " + std::to_string(::getpid()), [&] {
     if (options.coordinator_endpoint.empty()) {

@@ -4,18 +4,18 @@
 #include <atomic>
 #include <limits>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <variant>
 
 #include "client/client.h"
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
 #include "client/request/key_of_picture.h"
 #include "client/request/picture_fields.h"
 #include "client/request/picture_record.h"
 #include "client/service/service_state.h"
 #include "common/base/time.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 inline namespace v0 {
@@ -224,7 +224,7 @@ std::vector<std::string> Service::Datasets() {
 std::string Service::StatusJson() {
   const std::lock_guard lock(impl_->mutex);
   const StatusReply reply = ValueOf(impl_->client->QueryStatus());
-  return slabstream::StatusJson(reply).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return slabstream::StatusJson(reply).dump(2);
 }
 
 }  // namespace v0

@@ -9,8 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/image_io/annotations.h"
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "common/cli/program.h"
 #include "common/view/camera.h"

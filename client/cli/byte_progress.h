@@ -18,7 +18,7 @@ class ByteProgress {
   ByteProgress(ProgressBar& bar, std::string what) : bar_(bar), what_(std::move(what)) {}
 
   void Show(std::uint64_t done, std::uint64_t all);  // all > 0
-  int percent() const { return percent_; }           // that was shown last; -1: nothing was
+  int percent() const { return percent_; }           // the percentage that was shown last; -1: nothing was
 
  private:
   ProgressBar& bar_;

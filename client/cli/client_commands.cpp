@@ -1,177 +1,180 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
+#include "client/cli/completion.h"
 #include "client/cli/cores.h"
+#include "client/cli/help_pages.h"
+#include "client/cli/laboratory.h"
 #include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/picture_orders.h"
 #include "client/cli/value.h"
-#include "client/image_io/picture_file_type.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/camera_file.h"
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
 #include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
-#include "coordinator/catalogue.h"
-#include "coordinator/tuning/service_machine.h"
+#include "data/catalogue/catalogue.h"
 #include "data/open/cache_option.h"
 #include "data/volume_io/formats.h"
-#include "simulator/model/link_model.h"
 
 namespace slabstream {
 namespace {
 
+void RunIfTyped(const Command& sub, std::function<Status()>& run, std::function<Status()> job) {
+  sub.OnTyped([&run, job = std::move(job)] { run = job; });
+}
+
 // If this command is the one that was typed, `execute` runs with the options.
 template <class Options>
-void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Options> options, Status (*execute)(const Options&)) {
-  sub.callback([&run, options, execute] { run = [options, execute] { return execute(*options); }; });
+void RunWith(const Command& sub, std::function<Status()>& run, std::shared_ptr<Options> options, Status (*execute)(const Options&)) {
+  RunIfTyped(sub, run, [options, execute] { return execute(*options); });
 }
 
 void DeclareRender(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("render", "Render a picture of a volume, or of each of several");
+  const Command sub = line.app.AddCommand("render", "Render a picture of a volume, or of each of several");
   auto options = std::make_shared<RenderOptions>();
-  sub->add_option("-o,--output", options->output,
-                  fmt::format("The picture: {}; of several SOURCEs, with {} in the place of their names", PictureEndings(), kNamePlace))
-      ->required()
-      ->type_name("FILE")
-      ->group(kOutputGroup);
-  AddFrameOptions(*sub, options->frame, {}, &options->sources);
-  AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
-  RunWith(*sub, line.run, options, RunRender);
+  sub.AddText("-o,--output", options->output,
+              fmt::format("The picture: {}; of several SOURCEs, with {} in the place of their names", PictureEndings(), kNamePlace))
+      .Required()
+      .TypeName("FILE")
+      .Group(kOutputGroup);
+  AddFrameOptions(sub, options->frame, {}, &options->sources);
+  AddRequestOption(sub, *FindRequestOption("previews"), options->frame.request);
+  RunWith(sub, line.run, options, RunRender);
 }
 
 void DeclareTurntable(const CommandLine& line) {
-  CLI::App* sub =
-      line.app.add_subcommand("turntable", "Render a full turn about the volume's z axis, or volumes over time, as pictures or as a movie");
+  const Command sub =
+      line.app.AddCommand("turntable", "Render a full turn about the volume's z axis, or volumes over time, as pictures or as a movie");
   auto options = std::make_shared<TurntableOptions>();
-  sub->option_defaults()->group(kOutputGroup);
-  AddParsed(*sub, "-o,--output", options->output, ParseTurntableOutput,
+  sub.GroupOptions(kOutputGroup);
+  AddParsed(sub, "-o,--output", options->output, ParseTurntableOutput,
             "Pictures: a name with a place for the number, such as 'frame_%04d.png'; or a movie, " + MovieEndings() +
                 ", encoded by the program ffmpeg")
-      ->required()
-      ->type_name("PATTERN|MOVIE");
+      .Required()
+      .TypeName("PATTERN|MOVIE");
   AddParsed(
-      *sub, "--frames", options->frames,
+      sub, "--frames", options->frames,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxTurntableFrames); },
       "Number of frames, spread evenly over turns, path and times")
-      ->type_name("N")
-      ->default_str("one for each time of --time, or the seconds of --path");
-  CLI::Option* const turns = AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
-  CLI::Option* const path = AddParsed(*sub, "--path", options->path, ParsePathFile, kPathHelp)->type_name("FILE")->excludes(turns);
-  AddParsed(*sub, "--time", options->times, ParseTimeRange,
+      .TypeName("N")
+      .Default("one for each time of --time, or the seconds of --path");
+  const Option turns = AddInteger(sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
+  const Option path = AddParsed(sub, "--path", options->path, ParsePathFile, kPathHelp).TypeName("FILE").Excludes(turns);
+  AddParsed(sub, "--time", options->times, ParseTimeRange,
             "Which volumes of a file with several, such as a time series; counted from 0, FIRST and LAST included")
-      ->type_name("T|FIRST:LAST");
+      .TypeName("T|FIRST:LAST");
   AddParsed(
-      *sub, "--fps", options->frames_per_second,
+      sub, "--fps", options->frames_per_second,
       [](const std::string& option, const std::string& text) {
         return ParseNumber(option, text, {kMinFramesPerSecond, kMaxFramesPerSecond});
       },
       kFramesPerSecondHelp)
-      ->type_name("NUMBER")
-      ->default_str(fmt::format("{:g}", MovieShape().frames_per_second));
-  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
-  AddFrameOptions(*sub, options->frame, {"time"});
-  ExcludeViewOptions(*sub, path);
-  path->excludes(sub->get_option("--camera"));
-  RunWith(*sub, line.run, options, RunTurntable);
+      .TypeName("NUMBER")
+      .Default(fmt::format("{:g}", MovieShape().frames_per_second));
+  AddInteger(sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
+  AddFrameOptions(sub, options->frame, {"time"});
+  ExcludeViewOptions(sub, path);
+  path.Excludes(sub.FindOption("--camera"));
+  RunWith(sub, line.run, options, RunTurntable);
 }
 
 void DeclareSlice(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("slice", "Render planes or thick slabs of a volume");
+  const Command sub = line.app.AddCommand("slice", "Render planes or thick slabs of a volume");
   auto options = std::make_shared<SliceOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: " + PictureEndings())->required()->type_name("FILE")->group(kOutputGroup);
-  AddSliceOptions(*sub, *options);
-  RunWith(*sub, line.run, options, RunSlice);
+  sub.AddText("-o,--output", options->output, "The picture: " + PictureEndings()).Required().TypeName("FILE").Group(kOutputGroup);
+  AddSliceOptions(sub, *options);
+  RunWith(sub, line.run, options, RunSlice);
 }
 
 void DeclareInfo(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand(
+  const Command sub = line.app.AddCommand(
       "info", "Print size, type, orientation and values of a volume file, the cells of an unstructured grid, or the record of a picture");
   auto options = std::make_shared<InfoOptions>();
-  CLI::Option* source =
-      sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr")->required();
+  Option source = sub.AddText("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr").Required();
   for (const char* name : {"transfer", "scalar-range", "opacity-distance"})
-    AddRequestOption(*sub, *FindRequestOption(name), options->request);
-  AddLayerFiles(*sub, options->layers);
-  AddReadOptions(*sub);
-  AddCacheOption(*sub, options->cache);
-  ResolveSource(*sub, source, options->path, options->request.transfer, [] { return true; });
-  sub->add_flag("--json", options->json, "Print JSON");
-  RunWith(*sub, line.run, options, RunInfo);
+    AddRequestOption(sub, *FindRequestOption(name), options->request);
+  AddLayerFiles(sub, options->layers);
+  AddReadOptions(sub);
+  AddCacheOption(sub, options->cache);
+  ResolveSource(sub, source, options->path, options->request.transfer, [] { return true; });
+  sub.AddFlag("--json", options->json, "Print JSON");
+  RunWith(sub, line.run, options, RunInfo);
 }
 
 void DeclareValue(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("value", "Print voxel, value and label at points of a dataset or a volume file");
+  const Command sub = line.app.AddCommand("value", "Print voxel, value and label at points of a dataset or a volume file");
   auto options = std::make_shared<ValueOptions>();
-  AddSource(*sub, options->source, options->connection);
-  AddRepeated(*sub, "--at", options->points, "A point of the world")->required()->type_name("X,Y,Z");
-  AddLayerFiles(*sub, options->layers);
-  sub->add_flag("--json", options->json, "Print JSON");
-  RunWith(*sub, line.run, options, RunValue);
+  AddSource(sub, options->source, options->connection);
+  AddRepeated(sub, "--at", options->points, "A point of the world").Required().TypeName("X,Y,Z");
+  AddLayerFiles(sub, options->layers);
+  sub.AddFlag("--json", options->json, "Print JSON");
+  RunWith(sub, line.run, options, RunValue);
 }
 
 void DeclareMeasure(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles, boxes and labels in a dataset or a volume file");
+  const Command sub = line.app.AddCommand("measure", "Measure distances, angles, profiles, boxes and labels in a dataset or a volume file");
   auto options = std::make_shared<MeasureOptions>();
-  AddSource(*sub, options->source, options->connection);
-  sub->option_defaults()->group("Measures, in the unit of the world (mm of a patient); each may be repeated");
-  AddRepeated(*sub, "--distance", options->distances, "Distance of two points of the world")->type_name("X,Y,Z:X,Y,Z");
-  AddRepeated(*sub, "--angle", options->angles, "Angle at the second of three points")->type_name("X,Y,Z:X,Y,Z:X,Y,Z");
-  AddRepeated(*sub, "--profile", options->profiles, "Values from one point to another, interpolated between voxels")
-      ->type_name("X,Y,Z:X,Y,Z");
-  AddInteger(*sub, "--samples", options->samples, 2, int(kMaxSamplePoints), "Values of each profile")->default_str("one for each voxel");
-  AddRepeated(*sub, "--box", options->boxes,
+  AddSource(sub, options->source, options->connection);
+  sub.GroupOptions("Measures, in the unit of the world (mm of a patient); each may be repeated");
+  AddRepeated(sub, "--distance", options->distances, "Distance of two points of the world").TypeName("X,Y,Z:X,Y,Z");
+  AddRepeated(sub, "--angle", options->angles, "Angle at the second of three points").TypeName("X,Y,Z:X,Y,Z:X,Y,Z");
+  AddRepeated(sub, "--profile", options->profiles, "Values from one point to another, interpolated between voxels").TypeName("X,Y,Z:X,Y,Z");
+  AddInteger(sub, "--samples", options->samples, 2, int(kMaxSamplePoints), "Values of each profile").Default("one for each voxel");
+  AddRepeated(sub, "--box", options->boxes,
               "Mean, standard deviation and extremes of the voxels with their centres in a box, given as for --clip-box of `render`")
-      ->type_name("X0:X1,Y0:Y1,Z0:Z1");
-  sub->add_option(
-         "--labels", CLI::callback_t([options](const CLI::results_t& texts) {
+      .TypeName("X0:X1,Y0:Y1,Z0:Z1");
+  sub.AddOption(
+         "--labels",
+         [options](const std::string&, const std::vector<std::string>& texts) {
            options->labels = true;
            if (!texts.back().empty()) SetLabelFiles(texts.back(), options->layers);
-           return true;
-         }),
+           return Status::Ok();
+         },
          "Volume, mean, standard deviation and extremes of each label: of the dataset's labels, or with --local of those in FILE, which "
          "are laid onto the voxels of SOURCE")
-      ->type_name("[FILE]")
-      ->expected(0, 1);
-  sub->option_defaults()->group("Options");
-  CLI::Option* const json = sub->add_flag("--json", options->json, "Print JSON");
-  sub->add_flag("--csv", options->csv, "Print the table of --labels as comma-separated values")->excludes(json);
-  RunWith(*sub, line.run, options, RunMeasure);
+      .TypeName("[FILE]")
+      .MaybeValue();
+  sub.GroupOptions("Options");
+  const Option json = sub.AddFlag("--json", options->json, "Print JSON");
+  sub.AddFlag("--csv", options->csv, "Print the table of --labels as comma-separated values").Excludes(json);
+  RunWith(sub, line.run, options, RunMeasure);
 }
 
 void DeclareTransfer(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("transfer", "Print a preset transfer function as JSON for --transfer");
+  const Command sub = line.app.AddCommand("transfer", "Print a preset transfer function as JSON for --transfer");
   auto options = std::make_shared<TransferOptions>();
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
-  CLI::Option* const preset = AddParsed(
-      *sub, "PRESET", options->request.transfer.choice,
+  const Option preset = AddParsed(
+      sub, "PRESET", options->request.transfer.choice,
       [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
         const Result<std::string> name = is_name(option, text);
         if (!name.ok()) return name.status();
         return std::variant<std::string, TransferFunction>(*name);
       },
       "Which" + Explained(TransferPresets()));
-  NoteChoices(preset, names);
-  sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values");
-  CLI::Option* const list =
-      sub->add_flag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");
-  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture: " + PictureEndings())
-      ->type_name("FILE")
-      ->needs(list);
-  AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);
-  AddReadOptions(*sub);
-  sub->parse_complete_callback([sub, options] { options->path = WithReadOptions(*sub, options->path); });
-  RunWith(*sub, line.run, options, RunTransfer);
+  preset.Choices(names);
+  sub.AddText("SOURCE", options->path, "The volume file: a preset depends on its values");
+  const Option list = sub.AddFlag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");
+  sub.AddText("--preview", options->preview, "With --list: draw the colour maps into a picture: " + PictureEndings())
+      .TypeName("FILE")
+      .Needs(list);
+  AddRequestOption(sub, *FindRequestOption("scalar-range"), options->request);
+  AddReadOptions(sub);
+  TakeReadOptions(sub, options->path);
+  RunWith(sub, line.run, options, RunTransfer);
 }
 
 // X0:X1,Y0:Y1,Z0:Z1 in voxels; a missing end is the volume's, which 0 stands for.
@@ -194,12 +197,12 @@ Result<Box> ParseVoxelBox(const std::string& option, const std::string& text) {
 }
 
 void DeclareConvert(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("convert", "Write a volume in another format, or with samples of another type");
+  const Command sub = line.app.AddCommand("convert", "Write a volume in another format, or with samples of another type");
   auto options = std::make_shared<ConvertOptions>();
-  sub->add_option("SOURCE", options->source, "A volume file, or a folder of slices")->required();
-  sub->add_option("OUTPUT", options->output, "The file to write: " + WritableEndings() + "; or a folder, .ome.zarr")->required();
+  sub.AddText("SOURCE", options->source, "A volume file, or a folder of slices").Required();
+  sub.AddText("OUTPUT", options->output, "The file to write: " + WritableEndings() + "; or a folder, .ome.zarr").Required();
   AddParsed(
-      *sub, "--type", options->type,
+      sub, "--type", options->type,
       [](const std::string& option, const std::string& text) -> Result<std::optional<SampleType>> {
         ReadOptions parsed;
         const Status status = FindNamed(ReadOptionList(), "type")->set(parsed, option, text);
@@ -207,18 +210,18 @@ void DeclareConvert(const CommandLine& line) {
       },
       "Type of the samples in OUTPUT: " + SampleTypeNames() +
           "; every value must fit. Raw samples in SOURCE have this type too, unless SOURCE says ?type=...")
-      ->type_name("TYPE")
-      ->default_str("the type of SOURCE, or the smallest that holds its values");
-  AddInteger(*sub, "--level", options->level, 0, kMaxLevels - 1, "Convert this level of SOURCE; 0 is the finest one");
-  AddParsed(*sub, "--box", options->box, ParseVoxelBox, "Convert these voxels of the level alone: from each first one to before the second")
-      ->type_name("X0:X1,Y0:Y1,Z0:Z1")
-      ->default_str("all");
-  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
-      ->type_name("SIZE")
-      ->default_str("none; 1G for what is not read as a whole");
-  AddCacheOption(*sub, options->cache);
+      .TypeName("TYPE")
+      .Default("the type of SOURCE, or the smallest that holds its values");
+  AddInteger(sub, "--level", options->level, 0, kMaxLevels - 1, "Convert this level of SOURCE; 0 is the finest one");
+  AddParsed(sub, "--box", options->box, ParseVoxelBox, "Convert these voxels of the level alone: from each first one to before the second")
+      .TypeName("X0:X1,Y0:Y1,Z0:Z1")
+      .Default("all");
+  AddParsed(sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
+      .TypeName("SIZE")
+      .Default("none; 1G for what is not read as a whole");
+  AddCacheOption(sub, options->cache);
   AddParsed(
-      *sub, "--zarr-version", options->zarr_version,
+      sub, "--zarr-version", options->zarr_version,
       [](const std::string& option, const std::string& text) -> Result<OmeZarrVersion> {
         for (const OmeZarrVersion version : {OmeZarrVersion::k04, OmeZarrVersion::k05}) {
           if (text == ToString(version)) return version;
@@ -226,101 +229,93 @@ void DeclareConvert(const CommandLine& line) {
         return Status::InvalidArgument(option + ": expected 0.4 or 0.5, not '" + text + "'");
       },
       "Version of an OME-Zarr: 0.4 (Zarr 2) or 0.5 (Zarr 3 with shards)")
-      ->type_name("VERSION")
-      ->default_str("0.5");
-  sub->add_flag("--progress", options->progress, "Show progress on stderr");
-  AddReadOptions(*sub, {"type"});
-  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
-  RunWith(*sub, line.run, options, RunConvert);
+      .TypeName("VERSION")
+      .Default("0.5");
+  sub.AddFlag("--progress", options->progress, "Show progress on stderr");
+  AddReadOptions(sub, {"type"});
+  TakeReadOptions(sub, options->source);
+  RunWith(sub, line.run, options, RunConvert);
 }
 
 void DeclareIndex(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand(
+  const Command sub = line.app.AddCommand(
       "index", "Read a volume once and note the values of its parts, so that later pictures read only what can show something");
   auto options = std::make_shared<IndexingOptions>();
-  sub->add_option("SOURCE", options->source, "A volume that is read in parts: a file, or a folder such as an OME-Zarr")->required();
-  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
-      ->type_name("SIZE")
-      ->default_str("1G");
-  AddCacheOption(*sub, options->cache);
-  sub->add_flag("--progress", options->progress, "Show progress on stderr");
-  AddReadOptions(*sub);
-  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
-  RunWith(*sub, line.run, options, RunIndex);
+  sub.AddText("SOURCE", options->source, "A volume that is read in parts: a file, or a folder such as an OME-Zarr").Required();
+  AddParsed(sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M").TypeName("SIZE").Default("1G");
+  AddCacheOption(sub, options->cache);
+  sub.AddFlag("--progress", options->progress, "Show progress on stderr");
+  AddReadOptions(sub);
+  TakeReadOptions(sub, options->source);
+  RunWith(sub, line.run, options, RunIndex);
 }
 
 void DeclareSphere(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
+  const Command sub = line.app.AddCommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
   auto options = std::make_shared<SphereOptions>();
   AddParsed(
-      *sub, "--class", options->request.sphere_class,
+      sub, "--class", options->request.sphere_class,
       [](const std::string& option, const std::string& text) -> Result<SphereClass> {
         const Result<int> number = ParseInteger(option, text, 1, 2);
         if (!number.ok()) return number.status();
         return SphereClass(*number);
       },
       "1: hollow, 2: filled")
-      ->required()
-      ->type_name("N");
-  AddInteger(*sub, "--size", options->request.size, 2, 4096, "Voxels a side")->required();
-  AddNumber(*sub, "--occupancy", options->request.occupancy, {0, 1, true}, "Share of voxels that are not empty");
-  sub->add_option("-o,--output", options->output, "The volume: " + WritableEndings())->required()->type_name("FILE");
-  RunWith(*sub, line.run, options, RunSphere);
+      .Required()
+      .TypeName("N");
+  AddInteger(sub, "--size", options->request.size, 2, 4096, "Voxels a side").Required();
+  AddNumber(sub, "--occupancy", options->request.occupancy, {0, 1, true}, "Share of voxels that are not empty");
+  sub.AddText("-o,--output", options->output, "The volume: " + WritableEndings()).Required().TypeName("FILE");
+  RunWith(sub, line.run, options, RunSphere);
 }
 
 void DeclareClusters(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("clusters", "Make a sparse test volume: balls that lie dense near a corner");
+  const Command sub = line.app.AddCommand("clusters", "Make a sparse test volume: balls that lie dense near a corner");
   auto options = std::make_shared<ClustersOptions>();
-  AddInteger(*sub, "--size", options->request.size, 8, 4096, "Voxels a side")->required();
-  AddNumber(*sub, "--occupancy", options->request.occupancy, {0.001, 0.3}, "Share of voxels that are not empty");
-  AddInteger(*sub, "--balls", options->request.balls, 1, 1000, "How many");
-  AddInteger(*sub, "--seed", options->request.seed, 0, std::numeric_limits<int>::max(), "Of their places");
-  AddNumber(*sub, "--time", options->request.time, {0, 1}, "They drift along x: 0 is the beginning, 1 the end");
-  sub->add_option("-o,--output", options->output, "The volume: " + WritableEndings())->required()->type_name("FILE");
-  RunWith(*sub, line.run, options, RunClusters);
+  AddInteger(sub, "--size", options->request.size, 8, 4096, "Voxels a side").Required();
+  AddNumber(sub, "--occupancy", options->request.occupancy, {0.001, 0.3}, "Share of voxels that are not empty");
+  AddInteger(sub, "--balls", options->request.balls, 1, 1000, "How many");
+  AddInteger(sub, "--seed", options->request.seed, 0, std::numeric_limits<int>::max(), "Of their places");
+  AddNumber(sub, "--time", options->request.time, {0, 1}, "They drift along x: 0 is the beginning, 1 the end");
+  sub.AddText("-o,--output", options->output, "The volume: " + WritableEndings()).Required().TypeName("FILE");
+  RunWith(sub, line.run, options, RunClusters);
 }
 
 void DeclareUp(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
+  const Command sub = line.app.AddCommand("up", "Start a coordinator and workers on this machine");
   auto options = std::make_shared<UpOptions>();
   options->listen = fmt::format("tcp://{}:7420", OwnHost());
-  AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")
-      ->default_str("one a core, but no more than one for each GiB of --memory");
-  AddThreads(*sub, options->threads, "Render threads of each worker");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("[NAME=]FILE|FOLDER");
-  AddParsed(*sub, "--listen", options->listen, EndpointText(true),
+  AddInteger(sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")
+      .Default("one a core, but no more than one for each GiB of --memory");
+  AddThreads(sub, options->threads, "Render threads of each worker");
+  AddRepeated(sub, "--data", options->data, kDataHelp).TypeName("[NAME=]FILE|FOLDER");
+  AddParsed(sub, "--listen", options->listen, EndpointText(true),
             "Address of this machine for clients; port * takes any free port. An address that is not loopback gets keys")
-      ->type_name("ENDPOINT")
-      ->default_str(options->listen);
+      .TypeName("ENDPOINT")
+      .Default(options->listen);
   AddOptionalValue(
-      *sub, "--compress", options->compress, "on", OneOf({"auto", "on", "off"}),
+      sub, "--compress", options->compress, "on", OneOf({"auto", "on", "off"}),
       "Compress images with zstd. auto: between workers whose link is slower than zstd. on (--compress alone): all images between workers, "
       "and pictures for clients behind a slow tunnel. off: never")
-      ->type_name("[=MODE]")
-      ->default_str("auto");
-  AddParsed(
-      *sub, "--link", options->link,
-      [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); },
-      "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
-      ->type_name("LINK")
-      ->default_str(kDefaultLink);
-  sub->add_option("--keys", options->keys, "Encrypt connections with the keys in this folder; make it if it does not exist")
-      ->type_name("FOLDER")
-      ->default_str("a folder beside the logs if --listen is not loopback, else none");
+      .TypeName("[=MODE]")
+      .Default("auto");
+  sub.AddText("--keys", options->keys, "Encrypt connections with the keys in this folder; make it if it does not exist")
+      .TypeName("FOLDER")
+      .Default("a folder beside the logs if --listen is not loopback, else none");
   options->memory = DefaultServiceMemory();
-  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit,
+  AddParsed(sub, "--memory", options->memory, ParseMemoryLimit,
             "Memory limit of all processes: the coordinator gets a third, the workers share the rest")
-      ->type_name("SIZE")
-      ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
-  AddCacheOption(*sub, options->cache);
-  AddInteger(*sub, "--metrics", options->metrics, 1, 65535,
+      .TypeName("SIZE")
+      .Default(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
+  AddCacheOption(sub, options->cache);
+  AddInteger(sub, "--metrics", options->metrics, 1, 65535,
              "Serve metrics for Prometheus on loopback: the coordinator at this port, each worker at one of the next")
-      ->type_name("PORT")
-      ->default_str("no metrics");
-  sub->add_flag("--unlisted", options->unlisted)->group(kHidden);
-  sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
-  AddLogLevel(*sub, line.log_level)->default_str("info for the processes that it starts, warning for itself");
-  sub->callback([&run = line.run, options, &log_level = line.log_level] {
+      .TypeName("PORT")
+      .Default("no metrics");
+  sub.AddFlag("--unlisted", options->unlisted).Group(kHidden);
+  sub.AddFlag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
+  AddLogLevel(sub, line.log_level).Default("info for the processes that it starts, warning for itself");
+  sub.OnTyped([&run = line.run, options, &log_level = line.log_level] {
     run = [options, &log_level] {
       options->log_level = log_level;
       if (options->workers == 0) options->workers = WorkersWithin(options->memory, std::min(CoreCount(), kMaxUpWorkers));
@@ -336,158 +331,155 @@ Result<std::string> ParseLoopbackPort(std::string_view option, std::string_view 
 }
 
 void DeclareView(const CommandLine& line) {
-  CLI::App* sub =
-      line.app.add_subcommand("view", "Show a volume in the browser; starts a service and a gateway if needed, and ends them at Ctrl-C");
+  const Command sub =
+      line.app.AddCommand("view", "Show a volume in the browser; starts a service and a gateway if needed, and ends them at Ctrl-C");
   auto options = std::make_shared<ViewOptions>();
-  sub->add_option("SOURCE", options->source, "A volume file, which a new service serves, or the name of a dataset at the service")
-      ->required();
-  AddLayerFiles(*sub, options->layers, nullptr);
-  AddReadOptions(*sub);
-  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
-  AddService(*sub, options->service);
-  AddCacheOption(*sub, options->cache);
+  sub.AddText("SOURCE", options->source, "A volume file, which a new service serves, or the name of a dataset at the service").Required();
+  AddLayerFiles(sub, options->layers, nullptr);
+  AddReadOptions(sub);
+  TakeReadOptions(sub, options->source);
+  AddService(sub, options->service);
+  AddCacheOption(sub, options->cache);
   options->listen = OwnHost() + ":0";
-  CLI::Option* const listen = sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
-                                  ->type_name("HOST:PORT")
-                                  ->default_str(options->listen);
-  AddParsed(*sub, "--port", options->listen, ParseLoopbackPort,
+  const Option listen = sub.AddText("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
+                            .TypeName("HOST:PORT")
+                            .Default(options->listen);
+  AddParsed(sub, "--port", options->listen, ParseLoopbackPort,
             "Port of the gateway on this machine: with --token-file, an address that stays")
-      ->type_name("PORT")
-      ->excludes(listen);
-  sub->add_option("--token-file", options->token_file, "Use the token in this file; make the file, with a new token, if it does not exist")
-      ->type_name("FILE");
-  sub->add_flag("!--no-browser", options->browser, "Only print the address");
-  RunWith(*sub, line.run, options, RunView);
+      .TypeName("PORT")
+      .Excludes(listen);
+  sub.AddText("--token-file", options->token_file, "Use the token in this file; make the file, with a new token, if it does not exist")
+      .TypeName("FILE");
+  sub.AddFlag("!--no-browser", options->browser, "Only print the address");
+  RunWith(sub, line.run, options, RunView);
 }
 
 void DeclareDown(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("down", "End a service that `up` started");
+  const Command sub = line.app.AddCommand("down", "End a service that `up` started");
   auto options = std::make_shared<DownOptions>();
-  CLI::Option* const endpoint = AddService(*sub, options->service);
-  sub->add_flag("--all", options->all, "End every service that `up` started here")
-      ->excludes(endpoint)
-      ->excludes(sub->get_option("--service"));
-  RunWith(*sub, line.run, options, RunDown);
+  const Option endpoint = AddService(sub, options->service);
+  sub.AddFlag("--all", options->all, "End every service that `up` started here").Excludes(endpoint).Excludes(sub.FindOption("--service"));
+  RunWith(sub, line.run, options, RunDown);
 }
 
 void DeclareStatus(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("status", "Show a service's workers, datasets and frames");
+  const Command sub = line.app.AddCommand("status", "Show a service's workers, datasets and frames");
   auto options = std::make_shared<StatusOptions>();
-  AddService(*sub, options->service);
-  sub->add_flag("--json", options->json, "Print JSON");
-  RunWith(*sub, line.run, options, RunStatus);
+  AddService(sub, options->service);
+  sub.AddFlag("--json", options->json, "Print JSON");
+  RunWith(sub, line.run, options, RunStatus);
 }
 
 void DeclareKeys(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("keys", "List, issue, change and revoke the keys that a service admits; for admins");
-  sub->require_subcommand(1);
+  const Command sub = line.app.AddCommand("keys", "List, issue, change and revoke the keys that a service admits; for admins");
+  sub.TakeCommand(true);
   const auto declare = [&](const char* name, const char* purpose, KeysAction action) {
-    CLI::App* order = sub->add_subcommand(name, purpose);
+    const Command order = sub.AddCommand(name, purpose);
     auto options = std::make_shared<KeysOptions>();
     options->order.action = action;
-    AddService(*order, options->service);
-    RunWith(*order, line.run, options, RunKeys);
+    AddService(order, options->service);
+    RunWith(order, line.run, options, RunKeys);
     return std::pair(order, options);
   };
   declare("list", "List the keys: id, role, when they were made, public key, name, and when each was heard last", KeysAction::kList);
   const auto [issue, issue_options] = declare("issue", "Make a key for one person, and write a service file with it", KeysAction::kIssue);
-  issue->add_option("--name", issue_options->order.name, "Whose key it is; `status`, `keys list` and `keys revoke` know it by this name")
-      ->required()
-      ->type_name("NAME");
-  AddChoice<Role, 2>(*issue, "--role", issue_options->order.role, {NameOf(Role::kClient), NameOf(Role::kAdmin)},
+  issue.AddText("--name", issue_options->order.name, "Whose key it is; `status`, `keys list` and `keys revoke` know it by this name")
+      .Required()
+      .TypeName("NAME");
+  AddChoice<Role, 2>(issue, "--role", issue_options->order.role, {NameOf(Role::kClient), NameOf(Role::kAdmin)},
                      {Role::kClient, Role::kAdmin}, "What its holder may do: client or admin")
-      ->default_str("client");
-  issue->add_option("-o,--output", issue_options->output, "The service file, which must not exist yet")
-      ->type_name("FILE")
-      ->default_str("NAME.json");
+      .Default("client");
+  issue.AddText("-o,--output", issue_options->output, "The service file, which must not exist yet").TypeName("FILE").Default("NAME.json");
   const auto [rotate, rotate_options] =
       declare("rotate", "Put a new key into the service file of a role; old keys stay valid until they are revoked", KeysAction::kRotate);
-  AddChoice<Role, kRoles.size()>(*rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
+  AddChoice<Role, kRoles.size()>(rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
                                  kRoles, "client, worker or admin")
-      ->required();
+      .Required();
   const auto [revoke, revoke_options] = declare("revoke", "Revoke a key and end its connections", KeysAction::kRevoke);
   revoke
-      ->add_option("KEY", revoke_options->order.key,
-                   "The name or the id of a key, or the public key itself, as `slabstream keys list` shows them")
-      ->required();
+      .AddText("KEY", revoke_options->order.key,
+               "The name or the id of a key, or the public key itself, as `slabstream keys list` shows them")
+      .Required();
 }
 
 void DeclareData(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand(
+  const Command sub = line.app.AddCommand(
       "data", "List, add, remove and reload datasets of a running service; changes need an admin's key if the service has keys");
-  sub->require_subcommand(1);
+  sub.TakeCommand(true);
   const auto declare = [&](const char* name, const char* purpose, DataAction action) {
-    CLI::App* order = sub->add_subcommand(name, purpose);
+    const Command order = sub.AddCommand(name, purpose);
     auto options = std::make_shared<DataOptions>();
     options->order.action = action;
-    AddService(*order, options->service);
-    order->add_flag("--json", options->json, "Print JSON");
-    RunWith(*order, line.run, options, RunData);
+    AddService(order, options->service);
+    order.AddFlag("--json", options->json, "Print JSON");
+    RunWith(order, line.run, options, RunData);
     return std::pair(order, options);
   };
   declare("list", "Print each dataset: state, size, samples and last error", DataAction::kList);
   const auto [add, add_options] =
       declare("add", "Add volumes, or folders to watch, until the coordinator ends; paths are on the coordinator's host", DataAction::kAdd);
-  add->add_option("DATA", add_options->order.items, "FILE, NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
-      ->required();
+  add.AddTexts("DATA", add_options->order.items, "FILE, NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
+      .Required();
   const auto [remove, remove_options] =
       declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files are not deleted, and running frames finish",
               DataAction::kRemove);
-  remove->add_option("NAME", remove_options->order.items, "Names of datasets, or the absolute paths of watched folders")->required();
+  remove.AddTexts("NAME", remove_options->order.items, "Names of datasets, or the absolute paths of watched folders").Required();
   const auto [reload, reload_options] =
       declare("reload", "Read the files again at the next frame, even if they seem unchanged. Running frames finish with the old voxels",
               DataAction::kReload);
-  reload->add_option("NAME", reload_options->order.items, "Names of datasets")->required();
+  reload.AddTexts("NAME", reload_options->order.items, "Names of datasets").Required();
 }
 
 void DeclareLogs(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("logs", "Print the logs of a service that `up` started on this machine, in order of time");
+  const Command sub = line.app.AddCommand("logs", "Print the logs of a service that `up` started on this machine, in order of time");
   auto options = std::make_shared<LogsOptions>();
-  AddService(*sub, options->service);
-  sub->add_flag("--follow", options->follow, "Print new lines until the service ends, or Ctrl-C");
+  AddService(sub, options->service);
+  sub.AddFlag("--follow", options->follow, "Print new lines until the service ends, or Ctrl-C");
   constexpr Duration kLongest = std::chrono::hours(24 * 365);
   AddParsed(
-      *sub, "--since", options->since,
+      sub, "--since", options->since,
       [kLongest](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongest); },
       "Skip older lines: 30s, 10m or 2h")
-      ->type_name("TIME")
-      ->default_str("the beginning");
-  RunWith(*sub, line.run, options, RunLogs);
+      .TypeName("TIME")
+      .Default("the beginning");
+  RunWith(sub, line.run, options, RunLogs);
 }
 
 void DeclareSlurm(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("slurm", "Print a job script for Slurm: a service on the nodes of a cluster");
+  const Command sub = line.app.AddCommand("slurm", "Print a job script for Slurm: a service on the nodes of a cluster");
   auto options = std::make_shared<SlurmOptions>();
-  AddInteger(*sub, "--nodes", options->nodes, 1, kMaxJobNodes, "Nodes with workers; the coordinator runs on one of them");
-  AddInteger(*sub, "--workers-per-node", options->workers_per_node, 1, kMaxWorkersPerNode, "Worker processes on each node");
-  AddInteger(*sub, "--threads", options->threads, 1, int(kMaxThreads),
+  AddInteger(sub, "--nodes", options->nodes, 1, kMaxJobNodes, "Nodes with workers; the coordinator runs on one of them");
+  AddInteger(sub, "--workers-per-node", options->workers_per_node, 1, kMaxWorkersPerNode, "Worker processes on each node");
+  AddInteger(sub, "--threads", options->threads, 1, int(kMaxThreads),
              "Render threads of each worker, for nodes that are shared with other jobs")
-      ->default_str("the job gets whole nodes, and workers divide their cores");
-  AddParsed(*sub, "--time", options->time, ParseTimeLimit, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
-      ->type_name("TIME")
-      ->default_str("the partition's");
-  AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("[NAME=]FILE|FOLDER");
-  sub->add_option("--folder", options->folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
-      ->type_name("FOLDER")
-      ->default_str("the folder from which the job is submitted");
-  AddRepeated(*sub, "--sbatch", options->directives, "A further option for sbatch, without its dashes, such as partition=long")
-      ->type_name("OPTION");
-  RunWith(*sub, line.run, options, RunSlurm);
+      .Default("the job gets whole nodes, and workers divide their cores");
+  AddParsed(sub, "--time", options->time, ParseTimeLimit, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
+      .TypeName("TIME")
+      .Default("the partition's");
+  AddInteger(sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
+  AddRepeated(sub, "--data", options->data, kDataHelp).Required().TypeName("[NAME=]FILE|FOLDER");
+  sub.AddText("--folder", options->folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
+      .TypeName("FOLDER")
+      .Default("the folder from which the job is submitted");
+  AddRepeated(sub, "--sbatch", options->directives, "A further option for sbatch, without its dashes, such as partition=long")
+      .TypeName("OPTION");
+  RunWith(sub, line.run, options, RunSlurm);
 }
 
 void DeclareAnnotate(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand(kAnnotateCommand, "Draw annotations onto the pixels on stdin; for the Python package");
-  sub->callback([&run = line.run] { run = RunAnnotate; });
+  const Command sub = line.app.AddCommand(kAnnotateCommand, "Draw annotations onto the pixels on stdin; for the Python package");
+  sub.Group(kHidden);
+  sub.OnTyped([&run = line.run] { run = RunAnnotate; });
 }
 
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,   DeclareInfo,  DeclareValue,
-                                                 DeclareMeasure,  DeclareTransfer,  DeclareConvert, DeclareIndex, DeclareSphere,
-                                                 DeclareClusters, DeclareUp,        DeclareView,    DeclareDown,  DeclareStatus,
-                                                 DeclareAnnotate, DeclareKeys,      DeclareData,    DeclareLogs,  DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,     DeclareTurntable,  DeclareSlice,    DeclareInfo,  DeclareValue,
+                                                 DeclareMeasure,    DeclareTransfer,   DeclareConvert,  DeclareIndex, DeclareSphere,
+                                                 DeclareClusters,   DeclareUp,         DeclareView,     DeclareDown,  DeclareStatus,
+                                                 DeclareAnnotate,   DeclareKeys,       DeclareData,     DeclareLogs,  DeclareSlurm,
+                                                 DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
   return kCommands;
 }
 

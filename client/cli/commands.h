@@ -1,5 +1,5 @@
-// The client's commands; client_commands.cpp declares their options. A command prints its results on stdout. The caller reports the
-// returned status in one line on stderr and derives the exit status from it (command_line.h).
+// The commands of `slabstream`; client_commands.cpp declares the options of the client's. A command prints its results on stdout. The
+// caller reports the returned status in one line on stderr and derives the exit status from it (command_line.h).
 #pragma once
 
 #include <span>

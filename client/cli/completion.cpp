@@ -4,11 +4,11 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "client/client.h"
 #include "client/request/option_description.h"
 #include "client/service/service_state.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
@@ -74,38 +74,33 @@ complete -c slabstream -f -a '(__slabstream_complete)'
 
 // Where the last word stands: what the words before it say.
 struct Place {
-  CLI::App* command = nullptr;
-  CLI::Option* option = nullptr;         // whose value it is
+  Command command;
+  Option option = Option();              // whose value it is; or none
   std::vector<std::string> positionals;  // before it, of the command
   ServiceChoice service;
 };
 
-void TakeValue(Place& place, const CLI::Option& option, const std::string& value) {
-  if (option.check_name("--endpoint")) place.service.endpoint = value;
-  if (option.check_name("--service")) place.service.file = value;
+void TakeValue(Place& place, const Option& option, const std::string& value) {
+  if (option.Has("--endpoint")) place.service.endpoint = value;
+  if (option.Has("--service")) place.service.file = value;
 }
 
-CLI::App* CommandNamed(CLI::App& app, std::string_view name) {
-  const auto found = app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
-  return found.empty() ? nullptr : found.front();
-}
-
-Place PlaceAfter(CLI::App& program, std::span<const std::string> words) {
-  Place place{.command = &program};
+Place PlaceAfter(const Command& program, std::span<const std::string> words) {
+  Place place{.command = program};
   for (const std::string& word : words) {
-    if (place.option != nullptr) {
-      TakeValue(place, *place.option, word);
-      place.option = nullptr;
+    if (place.option) {
+      TakeValue(place, place.option, word);
+      place.option = Option();
     } else if (word.starts_with('-') && word.size() > 1) {
       const std::size_t equals = word.find('=');
-      CLI::Option* const option = place.command->get_option_no_throw(word.substr(0, equals));
-      if (option == nullptr) continue;
+      const Option option = place.command.FindOption(word.substr(0, equals));
+      if (!option) continue;
       if (equals != std::string::npos) {
-        TakeValue(place, *option, word.substr(equals + 1));
-      } else if (option->get_items_expected_max() > 0) {
+        TakeValue(place, option, word.substr(equals + 1));
+      } else if (option.most_values() > 0) {
         place.option = option;
       }
-    } else if (CLI::App* const command = CommandNamed(*place.command, word); command != nullptr && place.positionals.empty()) {
+    } else if (const Command command = place.command.FindCommand(word); command && place.positionals.empty()) {
       place.command = command;
     } else {
       place.positionals.push_back(word);
@@ -116,54 +111,54 @@ Place PlaceAfter(CLI::App& program, std::span<const std::string> words) {
 
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-std::vector<Candidate> Commands(const CLI::App& app) {
+std::vector<Candidate> Commands(const Command& app) {
   std::vector<Candidate> commands;
-  for (const CLI::App* command : app.get_subcommands(nullptr)) {
-    if (!command->get_group().empty()) commands.push_back({command->get_name(), FirstLine(command->get_description())});
+  for (const Command& command : app.commands()) {
+    if (!command.group().empty()) commands.push_back({command.name(), FirstLine(command.description())});
   }
   return commands;
 }
 
-std::vector<Candidate> OptionNames(CLI::App& app) {
+std::vector<Candidate> OptionNames(const Command& app) {
   std::vector<Candidate> names;
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->get_group().empty()) continue;
-    for (const std::string& name : option->get_lnames()) names.push_back({"--" + name, FirstLine(option->get_description())});
+  for (const Option& option : app.options()) {
+    if (option.group().empty()) continue;
+    for (const std::string& name : option.long_names()) names.push_back({"--" + name, FirstLine(option.description())});
   }
   return names;
 }
 
-std::vector<Candidate> Values(CLI::App& command, const CLI::Option& option) {
+std::vector<Candidate> Values(const Command& command, const Option& option) {
   std::vector<Candidate> values;
-  const std::string name = option.get_lnames().empty() ? option.get_name() : option.get_lnames().front();
-  for (const nlohmann::ordered_json& described : DescribeOptions(command)) {
+  const std::string name = option.name();
+  for (const Json& described : DescribeOptions(command)) {
     if (described["name"] != name) continue;
     for (const char* list : {"choices", "presets"}) {
-      for (const auto& value : described.value(list, nlohmann::ordered_json::array())) values.push_back({value, ""});
+      for (const auto& value : described.value(list, Json::array())) values.push_back({value.text(), ""});
     }
     if (described.contains("renderers")) values = {{"auto", ""}};  // and those below, with their purposes
-    for (const auto& renderer : described.value("renderers", nlohmann::ordered_json::array())) {
-      values.push_back({renderer["name"], renderer["purpose"]});
+    for (const auto& renderer : described.value("renderers", Json::array())) {
+      values.push_back({renderer["name"].text(), renderer["purpose"].text()});
     }
-    for (const auto& window : described.value("windows", nlohmann::ordered_json::array())) values.push_back({window["name"], ""});
+    for (const auto& window : described.value("windows", Json::array())) values.push_back({window["name"].text(), ""});
   }
   return values;
 }
 
 // The argument that comes after `count` others.
-const CLI::Option* PositionalAfter(const CLI::App& app, std::size_t count) {
-  const auto positionals = app.get_options([](const CLI::Option* option) { return option->get_positional(); });
-  if (positionals.empty()) return nullptr;
-  if (count < positionals.size()) return positionals[count];
-  return positionals.back()->get_items_expected_max() > 1 ? positionals.back() : nullptr;
+Option ArgumentAfter(const Command& app, std::size_t count) {
+  std::vector<Option> arguments = app.options();
+  std::erase_if(arguments, [](const Option& option) { return !option.is_argument(); });
+  if (count < arguments.size()) return arguments[count];
+  return arguments.empty() || arguments.back().most_values() <= 1 ? Option() : arguments.back();
 }
 
 std::vector<Candidate> Datasets(const Place& place, std::string_view typed, const DatasetNames& datasets) {
   std::vector<Candidate> names;
   const std::size_t colon = typed.rfind(':');
-  const CLI::Option* const transfer = place.command->get_option_no_throw("--transfer");
-  if (colon != std::string_view::npos && transfer != nullptr) {  // NAME:TRANSFER
-    for (const Candidate& preset : Values(*place.command, *transfer)) {
+  const Option transfer = place.command.FindOption("--transfer");
+  if (colon != std::string_view::npos && transfer) {  // NAME:TRANSFER
+    for (const Candidate& preset : Values(place.command, transfer)) {
       names.push_back({std::string(typed.substr(0, colon + 1)) + preset.word, ""});
     }
     return names;
@@ -172,22 +167,22 @@ std::vector<Candidate> Datasets(const Place& place, std::string_view typed, cons
   return names;
 }
 
-std::vector<Candidate> Arguments(CLI::App& program, const Place& place, std::string_view typed, const DatasetNames& datasets) {
-  if (place.positionals.empty() && !Commands(*place.command).empty()) return Commands(*place.command);
-  const CLI::Option* const argument = PositionalAfter(*place.command, place.positionals.size());
-  if (argument == nullptr) return {};
-  const std::string name = argument->get_name(true);
+std::vector<Candidate> Arguments(const Command& program, const Place& place, std::string_view typed, const DatasetNames& datasets) {
+  if (place.positionals.empty() && !Commands(place.command).empty()) return Commands(place.command);
+  const Option argument = ArgumentAfter(place.command, place.positionals.size());
+  if (!argument) return {};
+  const std::string name = argument.argument_name();
   if (name == "COMMAND") {
-    CLI::App* about = &program;
+    Command about = program;
     for (const std::string& word : place.positionals) {
-      about = CommandNamed(*about, word);
-      if (about == nullptr) return {};
+      about = about.FindCommand(word);
+      if (!about) return {};
     }
-    return Commands(*about);
+    return Commands(about);
   }
-  const bool of_service = place.command->get_option_no_throw("--endpoint") != nullptr;
+  const bool of_service = bool(place.command.FindOption("--endpoint"));
   if (of_service && (name == "SOURCE" || name == "NAME")) return Datasets(place, typed, datasets);
-  return Values(*place.command, *argument);
+  return Values(place.command, argument);
 }
 
 std::vector<std::string> DatasetsAt(const ServiceChoice& choice) {
@@ -207,22 +202,22 @@ std::vector<std::string> DatasetsAt(const ServiceChoice& choice) {
 
 }  // namespace
 
-std::vector<Candidate> Complete(CLI::App& program, std::span<const std::string> words, const DatasetNames& datasets) {
+std::vector<Candidate> Complete(const Command& program, std::span<const std::string> words, const DatasetNames& datasets) {
   if (words.empty()) return {};
   const Place place = PlaceAfter(program, words.first(words.size() - 1));
   std::string typed = words.back(), before;  // of --NAME=VALUE the value, and what stands before it
   std::vector<Candidate> all;
-  if (place.option != nullptr) {
-    all = Values(*place.command, *place.option);
+  if (place.option) {
+    all = Values(place.command, place.option);
   } else if (typed.starts_with('-')) {
     const std::size_t equals = typed.find('=');
-    const CLI::Option* const option = equals == std::string::npos ? nullptr : place.command->get_option_no_throw(typed.substr(0, equals));
-    if (option != nullptr) {
+    const Option option = equals == std::string::npos ? Option() : place.command.FindOption(typed.substr(0, equals));
+    if (option) {
       before = typed.substr(0, equals + 1);
       typed.erase(0, equals + 1);
-      all = Values(*place.command, *option);
+      all = Values(place.command, option);
     } else {
-      all = OptionNames(*place.command);
+      all = OptionNames(place.command);
     }
   } else {
     all = Arguments(program, place, typed, datasets);
@@ -232,21 +227,21 @@ std::vector<Candidate> Complete(CLI::App& program, std::span<const std::string> 
   return all;
 }
 
-Status RunComplete(CLI::App& program, std::span<const std::string> words) {
+Status RunComplete(const Command& program, std::span<const std::string> words) {
   for (const Candidate& candidate : Complete(program, words, DatasetsAt)) std::cout << candidate.word << '\t' << candidate.purpose << '\n';
   return Status::Ok();
 }
 
 void DeclareCompletion(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("completion", "Print a script that lets a shell complete commands, options and their values");
+  const Command sub = line.app.AddCommand("completion", "Print a script that lets a shell complete commands, options and their values");
   std::array<std::string_view, std::size(kShells)> names, scripts;
   for (std::size_t i = 0; i < std::size(kShells); ++i) {
     names[i] = kShells[i].name;
     scripts[i] = kShells[i].script;
   }
   auto script = std::make_shared<std::string_view>();
-  AddChoice(*sub, "SHELL", *script, names, scripts, "bash, zsh or fish; for bash: eval \"$(slabstream completion bash)\"")->required();
-  sub->callback([&run = line.run, script] {
+  AddChoice(sub, "SHELL", *script, names, scripts, "bash, zsh or fish; for bash: eval \"$(slabstream completion bash)\"").Required();
+  sub.OnTyped([&run = line.run, script] {
     run = [script] {
       std::cout << *script;
       return Status::Ok();

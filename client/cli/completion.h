@@ -27,10 +27,10 @@ using DatasetNames = std::function<std::vector<std::string>(const ServiceChoice&
 
 // What the last of `words`, which follow the name of the program, may become, by the commands and options of `program`. Empty: perhaps the
 // name of a file. Calls `datasets` only if that word may be a dataset.
-std::vector<Candidate> Complete(CLI::App& program, std::span<const std::string> words, const DatasetNames& datasets);
+std::vector<Candidate> Complete(const Command& program, std::span<const std::string> words, const DatasetNames& datasets);
 
 // Prints the candidates, one a line: the word, a tab, and its purpose.
-Status RunComplete(CLI::App& program, std::span<const std::string> words);
+Status RunComplete(const Command& program, std::span<const std::string> words);
 
 // `completion SHELL`: prints the script.
 void DeclareCompletion(const CommandLine& line);

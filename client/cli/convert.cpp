@@ -12,14 +12,15 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_display.h"
-#include "common/base/files.h"
 #include "common/base/log.h"
+#include "common/files/files.h"
 #include "common/volume/memory_budget.h"
-#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/stores/object_cache.h"
-#include "data/survey/survey.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {
@@ -58,13 +59,12 @@ bool RoundsLabels(SampleType type, const ExactSamples& exact) {
 }
 
 // A box of a level, or the whole volume.
-Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source, ProgressBar& bar) {
-  if (!options.converts_part() && IsReadWhole(source.path, source.options)) return ReadInputVolume(source);
-  const Result<SourceToConvert> part = OpenToConvert(options, source, {}, bar);
-  if (!part.ok()) return part.status();
-  Result<LevelInMemory> level = ReadLevel(*part->source, 0, source.options.progress, ExactWanted::kAll);
-  if (!level.ok()) return AsInput(level.status());
-  return LoadedVolume{FileInfoOf(part->source->info()), std::move(level->volume), std::move(level->exact)};
+Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source) {
+  const Result<SourceToConvert> opened = OpenToConvert(options, source, {});
+  if (!opened.ok()) return opened.status();
+  Result<LoadedVolume> loaded = ReadVolume(*opened->source, source.path, source.options, true);
+  if (!loaded.ok()) return AsInput(loaded.status());
+  return loaded;
 }
 
 }  // namespace
@@ -77,13 +77,11 @@ Status RunConvert(const ConvertOptions& options) {
   const VolumeFormat* const from = FindFormat(source->path, source->options);
   const bool needs_type = from != nullptr && std::ranges::count(from->required, "type") > 0;
   if (needs_type && !source->options.type) source->options.type = options.type;
+  if (Status status = CheckInputVolume(*source); !status.ok()) return status;
   if (options.memory > 0) LimitMemory(options.memory);
   if (NamesZarr(options.output)) {
     if (options.type && !needs_type) return Status::InvalidArgument("--type: an OME-Zarr keeps the type of SOURCE");
     return ConvertToZarr(options, *source);
-  }
-  if (!options.converts_part()) {
-    if (Status status = CheckInputVolume(*source); !status.ok()) return status;
   }
   const VolumeFormat* const to = FindWritableFormat(options.output);
   if (to == nullptr) {
@@ -96,11 +94,12 @@ Status RunConvert(const ConvertOptions& options) {
   ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source->path)); });
   bar.Show(0, Describe(ReadShare{}, source->path));
   source->options.progress = &reading;
-  const Result<LoadedVolume> loaded = Read(options, *source, bar);
+  const Result<LoadedVolume> loaded = Read(options, *source);
   if (!loaded.ok()) return loaded.status();
-  const VolumeFileInfo& info = loaded->info;
-  if (Status status = CheckKeepsInput(options, *to, info.other_files); !status.ok()) return status;
-  if (const std::string lost = WhatIsLost(*to, info.description.geometry); !lost.empty()) {
+  const SourceInfo& info = loaded->info;
+  if (Status status = CheckKeepsInput(options, *to, std::vector<std::filesystem::path>(info.files.begin(), info.files.end())); !status.ok())
+    return status;
+  if (const std::string lost = WhatIsLost(*to, info.finest().geometry); !lost.empty()) {
     LogWarning(fmt::format("{}: {} files do not keep {}", options.output, to->name, lost));
   }
   if (options.type && loaded->exact != nullptr && RoundsLabels(*options.type, *loaded->exact)) {
@@ -113,7 +112,7 @@ Status RunConvert(const ConvertOptions& options) {
   if (Status status = WriteVolume(*loaded->volume, options.output, {TypeToWrite(options, *loaded), progress, loaded->exact.get()});
       !status.ok())
     return status;
-  const Index3& size = info.description.geometry.size;
+  const Index3& size = info.finest().geometry.size;
   std::cout << fmt::format("wrote {}: {}, {} x {} x {} voxels\n", options.output, to->name, size.x, size.y, size.z);
   return Status::Ok();
 }

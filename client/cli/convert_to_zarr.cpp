@@ -17,7 +17,7 @@
 #include "client/cli/progress_display.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
-#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 
 namespace slabstream {
@@ -48,8 +48,16 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsual;
   ProgressBar bar(options.progress, 1);
   bar.Show(0, Describe(ReadShare{}, source.path));
-  const Result<SourceToConvert> opened = OpenToConvert(options, source, Share(memory, 0).reading, bar);
+  bool decodes = false;  // a volume that is read as a whole, before anything is written
+  ReadProgress reading([&](const ReadShare& read) {
+    if (decodes) bar.Show(0.01 * read.percent, Describe(read, source.path));
+  });
+  SourceText with_progress = source;
+  with_progress.options.progress = &reading;
+  const Result<SourceToConvert> opened = OpenToConvert(options, with_progress, Share(memory, 0).reading);
   if (!opened.ok()) return opened.status();
+  decodes = opened->memory > 0;
+  WarnOfPart(source.path, source.options, opened->source->info());
   const VolumeDescription& volume = opened->source->info().levels[0].description;
   const std::uint64_t held = options.memory > 0 ? opened->memory : 0;
 
@@ -63,7 +71,7 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   };
   const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
-                                      .slices = opened->slices,
+                                      .slices = opened->source->info().slices,
                                       .memory = Share(memory, held).writing,
                                       .source = ShownSource(options.source),
                                       .stop = stop.get_token(),

@@ -3,12 +3,12 @@
 
 #include <filesystem>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
 #include "client/report/dataset_text.h"
-#include "coordinator/catalogue.h"
+#include "common/json/json.h"
+#include "data/catalogue/catalogue.h"
 
 namespace slabstream {
 namespace {
@@ -46,9 +46,9 @@ Status RunData(const DataOptions& options) {
   const Result<std::vector<DatasetStatus>> datasets = connection->client().OrderData(order);
   if (!datasets.ok()) return datasets.status();
   if (options.json) {
-    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    Json list = Json::array();
     for (const DatasetStatus& dataset : *datasets) list.push_back(DatasetJson(dataset));
-    std::cout << list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+    std::cout << list.dump(2) << '\n';
   } else {
     std::cout << DatasetTableText(*datasets);
   }

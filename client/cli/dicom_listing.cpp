@@ -67,15 +67,15 @@ std::string SeriesText(const std::vector<DicomSeries>& all) {
   return text;
 }
 
-nlohmann::ordered_json SeriesJson(const std::vector<DicomSeries>& all) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+Json SeriesJson(const std::vector<DicomSeries>& all) {
+  Json json = Json::array();
   for (const DicomSeries& series : all) {
     const DicomImage& first = series.images.front();
-    nlohmann::ordered_json each = {{"number", series.number},
-                                   {"uid", series.uid},
-                                   {"modality", series.modality},
-                                   {"description", series.description},
-                                   {"size", {first.columns, first.rows, series.frame_count()}}};
+    Json each = {{"number", series.number},
+                 {"uid", series.uid},
+                 {"modality", series.modality},
+                 {"description", series.description},
+                 {"size", {first.columns, first.rows, series.frame_count()}}};
     if (series.trouble.ok()) {
       each["size"][2] = series.stack.size.z;
       if (series.stack.volumes > 1) each["times"] = series.stack.volumes;

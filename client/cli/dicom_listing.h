@@ -1,10 +1,10 @@
 // The series of a DICOM folder as `info` lists them: facts of the images, nothing of the patient.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "data/volume_io/dicom_series.h"
 
 namespace slabstream {
@@ -17,6 +17,6 @@ bool NeedsChoice(const std::vector<DicomSeries>& all, const std::string& source)
 
 // A line each, below a line of headings; "" if there are none.
 std::string SeriesText(const std::vector<DicomSeries>& all);
-nlohmann::ordered_json SeriesJson(const std::vector<DicomSeries>& all);
+Json SeriesJson(const std::vector<DicomSeries>& all);
 
 }  // namespace slabstream

@@ -1,12 +1,9 @@
 #include "client/cli/help_pages.h"
 
-#include <memory>
-#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "common/base/check.h"
 #include "common/cli/help_formatter.h"
 
 namespace slabstream {
@@ -75,10 +72,6 @@ std::vector<CommandPage> CommandPages() {
       {"data",
        {.examples = {{"slabstream data list", "The datasets of the service"},
                      {"slabstream data add foot=/scans/foot.nrrd", "One more dataset, until the service ends"}}}},
-      {"bench", {.examples = {{"slabstream bench head.nii.gz", "How fast this machine renders a volume"}}}},
-      {"experiment",
-       {.examples = {{"slabstream experiment paper -o paper --quick", "The tables and figures of the paper on this machine, in short"},
-                     {"slabstream experiment combining -o combining", "Schemes to combine images, compared"}}}},
   };
 }
 
@@ -92,11 +85,9 @@ HelpPage ProgramPage() {
 
 }  // namespace
 
-void AddHelpPages(CLI::App& program) {
-  const auto formatter = std::dynamic_pointer_cast<HelpFormatter>(program.get_formatter());
-  CHECK(formatter != nullptr);
-  formatter->SetPage(program, ProgramPage());
-  for (CommandPage& each : CommandPages()) formatter->SetPage(*program.get_subcommand(std::string(each.command)), std::move(each.page));
+void DeclareHelpPages(const CommandLine& line) {
+  SetHelpPage(line.app, ProgramPage());
+  for (CommandPage& each : CommandPages()) SetHelpPage(line.app.FindCommand(each.command), std::move(each.page));
 }
 
 }  // namespace slabstream

@@ -2,11 +2,11 @@
 // too. client_commands.cpp declares the options.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "client/cli/command_line.h"
 
 namespace slabstream {
 
 // Of the program and its commands, which are declared already.
-void AddHelpPages(CLI::App& program);
+void DeclareHelpPages(const CommandLine& line);
 
 }  // namespace slabstream

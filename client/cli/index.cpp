@@ -13,8 +13,7 @@
 #include "client/cli/progress_bar.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
-#include "coordinator/catalogue.h"
-#include "data/open/any_volume.h"
+#include "data/catalogue/catalogue.h"
 #include "data/open/open_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/stores/object_cache.h"
@@ -48,17 +47,18 @@ Status RunIndex(const IndexingOptions& options) {
   Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
   source->options.describe = true;  // as the pictures do that read the index
-  if (!IsReadInParts(source->path, source->options)) {
-    if (Status status = CheckInputVolume(*source); !status.ok()) return status;
-    return Status::InvalidArgument(
-        fmt::format("SOURCE '{}' can have no index: its format cannot be read in parts; `slabstream convert` writes an OME-Zarr, which can",
-                    options.source));
-  }
+  source->options.headers_only = true;
+  if (Status status = CheckInputVolume(*source); !status.ok()) return status;
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsualMemory;
   LimitMemory(memory);
   const Result<std::shared_ptr<VolumeSource>> opened = Open(*source, memory);
   if (!opened.ok()) return opened.status();
   const SourceInfo& info = (*opened)->info();
+  if (!info.in_parts()) {
+    return Status::InvalidArgument(
+        fmt::format("SOURCE '{}' can have no index: its format cannot be read in parts; `slabstream convert` writes an OME-Zarr, which can",
+                    options.source));
+  }
   const Result<IndexFile> file = IndexFileOf(options.source);
   if (!file.ok()) return file.status();
   const auto name_now = [&]() -> Result<std::string> {

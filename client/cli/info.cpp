@@ -8,7 +8,6 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -24,16 +23,16 @@
 #include "client/cli/picture_info.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_display.h"
-#include "client/image_io/picture_header.h"
+#include "client/pictures/picture_header.h"
 #include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/resolved_request.h"
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
-#include "coordinator/catalogue.h"
-#include "data/open/any_volume.h"
+#include "data/catalogue/catalogue.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/index_file.h"
@@ -44,7 +43,7 @@ namespace {
 
 // A volume and its statistics, without its voxels.
 struct VolumeFacts {
-  VolumeFileInfo file;
+  SourceInfo file;
   std::shared_ptr<const VolumeSummary> summary;  // of the whole volume, or what a survey found
   std::optional<OpenedSource> parts = {};        // none: it was read as a whole
 };
@@ -91,9 +90,9 @@ std::string IndexText(const std::optional<IndexFacts>& index, const std::string&
   return text;
 }
 
-nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
+Json IndexJson(const std::optional<IndexFacts>& index) {
   if (!index || !index->file) return nullptr;
-  nlohmann::ordered_json json = {
+  Json json = {
       {"path", index->path}, {"bytes", index->file->bytes}, {"written", TimeText(index->file->written)}, {"usable", index->usable}};
   if (index->usable) {
     json["read"] = index->read;
@@ -109,7 +108,9 @@ Result<VolumeFacts> FactsOf(const std::string& source) {
   Result<ReadableSource> read = ReadSource(DataSource(source, ""), std::uint64_t(kExactBytes), tell);
   if (!read.ok()) return AsInput(read.status());
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
-    return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};
+    SourceInfo info = opened->source->info();
+    if (MayBeRounded(info.exact.type)) info.notes.push_back(RoundingText(info.exact.type));
+    return VolumeFacts{std::move(info), opened->survey.summary, std::move(*opened)};
   }
   const LoadedSource& loaded = std::get<LoadedSource>(*read);
   return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(Summarize(*loaded.volume))};
@@ -182,11 +183,18 @@ std::string UnitText(const VolumeGeometry& geometry) {
   return unit > LengthUnit::kFile ? fmt::format(" {}", NameOf(unit)) : "";
 }
 
+// A source of chunks does not tell.
+StoredAxes StoredAxesOf(const SourceInfo& info) {
+  const VolumeGeometry& geometry = info.finest().geometry;
+  const Vec3& spacing = geometry.spacing;
+  return info.stored.value_or(StoredAxes{geometry.size, {Vec3{spacing.x, 0, 0}, Vec3{0, spacing.y, 0}, Vec3{0, 0, spacing.z}}});
+}
+
 constexpr const char* kStoredAxes[] = {"stored_x", "stored_y", "stored_z"};
 
 std::string OrientationText(const VolumeFacts& facts) {
-  const VolumeFileInfo& info = facts.file;
-  const VolumeGeometry& geometry = info.description.geometry;
+  const SourceInfo& info = facts.file;
+  const VolumeGeometry& geometry = info.finest().geometry;
   const Orientation& orientation = geometry.orientation;
   const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
   std::string text = fmt::format("extent       {:.6g} x {:.6g} x {:.6g}{}\n", extent.x, extent.y, extent.z, UnitText(geometry));
@@ -196,14 +204,14 @@ std::string OrientationText(const VolumeFacts& facts) {
   text += fmt::format("origin       {:.6g} {:.6g} {:.6g}{}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z,
                       UnitText(geometry));
   for (std::size_t i = 0; i < 3 && !facts.parts; ++i) {
-    text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, info.steps[i]));
+    text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, StoredAxesOf(info).steps[i]));
   }
   const double degrees = ObliqueDegrees(orientation);
   text += degrees < 0.05 ? "oblique      no\n" : fmt::format("oblique      by {:.1f} degrees\n", degrees);
-  if (info.straightened) {
+  if (const StoredAxes stored = StoredAxesOf(info); stored.slanted) {
     text += fmt::format(
         "slanted      the file has {} x {} x {} voxels whose axes are not at right angles (a tilted gantry?); they are straightened\n",
-        info.stored_size.x, info.stored_size.y, info.stored_size.z);
+        stored.size.x, stored.size.y, stored.size.z);
   }
   return text;
 }
@@ -223,27 +231,27 @@ std::string PartsText(const SourceInfo& info) {
   return text;
 }
 
-std::string ChannelsText(const VolumeFileInfo& info) {
+std::string ChannelsText(const SourceInfo& info) {
   if (info.channels.empty()) return "";
   std::string text = fmt::format("channels     {}:", info.channels.size());
   for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
   return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
 }
 
-std::string TimesText(const VolumeFileInfo& info) {
+std::string TimesText(const SourceInfo& info) {
   return info.times > 1 ? fmt::format("times        {}; this is number {}\n", info.times, info.time) : "";
 }
 
-std::string NotesText(const VolumeFileInfo& info) {
+std::string NotesText(const SourceInfo& info) {
   std::string text;
   for (const std::string& note : info.notes) text += fmt::format("note         {}\n", Printable(note));
   return text;
 }
 
 std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy) {
-  const VolumeFileInfo& info = facts.file;
+  const SourceInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
-  const VolumeDescription& d = info.description;
+  const VolumeDescription& d = info.finest();
   const Vec3& spacing = d.geometry.spacing;
   std::string text = fmt::format("format       {}\n", info.format);
   text += fmt::format("size         {} voxels ({:.1f} MiB)\n", SizeText(d.geometry.size), double(d.voxel_bytes()) / (1 << 20));
@@ -261,9 +269,7 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
 }
 
-std::string JsonText(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
+std::string JsonText(const Json& json) { return json.dump(2) + "\n"; }
 
 // Voxels of the volume by number of the label.
 std::vector<std::uint64_t> CountLabels(const Layers& layers) {
@@ -298,15 +304,15 @@ std::string LayersText(const Layers& layers) {
   return text;
 }
 
-nlohmann::ordered_json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
+Json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
 
-nlohmann::ordered_json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
+Json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
 
-nlohmann::ordered_json LayersJson(const Layers& layers) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+Json LayersJson(const Layers& layers) {
+  Json json = Json::object();
   if (layers.labels != nullptr) {
     const std::vector<std::uint64_t> counts = CountLabels(layers);
-    json["labels"] = nlohmann::ordered_json::array();
+    json["labels"] = Json::array();
     for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
       const Label& label = layers.table->labels[i];
       json["labels"].push_back(
@@ -320,9 +326,9 @@ nlohmann::ordered_json LayersJson(const Layers& layers) {
   return json;
 }
 
-void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
+void AddPartsJson(const VolumeFacts& facts, Json& json) {
   const SourceInfo& info = facts.parts->source->info();
-  json["levels"] = nlohmann::ordered_json::array();
+  json["levels"] = Json::array();
   for (const SourceLevel& level : info.levels) {
     const VolumeGeometry& geometry = level.description.geometry;
     json["levels"].push_back({{"size", SizeJson(geometry.size)},
@@ -337,39 +343,38 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
 
 std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy,
                      const std::vector<DicomSeries>& series, const Layers& layers) {
-  const VolumeFileInfo& info = facts.file;
+  const SourceInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
-  const VolumeDescription& d = info.description;
+  const VolumeDescription& d = info.finest();
   const Orientation& orientation = d.geometry.orientation;
-  nlohmann::ordered_json world = {
-      {"world", NameOf(orientation.world)},
-      {"origin", VectorJson(orientation.origin)},
-      {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
-      {"oblique_degrees", ObliqueDegrees(orientation)}};
+  Json world = {{"world", NameOf(orientation.world)},
+                {"origin", VectorJson(orientation.origin)},
+                {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
+                {"oblique_degrees", ObliqueDegrees(orientation)}};
   if (orientation.world != World::kVoxels && !facts.parts) {
-    for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
+    for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, StoredAxesOf(info).steps[i]);
   }
-  world["straightened"] = info.straightened;
-  nlohmann::ordered_json json = {{"format", info.format},
-                                 {"size", SizeJson(d.geometry.size)},
-                                 {"type", NameOf(d.type)},
-                                 {"file_type", info.file_type},
-                                 {"labels", info.labels},
-                                 {"channels", info.channels},
-                                 {"channel", info.channel},
-                                 {"times", info.times},
-                                 {"time", info.time},
-                                 {"notes", info.notes},
-                                 {"voxel_bytes", d.voxel_bytes()},
-                                 {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
-                                 {"spacing", VectorJson(d.geometry.spacing)},
-                                 {"unit", NameOf(UnitOf(d.geometry))},
-                                 {"orientation", world},
-                                 {"range", RangeJson(summary.range)},
-                                 {"non_finite", summary.non_finite},
-                                 {"transfer", transfer},
-                                 {"occupancy", occupancy},
-                                 {"histogram", summary.histogram}};
+  world["straightened"] = StoredAxesOf(info).slanted;
+  Json json = {{"format", info.format},
+               {"size", SizeJson(d.geometry.size)},
+               {"type", NameOf(d.type)},
+               {"file_type", info.file_type},
+               {"labels", info.labels},
+               {"channels", info.channels},
+               {"channel", info.channel},
+               {"times", info.times},
+               {"time", info.time},
+               {"notes", info.notes},
+               {"voxel_bytes", d.voxel_bytes()},
+               {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
+               {"spacing", VectorJson(d.geometry.spacing)},
+               {"unit", NameOf(UnitOf(d.geometry))},
+               {"orientation", world},
+               {"range", RangeJson(summary.range)},
+               {"non_finite", summary.non_finite},
+               {"transfer", transfer},
+               {"occupancy", occupancy},
+               {"histogram", summary.histogram}};
   if (facts.parts) {
     AddPartsJson(facts, json);
     json["index"] = IndexJson(index);
@@ -401,7 +406,7 @@ Status RunInfo(const InfoOptions& options) {
   if (!transfer.ok()) return transfer.status();
   const double occupancy = OccupancyOf(*facts->summary, *transfer);
 
-  const Result<Layers> layers = ReadLayers(options.layers, facts->file.description.geometry);
+  const Result<Layers> layers = ReadLayers(options.layers, facts->file.finest().geometry);
   if (!layers.ok()) return AsInput(layers.status());
 
   const std::string name = TransferName(options.request.transfer);

@@ -1,12 +1,7 @@
 #include "client/cli/input_volume.h"
 
-#include <fmt/format.h>
-
-#include <optional>
-
-#include "data/brick_store/brick_store.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 
@@ -16,7 +11,7 @@ Status CheckInputVolume(const std::string& source) {
 }
 
 Status CheckInputVolume(const SourceText& source) {
-  const Status status = CheckAnyVolume(source.path, source.options);
+  const Status status = CheckVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }
 
@@ -25,16 +20,19 @@ Status CheckInputHeaders(const std::string& source) {
   if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
   if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
   parsed->options.describe = true;
-  return AsInput(CheckAnyVolumeHeaders(parsed->path, parsed->options).status());
+  return AsInput(CheckVolumeHeaders(parsed->path, parsed->options).status());
 }
 
-bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes) {
+Result<bool> CanBeReadInParts(const std::string& source, std::uint64_t most_bytes) {
   Result<SourceText> parsed = ParseSourceText(source);
-  if (!parsed.ok()) return false;
-  parsed->options.describe = true;
-  if (IsReadInParts(parsed->path, parsed->options)) return true;
-  const Result<std::optional<SourceInfo>> stream = DescribeStream(parsed->path, parsed->options);
-  return stream.ok() && *stream && std::uint64_t((*stream)->levels.front().description.voxel_bytes()) > most_bytes;
+  if (!parsed.ok()) return parsed.status();
+  const VolumeFormat* const format = FindFormat(parsed->path, parsed->options);
+  if (format != nullptr && format->open == nullptr && format->locate == nullptr) return false;
+  parsed->options.describe = parsed->options.headers_only = true;
+  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(parsed->path, parsed->options, ProcessReadContext());
+  if (!opened.ok()) return AsInput(opened.status());
+  const SourceInfo& info = (*opened)->info();
+  return info.in_parts() || (info.slices && std::uint64_t(info.finest().voxel_bytes()) > most_bytes);
 }
 
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
@@ -48,8 +46,8 @@ Result<LoadedVolume> ReadInputVolume(const std::string& source, const TellRead& 
   return ReadInputVolume(*parsed);
 }
 
-Result<LoadedVolume> ReadInputVolume(const SourceText& source) {
-  Result<LoadedVolume> loaded = ReadAnyVolume(source.path, source.options);
+Result<LoadedVolume> ReadInputVolume(const SourceText& source, bool all_exact) {
+  Result<LoadedVolume> loaded = ReadVolume(source.path, source.options, all_exact);
   if (!loaded.ok()) return AsInput(loaded.status());
   return loaded;
 }

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <string_view>
@@ -17,6 +16,7 @@
 #include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "client/request/values.h"
+#include "common/json/json.h"
 #include "common/math/points_along.h"
 #include "common/view/picture_geometry.h"
 #include "common/wire/client_messages.h"
@@ -99,7 +99,7 @@ std::string NumberText(const Json& value) { return value.is_null() ? "none" : fm
 
 void Print(const Json& measures) {
   for (const Json& m : measures) {
-    const std::string measure = m["measure"], unit = m.value("unit", std::string());
+    const std::string measure = m["measure"].text(), unit = m.value("unit", "");
     if (measure == "distance") {
       std::cout << fmt::format("distance {:.6g} {}\n", m["length"].get<double>(), unit);
     } else if (measure == "angle") {
@@ -192,7 +192,7 @@ Status RunMeasure(const MeasureOptions& options) {
     if (options.json) found.push_back(std::move(json));
   }
   if (options.json) {
-    std::cout << found.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    std::cout << found.dump(2) << "\n";
   } else {
     Print(found);
     if (options.labels) std::cout << (options.csv ? LabelStatisticsCsv(labels) : LabelStatisticsText(labels));

@@ -20,9 +20,9 @@ struct MeasureOptions {
   std::vector<std::string> boxes;      // as ParseClipBox takes them
   bool labels = false;                 // the voxels of each label
   LayerFiles layers;                   // the labels, with local_workers > 0
-  int samples = 0;                     // of each profile, [2, kMaxSamplePoints]; 0: one for each voxel that the line passes
+  int samples = 0;                     // samples of each profile, [2, kMaxSamplePoints]; 0: one for each voxel that the line passes
   bool json = false;
-  bool csv = false;  // of labels, and of nothing else
+  bool csv = false;  // for labels, and for nothing else
 };
 
 Status RunMeasure(const MeasureOptions& options);

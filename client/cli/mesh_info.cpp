@@ -85,8 +85,7 @@ Status RunMeshInfo(const InfoOptions& options) {
       ReadMesh(source->path, {.array = source->options.array, .time = source->options.time, .channel = source->options.channel});
   if (!loaded.ok()) return AsInput(loaded.status());
   const ValueRange range = RangeOf(loaded->mesh.values);
-  std::cout << (options.json ? MeshJson(*loaded, range).dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                             : MeshText(*loaded, range, source->options.lattice));
+  std::cout << (options.json ? MeshJson(*loaded, range).dump(2) + "\n" : MeshText(*loaded, range, source->options.lattice));
   return Status::Ok();
 }
 

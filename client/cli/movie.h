@@ -7,16 +7,16 @@
 #include <vector>
 
 #include "client/cli/picture_sink.h"
-#include "client/image_io/composed_picture.h"
 #include "client/movie/movie_encoder.h"
 #include "client/movie/movie_format.h"
-#include "common/base/files.h"
+#include "client/pictures/picture_writer.h"
 #include "common/base/status.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 
 struct MovieOptions {
-  std::string path;  // of a movie, as MovieFormatOf has it
+  std::string path;  // the movie's path, as MovieFormatOf has it
   MovieShape shape;
   PictureFormat format;
   PictureKey key = {};  // black shows through a transparent background

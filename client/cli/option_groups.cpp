@@ -22,8 +22,8 @@ namespace {
 
 constexpr char kSuitable[] = "suitable";  // what --local alone stands for
 
-void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
-  app.option_defaults()->group("Service");
+void AddConnectionOptions(const Command& app, ConnectionOptions& connection) {
+  app.GroupOptions("Service");
   const auto parse = [](const std::string& option, const std::string& text) -> Result<int> {
     if (text == kSuitable) return ConnectionOptions::kSuitableWorkers;
     return ParseInteger(option, text, 1, kMaxLocalWorkers);
@@ -33,11 +33,11 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
       fmt::format("Render the file SOURCE in this process, with N workers, or else with one for {} cores, and no more than one "
                   "for each GiB of --memory; needs no service, and is not needed where no service is named and none runs",
                   kThreadsOfAWorker))
-      ->type_name("[N]");
+      .TypeName("[N]");
   AddThreads(app, connection.local_threads, "Render threads of each worker of --local");
   AddParsed(app, "--memory", connection.local_memory, ParseMemoryLimit, "Memory limit of this process, with --local: 2G or 512M")
-      ->type_name("SIZE")
-      ->default_str("none");
+      .TypeName("SIZE")
+      .Default("none");
   AddCacheOption(app, connection.local_cache);
   AddService(app, connection.service);
 }
@@ -63,52 +63,51 @@ constexpr char kSourceHelp[] = "A dataset's name at the service, or a volume fil
 
 }  // namespace
 
-CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help) {
-  return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help)->default_str("the cores divided by the workers");
+Option AddThreads(const Command& app, int& threads, const std::string& help) {
+  return AddInteger(app, "--threads", threads, 1, int(kMaxThreads), help).Default("the cores divided by the workers");
 }
 
-void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except) {
-  app.option_defaults()->group(kReadingGroup);
+void AddReadOptions(const Command& app, std::initializer_list<std::string_view> except) {
+  app.GroupOptions(kReadingGroup);
   for (const ReadOption& option : ReadOptionList()) {
     if (std::ranges::count(except, option.name) > 0) continue;
     if (option.value.empty()) {
       const std::string purpose(option.purpose);
-      app.add_flag(fmt::format("--{}", option.name), purpose);
+      app.AddFlag(fmt::format("--{}", option.name), purpose);
       continue;
     }
-    const auto check = [&option](const CLI::results_t& texts) {
+    const auto check = [&option](const std::string& name, const std::vector<std::string>& texts) {
       for (const std::string& text : texts) {
         ReadOptions scratch;
-        if (Status status = option.set(scratch, fmt::format("--{}", option.name), text); !status.ok()) {
-          throw CLI::ValidationError(status.message());
-        }
+        if (Status status = option.set(scratch, name, text); !status.ok()) return status;
       }
-      return true;
+      return Status::Ok();
     };
-    CLI::Option* const added = app.add_option(fmt::format("--{}", option.name), CLI::callback_t(check), std::string(option.purpose))
-                                   ->type_name(std::string(option.value));
-    if (option.of_addresses) added->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    const Option added = app.AddOption(fmt::format("--{}", option.name), check, std::string(option.purpose));
+    added.TypeName(std::string(option.value));
+    if (option.of_addresses) added.Repeatable();
   }
-  app.option_defaults()->group("Options");
-}
-
-std::string WithReadOptions(const CLI::App& app, std::string source) {
-  for (const ReadOption& option : ReadOptionList()) {
-    const CLI::Option* const given = app.get_option_no_throw(fmt::format("--{}", option.name));
-    const bool reads = given != nullptr && given->get_group() == kReadingGroup;  // a command may have an option of the same name
-    if (!reads) continue;
-    for (const std::string& value : given->results()) source = WithReadOption(source, option.name, value);
-  }
-  return source;
+  app.GroupOptions("Options");
 }
 
 namespace {
 
-// WithReadOptions. Throws what CLI11 takes for an error if there are such options although the source is no file.
-std::string WithReadOptionsOfFile(const CLI::App& app, const std::string& source, bool is_file) {
+// The source with those options for reading that were given to `app`.
+std::string WithReadOptions(const Command& app, std::string source) {
+  for (const ReadOption& option : ReadOptionList()) {
+    const Option given = app.FindOption(fmt::format("--{}", option.name));
+    const bool reads = given && given.group() == kReadingGroup;  // a command may have an option of the same name
+    if (!reads) continue;
+    for (const std::string& value : given.texts()) source = WithReadOption(source, option.name, value);
+  }
+  return source;
+}
+
+// WithReadOptions. InvalidArgument if there are such options although the source is no file.
+Result<std::string> WithReadOptionsOfFile(const Command& app, const std::string& source, bool is_file) {
   std::string with_options = WithReadOptions(app, source);
   if (with_options != source && !is_file) {
-    throw CLI::ValidationError(
+    return Status::InvalidArgument(
         fmt::format("'{}' is a dataset at the service; give options for reading its file where the service names it, as in --data {}",
                     source, WithReadOptions(app, "NAME=FILE")));
   }
@@ -116,13 +115,15 @@ std::string WithReadOptionsOfFile(const CLI::App& app, const std::string& source
 }
 
 // The parts of VOLUME:TRANSFER, with the options for reading that were given to `app`; without TRANSFER, `usual` is the transfer function.
-SourceChoice Resolved(const CLI::App& app, const std::string& volume, TransferChoice usual, bool is_file) {
+Result<SourceChoice> Resolved(const Command& app, const std::string& volume, TransferChoice usual, bool is_file) {
   Result<VolumeArgument> argument = ParseVolumeArgument("SOURCE", volume, is_file);
-  if (!argument.ok()) throw CLI::ValidationError(argument.status().message());
-  if (argument->transfer && app.get_option("--transfer")->count() > 0) {
-    throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
+  if (!argument.ok()) return argument.status();
+  if (argument->transfer && app.FindOption("--transfer").given()) {
+    return Status::InvalidArgument(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
   }
-  SourceChoice choice{WithReadOptionsOfFile(app, argument->volume, is_file), std::move(usual)};
+  Result<std::string> source = WithReadOptionsOfFile(app, argument->volume, is_file);
+  if (!source.ok()) return source.status();
+  SourceChoice choice{*std::move(source), std::move(usual)};
   if (argument->transfer) {
     choice.transfer.choice = *std::move(argument->transfer);
   } else {
@@ -133,29 +134,40 @@ SourceChoice Resolved(const CLI::App& app, const std::string& volume, TransferCh
 
 }  // namespace
 
-void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
-  app.parse_complete_callback([&app, source, &volume, &transfer, is_file = std::move(is_file)] {
-    if (source->count() == 0) return;
-    const bool file = is_file();
-    SourceChoice choice = Resolved(app, volume, transfer, file);
-    volume = std::move(choice.source);
-    transfer = std::move(choice.transfer);
+void TakeReadOptions(const Command& app, std::string& source) {
+  app.AfterParse([app, &source] {
+    source = WithReadOptions(app, source);
+    return Status::Ok();
   });
 }
 
-void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection) {
-  app.option_defaults()->group("Options");
-  app.add_option("SOURCE", source, kSourceHelp)->required();
-  AddReadOptions(app);
-  AddConnectionOptions(app, connection);
-  app.option_defaults()->group("Options");
-  app.parse_complete_callback(
-      [&app, &source, &connection] { source = WithReadOptionsOfFile(app, source, RendersHere(source, connection)); });
+void ResolveSource(const Command& app, Option source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
+  app.AfterParse([app, source, &volume, &transfer, is_file = std::move(is_file)] {
+    if (!source.given()) return Status::Ok();
+    Result<SourceChoice> choice = Resolved(app, volume, transfer, is_file());
+    if (!choice.ok()) return choice.status();
+    volume = std::move(choice->source);
+    transfer = std::move(choice->transfer);
+    return Status::Ok();
+  });
 }
 
-void AddSliceOptions(CLI::App& app, SliceOptions& options) {
-  app.option_defaults()->group("Options");
-  CLI::Option* source = app.add_option("SOURCE", options.source, kSourceHelp)->required();
+void AddSource(const Command& app, std::string& source, ConnectionOptions& connection) {
+  app.GroupOptions("Options");
+  app.AddText("SOURCE", source, kSourceHelp).Required();
+  AddReadOptions(app);
+  AddConnectionOptions(app, connection);
+  app.GroupOptions("Options");
+  app.AfterParse([app, &source, &connection] {
+    Result<std::string> with_options = WithReadOptionsOfFile(app, source, RendersHere(source, connection));
+    if (with_options.ok()) source = *with_options;
+    return with_options.status();
+  });
+}
+
+void AddSliceOptions(const Command& app, SliceOptions& options) {
+  app.GroupOptions("Options");
+  Option source = app.AddText("SOURCE", options.source, kSourceHelp).Required();
   AddReadOptions(app);
   AddConnectionOptions(app, options.connection);
   AddSlicePictureOptions(app, options.slice, &options.layers);
@@ -163,13 +175,13 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
                 [&options] { return RendersHere(options.source, options.connection); });
 }
 
-void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except,
+void AddFrameOptions(const Command& app, FrameOptions& options, std::initializer_list<std::string_view> except,
                      std::vector<SourceChoice>* sources) {
-  app.option_defaults()->group("Options");
+  app.GroupOptions("Options");
   const std::string help = fmt::format("{}; append :TRANSFER to choose its transfer function", kSourceHelp);
   auto texts = std::make_shared<std::vector<std::string>>();  // of several sources
-  CLI::Option* source = sources == nullptr ? app.add_option("SOURCE", options.source, help)->required()
-                                           : app.add_option("SOURCE", *texts, help + "; several make a picture each")->required();
+  const Option source = sources == nullptr ? app.AddText("SOURCE", options.source, help).Required()
+                                           : app.AddTexts("SOURCE", *texts, help + "; several make a picture each").Required();
   AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
   AddRenderPictureOptions(app, options.request, options.format, &options.layers);
@@ -177,22 +189,26 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list
     ResolveSource(app, source, options.source, options.request.transfer,
                   [&options] { return RendersHere(options.source, options.connection); });
   } else {
-    app.parse_complete_callback([&app, &options, texts, sources] {
+    app.AfterParse([app, &options, texts, sources] {
       const bool here = RendersHere(*texts, options.connection);
-      for (const std::string& text : *texts) sources->push_back(Resolved(app, text, options.request.transfer, here));
+      for (const std::string& text : *texts) {
+        Result<SourceChoice> choice = Resolved(app, text, options.request.transfer, here);
+        if (!choice.ok()) return choice.status();
+        sources->push_back(*std::move(choice));
+      }
+      return Status::Ok();
     });
   }
-  app.option_defaults()->group(kOutputGroup);
-  app.add_flag("!--no-record", options.record,
-               "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");
-  app.add_option("--save-camera", options.camera_path, "Write the camera that was used to a file for --camera and --path")
-      ->type_name("FILE");
-  app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
-  app.add_option("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing")->type_name("FILE");
+  app.GroupOptions(kOutputGroup);
+  app.AddFlag("!--no-record", options.record,
+              "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");
+  app.AddText("--save-camera", options.camera_path, "Write the camera that was used to a file for --camera and --path").TypeName("FILE");
+  app.AddText("--stats", options.stats_path, "Write plan, bytes and stage times as JSON").TypeName("FILE");
+  app.AddText("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing").TypeName("FILE");
   AddParsed(app, "--otlp", options.collector, ParseCollector,
             "Send the timeline to an OpenTelemetry collector, by OTLP over HTTP without TLS; the path is /v1/traces unless given")
-      ->type_name("URL");
-  app.add_flag("--progress", options.progress, "Show progress on stderr");
+      .TypeName("URL");
+  app.AddFlag("--progress", options.progress, "Show progress on stderr");
 }
 
 }  // namespace slabstream

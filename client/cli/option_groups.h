@@ -1,7 +1,6 @@
 // Options that several subcommands share.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <initializer_list>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "client/cli/options.h"
 #include "client/request/picture_options.h"
+#include "common/cli/command.h"
 
 namespace slabstream {
 
@@ -17,27 +17,27 @@ namespace slabstream {
 inline constexpr char kOutputGroup[] = "Output", kReadingGroup[] = "Reading a file";
 
 // --threads, [1, kMaxThreads]; 0 stays if it is not given.
-CLI::Option* AddThreads(CLI::App& app, int& threads, const std::string& help);
+Option AddThreads(const Command& app, int& threads, const std::string& help);
 
 // An option for each of ReadOptionList() but those of `except`: --time 3 says what ?time=3 behind a source says.
-void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> except = {});
-// The source with those options that were given to `app`.
-std::string WithReadOptions(const CLI::App& app, std::string source);
+void AddReadOptions(const Command& app, std::initializer_list<std::string_view> except = {});
+// After the parse, adds those that were given to the `source`, which is a file.
+void TakeReadOptions(const Command& app, std::string& source);
 
 // After the parse, splits a `source` of the form VOLUME:TRANSFER into its parts (volume_argument.h) and adds what AddReadOptions took,
 // which must be about a file. Calls `is_file` only then.
-void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
+void ResolveSource(const Command& app, Option source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
 // SOURCE, a dataset or with --local a file, with the options for reading it, and where it is.
-void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection);
+void AddSource(const Command& app, std::string& source, ConnectionOptions& connection);
 
 // All options of `slice` but its output.
-void AddSliceOptions(CLI::App& app, SliceOptions& options);
+void AddSliceOptions(const Command& app, SliceOptions& options);
 
 // All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
 // `except`: options for reading that the command has in a form of its own. `sources`: gets one or more SOURCEs; null: there is one, in
 // `options`.
-void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except = {},
+void AddFrameOptions(const Command& app, FrameOptions& options, std::initializer_list<std::string_view> except = {},
                      std::vector<SourceChoice>* sources = nullptr);
 
 }  // namespace slabstream

@@ -26,15 +26,15 @@ namespace slabstream {
 
 class RendererKind;
 
-inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
+inline constexpr int kMaxLocalWorkers = 256;  // EmbeddedOptions takes no more
 
 // Where the frames are rendered.
 struct ConnectionOptions {
-  static constexpr int kSuitableWorkers = -1;  // of local_workers, only while options are read
+  static constexpr int kSuitableWorkers = -1;  // a value of local_workers, only while options are read
   int local_workers = 0;                       // 0: render at the service; else in this process, by this many workers
-  int local_threads = 0;                       // of each local worker; 0: LocalThreads
+  int local_threads = 0;                       // threads of each local worker; 0: LocalThreads
   std::uint64_t local_memory = 0;              // bytes, limit of this process with local workers; 0: none
-  std::uint64_t local_cache = 0;               // bytes on disk, likewise; 0: none
+  std::uint64_t local_cache = 0;               // bytes on disk for local workers; 0: none
   bool unasked = false;                        // local workers that nobody asked for (RendersHere)
   ServiceChoice service;
 };
@@ -48,7 +48,7 @@ struct FrameOptions {
   PictureFormat format;
   bool record = true;                               // pictures hold how they were made
   std::string stats_path, trace_path, camera_path;  // files to be written; empty: not wanted
-  std::optional<HttpUrl> collector;                 // of OpenTelemetry, which gets the spans; none: not wanted
+  std::optional<HttpUrl> collector;                 // OpenTelemetry's collector, which gets the spans; none: not wanted
   bool progress = false;
 };
 
@@ -59,7 +59,7 @@ struct SourceChoice {
 };
 
 struct RenderOptions {
-  FrameOptions frame;                 // of each picture; its source and transfer function are those of `sources`
+  FrameOptions frame;                 // the options of each picture; its source and transfer function are those of `sources`
   std::vector<SourceChoice> sources;  // at least one
   std::string output;                 // with several sources: PictureOrders
 };
@@ -69,8 +69,8 @@ inline constexpr int kMaxInFlight = 64;
 struct TurntableOptions {
   FrameOptions frame;
   TurntableOutput output;
-  std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
-  std::optional<TimeRange> times;           // of the volumes in SOURCE; none: it is one volume
+  std::optional<double> frames_per_second;  // for a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
+  std::optional<TimeRange> times;           // the times of the volumes in SOURCE; none: it is one volume
   // [1, kMaxTurntableFrames], spread evenly over turns, path and times; none: one for each time, or as many as the path's seconds need.
   std::optional<int> frames;
   int turns = 1;                      // [0, kMaxTurns], which begin at the request's azimuth
@@ -103,8 +103,8 @@ struct TransferOptions {
 struct ConvertOptions {
   std::string source;  // a path, with options for reading it or without
   std::string output;
-  std::optional<SampleType> type;  // of the samples in `output`
-  int level = 0;                   // of `source`
+  std::optional<SampleType> type;  // the type of the samples in `output`
+  int level = 0;                   // the level of `source`
   Box box = {};                    // in voxels of that level; an end of 0: to the last one
   std::uint64_t memory = 0;        // bytes, limit of this process; 0: none
   std::uint64_t cache = 0;         // bytes on disk, for what web servers send; 0: none
@@ -135,27 +135,26 @@ inline constexpr int kMaxUpWorkers = 256;
 
 struct UpOptions {
   int workers = 0;                // processes, [1, kMaxUpWorkers]; 0, only while options are read: as many as suit machine and memory
-  int threads = 0;                // of each worker; 0: CoreShare
+  int threads = 0;                // threads of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine
   std::string keys;               // folder of keys; empty: one beside the logs if `listen` leaves this machine, else none
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
-  std::string link;               // as ParseLink takes it; empty: the coordinator's default
   std::uint64_t memory = 0;       // bytes, of all processes together
   std::uint64_t cache = 0;        // bytes on disk, as slabstream-worker takes it; 0: none
   int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none
   bool detach = false;
   bool unlisted = false;  // ServiceState::unlisted
-  std::string log_level;  // of the processes that it starts; empty: info
+  std::string log_level;  // the log level of the processes that it starts; empty: info
 };
 
 struct ViewOptions {
   ServiceChoice service;
   std::string source;       // a volume file, or a dataset's name at the service
-  LayerFiles layers;        // of a file
-  std::uint64_t cache = 0;  // of the service that it starts, as UpOptions::cache
+  LayerFiles layers;        // the layers of a file
+  std::uint64_t cache = 0;  // UpOptions::cache of the service that it starts
   std::string listen;       // as slabstream-gateway takes it
-  std::string token_file;   // likewise; empty: a new token. A file that does not exist is made
+  std::string token_file;   // as slabstream-gateway takes it; empty: a new token. A file that does not exist is made
   bool browser = true;      // open it, if there is a display
 };
 
@@ -172,7 +171,7 @@ struct StatusOptions {
 struct KeysOptions {
   ServiceChoice service;
   KeysOrder order;
-  std::string output;  // of kIssue: the service file; empty: NAME.json
+  std::string output;  // the service file of kIssue; empty: NAME.json
 };
 
 struct DataOptions {
@@ -190,11 +189,11 @@ struct LogsOptions {
 struct SlurmOptions {
   int nodes = 1;                        // [1, kMaxJobNodes]
   int workers_per_node = 1;             // [1, kMaxWorkersPerNode]
-  int threads = 0;                      // of each worker; 0: the cores of a node divided by its workers
-  TimeLimit time;                       // of the job
+  int threads = 0;                      // threads of each worker; 0: the cores of a node divided by its workers
+  TimeLimit time;                       // the time limit of the job
   int notice_seconds = 60;              // [1, kMaxNoticeSeconds]
   std::vector<std::string> data;        // NAME=PATH or DIR, as slabstream-coordinator takes them
-  std::string folder;                   // that all nodes share; empty: the one from which the job is submitted
+  std::string folder;                   // a folder that all nodes share; empty: the one from which the job is submitted
   std::vector<std::string> directives;  // as ParseDirective takes them
 };
 

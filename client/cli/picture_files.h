@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "client/cli/picture_sink.h"
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "data/layers/layer_reader.h"
 
 namespace slabstream {

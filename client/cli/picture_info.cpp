@@ -7,15 +7,13 @@
 #include <optional>
 #include <string>
 
-#include "client/image_io/picture_header.h"
+#include "client/pictures/picture_header.h"
 #include "client/request/picture_record.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::string_view kAgain = "again";  // name of the file that the command line makes
-
-std::string JsonText(const Json& json, int indent) { return json.dump(indent, ' ', false, Json::error_handler_t::replace); }
 
 // The text without control characters, which a terminal would obey: files may hold anything.
 std::string Harmless(std::string text) {
@@ -31,14 +29,14 @@ void AddLines(const std::string& name, const Json& value, std::string& text) {
     for (const auto& [field, inner] : value.items()) AddLines(name.empty() ? field : fmt::format("{}.{}", name, field), inner, text);
     return;
   }
-  std::string shown = value.is_string() ? value.get<std::string>() : JsonText(value, -1);
+  std::string shown = value.is_string() ? value.get<std::string>() : value.dump();
   if (value.is_array()) {
     shown.clear();
     const bool numbers = std::ranges::all_of(value, [](const Json& item) { return item.is_number(); });
     if (!numbers) shown = fmt::format("{} points", value.size());
     for (std::size_t i = 0; numbers && i < value.size(); ++i) {
       if (i > 0) shown += ' ';
-      shown += JsonText(value[i], -1);
+      shown += value[i].dump();
     }
   }
   if (!shown.empty()) text += fmt::format("  {:<28} {}\n", name, shown);
@@ -86,7 +84,7 @@ Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>
   if (!record) return json;
   for (const auto& [field, value] : record->json.items()) json[field] = value;
   json["command"] = RenderArguments(*record, output);
-  const auto map = [&](const TransferFunction& transfer) { return Json::parse(FormatParaViewColorMap(transfer, record->source)); };
+  const auto map = [&](const TransferFunction& transfer) { return Json::Parse(FormatParaViewColorMap(transfer, record->source)).value(); };
   if (const auto* own = OwnTransfer(record->request.transfer)) json["color_map"] = map(*own);
   if (const auto* overlay = OverlayTransfer(*record)) json["overlay_map"] = map(*overlay);
   return json;
@@ -112,7 +110,7 @@ Status RunPictureInfo(const InfoOptions& options) {
   }
   const std::string output = fmt::format("{}.{}", kAgain, header->format == "PNG" ? "png" : "exr");
   if (options.json) {
-    std::cout << JsonText(PictureJson(*header, record, output), 2) << "\n";
+    std::cout << PictureJson(*header, record, output).dump(2) << "\n";
     return Status::Ok();
   }
   const std::string how = record ? RecordLines(*record, output) : "made by      not known: the file holds no record of Slabstream\n";

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "client/client.h"
-#include "client/image_io/annotations.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/key_of_picture.h"
 
 namespace slabstream {

@@ -147,8 +147,8 @@ Json RecordingJson(std::span<const RecordedFrame> frames) {
 Result<std::vector<RecordedFrame>> ParseRecording(std::string_view text) {
   const Result<Json> json = ParseJson(text);
   if (!json.ok()) return Status::InvalidArgument("the trace: " + json.status().message());
-  const auto recording = json->is_object() ? json->find(kRecordingKey) : json->end();
-  if (recording == json->end()) {
+  const Json* const recording = json->find(kRecordingKey);
+  if (recording == nullptr) {
     return Status::InvalidArgument("the trace holds no \"slabstream\": record it with --trace of render or turntable");
   }
   std::optional<std::string> mistake;

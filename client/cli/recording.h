@@ -10,7 +10,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +17,7 @@
 
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/json/json.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/registry.h"
 #include "common/wire/client_messages.h"
@@ -30,13 +30,13 @@ struct RecordedRank {
   BoxId box = 0;
   WorkerId worker = 0;  // 0: no report for this rank
   double render_seconds = 0;
-  PixelBounds bounds;  // of its image, in the grid
+  PixelBounds bounds;  // pixels of its image, in the grid
   double pixels = 0;   // non-empty pixels in the bounds
 };
 
 struct RecordedFrame {
   const RendererKind* renderer = &DefaultRenderer();
-  PixelBounds grid;  // of the frame that was rendered and combined
+  PixelBounds grid;  // pixels of the frame that was rendered and combined
   std::uint32_t workers = 1;
   WorkerId display = 0;
   std::string combine;
@@ -50,7 +50,7 @@ struct RecordedFrame {
 // The statistics must contain the reports. Ranks without a report draw nothing and cost nothing.
 RecordedFrame Record(const FrameStatistics& statistics, Duration latency);
 
-nlohmann::ordered_json RecordingJson(std::span<const RecordedFrame> frames);
+Json RecordingJson(std::span<const RecordedFrame> frames);
 
 // Parses the text of a whole trace file; at least one frame. InvalidArgument, naming the place: not JSON, not recorded by Slabstream,
 // another version, or a missing or out-of-range value.

@@ -10,10 +10,11 @@
 #include "client/embedded/embedded_service.h"
 #include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
+#include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
-#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/survey.h"
 
@@ -25,7 +26,7 @@ constexpr const char* kLocalDataset = "volume";
 Result<LoadedData> LoadInput(const std::string& path, const LayerFiles& files, const TellRead& tell) {
   Result<LoadedVolume> loaded = ReadInputVolume(path, tell);
   if (!loaded.ok()) return loaded.status();
-  PrepareToShow(path, *loaded);
+  if (!loaded->rounding.empty()) LogWarning(path + ": " + loaded->rounding);
   Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
   return LoadedData{{std::move(loaded->volume), *std::move(layers)}, std::move(loaded->exact)};
@@ -112,8 +113,9 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
-    if (!layers.any() && CanBeReadInParts(source, *most_held)) {
-      if (Status status = CheckInputHeaders(source); !status.ok()) return status;
+    const Result<bool> in_parts = layers.any() ? false : CanBeReadInParts(source, *most_held);
+    if (!in_parts.ok()) return in_parts.status();
+    if (*in_parts) {
       files.emplace_back(source, "");
     } else {
       files.emplace_back(DataLoader([source, layers](const TellRead& tell) { return LoadInput(source, layers, tell); }));

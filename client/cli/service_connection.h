@@ -9,7 +9,7 @@
 #include "client/cli/options.h"
 #include "client/client.h"
 #include "common/base/status.h"
-#include "coordinator/data_source.h"
+#include "data/catalogue/data_source.h"
 #include "data/layers/layer_reader.h"
 
 namespace slabstream {

@@ -9,9 +9,9 @@
 #include "client/cli/picture_keys.h"
 #include "client/cli/service_connection.h"
 #include "client/cli/warn_of_picture.h"
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/picture_warnings.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 

@@ -7,9 +7,9 @@
 #include "client/cli/commands.h"
 #include "client/cli/job_script.h"
 #include "client/service/service_state.h"
-#include "common/base/program_beside.h"
 #include "common/cli/program.h"
-#include "coordinator/catalogue.h"
+#include "common/files/program_beside.h"
+#include "data/catalogue/catalogue.h"
 
 namespace slabstream {
 namespace {

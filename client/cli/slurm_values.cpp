@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

@@ -10,7 +10,7 @@ namespace slabstream {
 
 inline constexpr int kMaxJobNodes = 1000;  // Slurm's MaxArraySize is 1001 unless a site changes it
 inline constexpr int kMaxWorkersPerNode = 256;
-inline constexpr int kMaxNoticeSeconds = 65535;  // of Slurm
+inline constexpr int kMaxNoticeSeconds = 65535;  // Slurm's limit
 
 struct TimeLimit {
   std::string text;  // as Slurm takes it; empty: none

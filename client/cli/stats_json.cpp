@@ -1,37 +1,14 @@
 #include "client/cli/stats_json.h"
 
-#include <nlohmann/json.hpp>
-
 #include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
+#include "common/json/json.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
-
-// Predicted and actual values, and the error of the prediction relative to the actual value.
-void AddPrediction(Json& json, const FramePrediction& predicted, const FrameRecord& frame, const FrameSummary& summary) {
-  struct Figure {
-    const char* name;
-    double predicted, happened;
-  };
-  const Figure figures[] = {
-      {"render_ms", predicted.render_seconds * 1e3, Milliseconds(summary.render_ns)},
-      {"combine_ms", predicted.combine_seconds * 1e3, Milliseconds(summary.combine_ns)},
-      {"finish_ms", predicted.finish_seconds * 1e3, Milliseconds(summary.finish_ns)},
-      {"latency_ms", predicted.latency_seconds * 1e3, Milliseconds(frame.latency.count())},
-      {"imbalance", predicted.imbalance, summary.imbalance},
-  };
-  for (const Figure& figure : figures) {
-    json["predicted"][figure.name] = figure.predicted;
-    json["happened"][figure.name] = figure.happened;
-    if (figure.happened > 0) json["prediction_error"][figure.name] = figure.predicted / figure.happened - 1;
-  }
-}
 
 Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
   Json stages = Json::object();
@@ -50,7 +27,6 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share}};
   if (!frame.statistics.lowered.empty()) json["lowered"] = frame.statistics.lowered;
-  if (frame.statistics.predicted) AddPrediction(json, *frame.statistics.predicted, frame, summary);
   return json;
 }
 
@@ -75,7 +51,7 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
                   {"balance", last.balance},       {"combine", last.combine}};
   json["bytes"] = BytesJson(all);
   json["frames"] = std::move(list);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace slabstream

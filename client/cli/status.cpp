@@ -1,7 +1,7 @@
 #include "client/report/status_text.h"
+#include "common/json/json.h"
 
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "client/cli/commands.h"
@@ -22,9 +22,9 @@ Status RunStatus(const StatusOptions& options) {
     if (Result<std::vector<AdmittedKey>> told = connection->client().OrderKeys({}); told.ok()) keys = *std::move(told);
   }
   if (options.json) {
-    nlohmann::ordered_json json = StatusJson(*reply);
+    Json json = StatusJson(*reply);
     if (!keys.empty()) json["keys"] = KeysJson(keys);
-    std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+    std::cout << json.dump(2) << "\n";
   } else {
     std::cout << StatusText(*reply) << (keys.empty() ? "" : KeysText(keys));
   }

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "client/cli/commands.h"
-#include "common/base/files.h"
-#include "data/volume_io/volume_reader.h"
+#include "common/files/files.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {

@@ -1,17 +1,15 @@
 #include "client/cli/trace_json.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
 
 #include "client/cli/recording.h"
 #include "client/report/frame_spans.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // Tracks of a worker: its two threads, and its waiting for voxels, which overlaps both.
 enum Track { kRenderTrack = 1, kCombineTrack = 2, kFetchTrack = 3 };
@@ -79,7 +77,7 @@ std::string TraceJson(const std::vector<FrameRecord>& frames) {
   recorded.reserve(frames.size());
   for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, frame.latency));
   const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump() + "\n";
 }
 
 }  // namespace slabstream

@@ -10,8 +10,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
-#include "client/image_io/image_writer.h"
-#include "client/image_io/ink.h"
+#include "client/pictures/picture_writer.h"
 #include "common/classification/color_maps.h"
 #include "common/image/local_image.h"
 #include "common/mesh/lattice.h"
@@ -55,6 +54,8 @@ std::string ListText(bool colors) {
 Status DrawMaps(const std::string& path) {
   constexpr int kNames = 100, kColors = 400, kHeight = 28, kLetters = 16;
   const std::vector<ColorMap>& maps = NamedColorMaps();
+  Result<Font> font = Font::Open();
+  if (!font.ok()) return font.status();
   const ImageSize size = {kNames + kColors, kHeight * int(maps.size())};
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, size.width, size.height});
   const auto set = [&](int x, int y, const Rgb& color) {
@@ -70,9 +71,8 @@ Status DrawMaps(const std::string& path) {
       for (int x = 0; x < kNames; ++x) set(x, y, {1, 1, 1});
       for (int x = 0; x < kColors; ++x) set(kNames + x, y, transfer.Color((x + 0.5) / kColors));
     }
-    const Result<Ink> text = TextInk(std::string(maps[std::size_t(i)].name), kLetters);
-    if (!text.ok()) return text.status();
-    const Ink ink = Shifted(*text, kLetters / 2, i * kHeight + (kHeight + kLetters) / 2 - kLetters / 5);
+    const Ink ink =
+        Shifted(font->Draw(maps[std::size_t(i)].name, kLetters), kLetters / 2, i * kHeight + (kHeight + kLetters) / 2 - kLetters / 5);
     for (int y = std::max(ink.bounds.y_begin, 0); y < std::min(ink.bounds.y_end, size.height); ++y) {
       for (int x = std::max(ink.bounds.x_begin, 0); x < std::min(ink.bounds.x_end, kNames); ++x) {
         const auto at = std::size_t(y - ink.bounds.y_begin) * std::size_t(ink.bounds.width()) + std::size_t(x - ink.bounds.x_begin);

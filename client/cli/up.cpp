@@ -23,13 +23,13 @@
 #include "client/service/service_state.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/program_beside.h"
-#include "common/base/stop_signals.h"
 #include "common/cli/program.h"
+#include "common/files/program_beside.h"
 #include "common/keys/role.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/endpoint.h"
 #include "common/volume/memory_budget.h"
-#include "coordinator/catalogue.h"
+#include "data/catalogue/catalogue.h"
 #include "data/open/cache_option.h"
 
 namespace slabstream {
@@ -187,7 +187,6 @@ class LocalService {
                                           "--log-level", LogLevelOfChildren()};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     AddCacheArgument(arguments, options_.cache);
-    if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
     AddMetrics(arguments, 0);
     if (Status started = StartChild(0, kCoordinatorProgram, std::move(arguments)); !started.ok()) return started;

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "client/cli/service_connection.h"
 #include "client/report/volume_text.h"
 #include "client/request/values.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 
@@ -26,7 +26,7 @@ Status RunValue(const ValueOptions& options) {
   if (!connection.ok()) return connection.status();
   const Result<std::vector<VolumeSample>> samples = connection->client().SampleAt(connection->dataset(), std::move(points));
   if (!samples.ok()) return samples.status();
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  Json json = Json::array();
   for (const VolumeSample& sample : *samples) {
     if (options.json) {
       json.push_back(SampleJson(sample));
@@ -34,7 +34,7 @@ Status RunValue(const ValueOptions& options) {
       std::cout << SampleText(sample) << "\n";
     }
   }
-  if (options.json) std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+  if (options.json) std::cout << json.dump(2) << "\n";
   return Status::Ok();
 }
 

@@ -16,18 +16,19 @@
 #include "client/service/process.h"
 #include "client/service/service_state.h"
 #include "common/base/did_you_mean.h"
-#include "common/base/files.h"
-#include "common/base/program_beside.h"
-#include "common/base/stop_signals.h"
-#include "common/base/url.h"
 #include "common/cli/program.h"
+#include "common/files/files.h"
+#include "common/files/program_beside.h"
 #include "common/frame/dataset_name.h"
 #include "common/http/address.h"
+#include "common/text/url.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/this_machine.h"
-#include "coordinator/catalogue.h"
+#include "data/catalogue/catalogue.h"
 #include "data/layers/layer_reader.h"
-#include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/open/source_name.h"
 #include "data/volume_io/read_options.h"
 
@@ -148,10 +149,10 @@ Status CheckEntry(const std::string& source, const std::string& entry) {
 void TellOfPart(const std::string& source) {
   Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return;
-  parsed->options.describe = true;
-  const Result<std::vector<std::string>> texts = TextsOfPart(parsed->path, parsed->options);
-  if (!texts.ok()) return;  // the page says what is wrong
-  for (const std::string& text : *texts) PrintNote(text);
+  parsed->options.describe = parsed->options.headers_only = true;
+  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(parsed->path, parsed->options, ProcessReadContext());
+  if (!opened.ok()) return;  // the page says what is wrong
+  for (const std::string& text : PartTexts(parsed->path, parsed->options, (*opened)->info())) PrintNote(text);
 }
 
 // The token in the file, which is made if it does not exist.

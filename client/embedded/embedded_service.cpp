@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/large_buffers.h"
+#include "common/memory/large_buffers.h"
 #include "common/volume/memory_budget.h"
 #include "data/stores/http_transfers.h"
 

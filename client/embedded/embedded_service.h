@@ -8,15 +8,15 @@
 #include "client/client.h"
 #include "common/base/status.h"
 #include "common/transport/socket.h"
-#include "coordinator/service.h"
-#include "worker/service.h"
+#include "coordinator/service/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
   CoordinatorOptions coordinator;  // endpoints and time-outs are filled in; the catalogue is used
-  WorkerConfig worker;             // of each; threads and budgets are used
+  WorkerConfig worker;             // what each worker gets; its threads and budgets are used
 };
 
 class EmbeddedService {

@@ -11,8 +11,8 @@
 
 #include "client/movie/movie_format.h"
 #include "client/service/process.h"
-#include "common/base/file_descriptor.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
 
 namespace slabstream {
 

@@ -16,8 +16,8 @@ struct MovieFormat {
   std::string_view ending;                  // ".mp4"
   std::string_view container;               // as ffmpeg's -f takes it
   std::vector<std::string_view> encoding;   // further arguments of ffmpeg
-  std::vector<std::string_view> of_file;    // of movies in files
-  std::vector<std::string_view> of_stream;  // of movies that are read while they are made
+  std::vector<std::string_view> of_file;    // ffmpeg's arguments for a movie in a file
+  std::vector<std::string_view> of_stream;  // ffmpeg's arguments for a movie that is read while it is made
   bool even_sides = false;                  // width and height must be even
   double max_frames_per_second = kMaxFramesPerSecond;
 };
@@ -31,7 +31,7 @@ std::string MovieEndings();  // ".mp4, .webm or .gif"
 const MovieFormat* MovieFormatOf(const std::string& path);
 
 struct MovieShape {
-  ImageSize size;  // of all frames
+  ImageSize size;  // the size of every frame
   double frames_per_second = 25;
 };
 

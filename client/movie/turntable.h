@@ -11,7 +11,8 @@ inline constexpr char kPathHelp[] = "Move through the cameras of a JSON list ins
 inline constexpr char kTurnsHelp[] = "Number of full turns; 0: the view is fixed";
 inline constexpr char kFramesPerSecondHelp[] = "Frames per second of a movie";
 
-// Of the frame with this index in [0, frames), in degrees. In one turn, so that a start near the limit of angles stays valid.
+// The azimuth of the frame with this index in [0, frames), in degrees. It stays within one turn, so that a start near
+// the limit of angles stays valid.
 inline double TurntableAzimuth(double begin_degrees, int turns, int index, int frames) {
   return std::fmod(begin_degrees + 360.0 * turns * index / frames, 360.0);
 }

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
@@ -23,7 +23,7 @@ std::vector<VolumeDescription> LevelsOf(const DatasetStatus& dataset) {
   return dataset.levels.empty() ? std::vector{dataset.description} : dataset.levels;
 }
 
-nlohmann::ordered_json LevelJson(const VolumeDescription& level) {
+Json LevelJson(const VolumeDescription& level) {
   const auto& [size, spacing, unused] = level.geometry;
   return {{"size", {size.x, size.y, size.z}}, {"spacing", {spacing.x, spacing.y, spacing.z}}, {"voxel_bytes", level.voxel_bytes()}};
 }
@@ -47,8 +47,8 @@ std::string AgeText(std::uint64_t milliseconds) {
   return hours < 48 ? fmt::format("{:.1f} h", hours) : fmt::format("{:.1f} d", hours / 24);
 }
 
-nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
-  nlohmann::ordered_json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
+Json DatasetJson(const DatasetStatus& dataset) {
+  Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
   if (dataset.state == DatasetState::kReady) {
     const VolumeGeometry& geometry = dataset.description.geometry;
     entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
@@ -57,7 +57,7 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
     entry["memory_bytes"] = dataset.memory_bytes;
     entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
     entry["cells"] = dataset.cells;
-    entry["levels"] = nlohmann::ordered_json::array();
+    entry["levels"] = Json::array();
     for (const VolumeDescription& level : LevelsOf(dataset)) entry["levels"].push_back(LevelJson(level));
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
   }

@@ -1,11 +1,11 @@
 // Datasets of a service, as `status` and `data` show them.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/json/json.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -15,7 +15,7 @@ std::string_view NameOf(DatasetState state);  // "ready"
 // "12 s", "5 min", "3.5 h", "2.1 d".
 std::string AgeText(std::uint64_t milliseconds);
 
-nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset);
+Json DatasetJson(const DatasetStatus& dataset);
 
 // A table: a line for each dataset, and one for the heads of the columns.
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets);

@@ -8,11 +8,11 @@ namespace slabstream {
 
 struct FrameSummary {
   StageTimes stage_ns{};           // worker time, summed over ranks
-  std::int64_t render_ns = 0;      // of the worker with the longest render time
+  std::int64_t render_ns = 0;      // the longest render time of a worker
   std::int64_t combine_ns = 0;     // combining and encoding of partial images, summed over workers
   std::int64_t finish_ns = 0;      // making and encoding the picture, of all its shares
-  std::uint64_t voxel_bytes = 0;   // that travelled to workers
-  std::uint64_t image_bytes = 0;   // that travelled between workers
+  std::uint64_t voxel_bytes = 0;   // bytes of voxels that travelled to workers
+  std::uint64_t image_bytes = 0;   // bytes of images that travelled between workers
   std::uint64_t stored_bytes = 0;  // read from the dataset's source, as they are stored
   double imbalance = 1;            // most / mean render time of a worker, over all workers of the plan; at least 1
   double idle_share = 0;  // share of the workers' time, from plan to last byte, in which none of a worker's threads had work; in [0, 1]

@@ -2,16 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "client/report/dataset_text.h"
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/transport/keys.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 std::string StatusText(const StatusReply& reply) {
   const auto limit = [](std::uint64_t bytes) { return bytes == 0 ? std::string("no memory limit") : "memory limit " + MemoryText(bytes); };

@@ -5,18 +5,16 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "client/report/value_text.h"
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/view/picture_geometry.h"
 #include "common/volume/exact_value.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json Vector(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }

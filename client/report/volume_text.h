@@ -1,44 +1,44 @@
 // What a dataset holds, as the command line and the gateway show it.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
 
 // {"dataset", "range", "counts", "non_finite", "percentiles": {"50": value, ...}}
-nlohmann::ordered_json HistogramJson(const std::string& dataset, const SummaryReply& summary);
+Json HistogramJson(const std::string& dataset, const SummaryReply& summary);
 
 // {"dataset", "range", "steepest", "values", "slopes", "counts"}
-nlohmann::ordered_json JointHistogramJson(const std::string& dataset, const JointHistogramReply& reply);
+Json JointHistogramJson(const std::string& dataset, const JointHistogramReply& reply);
 
 // {"dataset", "labels": [{"value", "name", "color": "#rrggbb"}, ...]}
-nlohmann::ordered_json LabelsJson(const std::string& dataset, const SummaryReply& summary);
+Json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 
 // {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"; "interpolated"}. Null: there is
 // none.
-nlohmann::ordered_json SampleJson(const VolumeSample& sample);
+Json SampleJson(const VolumeSample& sample);
 // The same with "hit", and "depth"; {"hit": false} if there is none.
-nlohmann::ordered_json PickJson(const PickReply& picked);
+Json PickJson(const PickReply& picked);
 
 // {"from", "to", "length", "values"}: what samples along a line hold, at least two of them. Null: nothing, or no finite value.
-nlohmann::ordered_json ProfileJson(const std::vector<VolumeSample>& samples);
+Json ProfileJson(const std::vector<VolumeSample>& samples);
 
 // {"voxels", "non_finite", "mean", "deviation", "least", "largest"}. Null: there are no voxels.
-nlohmann::ordered_json BoxStatisticsJson(const BoxStatistics& box);
+Json BoxStatisticsJson(const BoxStatistics& box);
 
 // What voxels of a dataset take of the world: millilitres, if the length of its unit is known in mm, cm or m; else its unit cubed.
 struct VoxelMeasure {
   std::string unit;   // "ml", "\u00b5m^3"
-  double volume = 1;  // of a voxel
+  double volume = 1;  // the volume of a voxel
 };
 VoxelMeasure MeasureOf(const VolumeGeometry& geometry);
 
 // {"unit", "labels": [{"value", "name", "color", "volume", and the fields of BoxStatisticsJson}, ...]}
-nlohmann::ordered_json LabelStatisticsJson(const StatisticsReply& reply);
+Json LabelStatisticsJson(const StatisticsReply& reply);
 // The same as lines of a table: comma-separated as RFC 4180 has it, with a line of names; or in columns.
 std::string LabelStatisticsCsv(const StatisticsReply& reply);
 std::string LabelStatisticsText(const StatisticsReply& reply);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "client/request/request_options.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "common/view/default_view.h"
 #include "common/wire/validate_request.h"
 

@@ -5,59 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <set>
 #include <vector>
 
 #include "common/base/printable.h"
 
 namespace slabstream {
-namespace {
-
-// Brackets and braces outside of texts. Of what is no JSON it may be any number.
-int DepthOf(std::string_view text) {
-  int depth = 0, deepest = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_text && c == '\\') {
-      ++i;
-    } else if (c == '"') {
-      in_text = !in_text;
-    } else if (!in_text && (c == '[' || c == '{')) {
-      deepest = std::max(deepest, ++depth);
-    } else if (!in_text && (c == ']' || c == '}')) {
-      --depth;
-    }
-  }
-  return deepest;
-}
-
-}  // namespace
-
 double Decimal(float number) { return std::strtod(fmt::format("{}", number).c_str(), nullptr); }
-
-// Copying a value and writing it out call themselves for each level, so the levels are limited before anything is made of the text.
-Result<Json> ParseJson(std::string_view text) {
-  if (const int depth = DepthOf(text); depth > kMaxJsonDepth)
-    return Status::InvalidArgument(fmt::format("values nest {} deep, at most {} are allowed", depth, kMaxJsonDepth));
-  // Of several fields with one name, a parser would keep the last one without a word.
-  std::string twice;
-  std::vector<std::set<std::string>> open;  // names of the objects that have begun and not ended
-  const auto note = [&](int, Json::parse_event_t event, const Json& value) {
-    if (event == Json::parse_event_t::object_start) open.emplace_back();
-    if (event == Json::parse_event_t::object_end) open.pop_back();
-    if (event == Json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second && twice.empty()) twice = value;
-    return true;
-  };
-  try {
-    Json json = Json::parse(text, note);
-    if (twice.empty()) return json;
-    return Printable(Status::InvalidArgument(fmt::format("field '{}' is given twice", twice.substr(0, 64))));
-  } catch (const Json::exception& error) {
-    const std::string what = error.what();
-    return Printable(Status::InvalidArgument("not JSON: " + what.substr(what.find("] ") + 2)));
-  }
-}
 
 void JsonValue::Complain(const std::string& what) const {
   if (!*mistake_) *mistake_ = Printable(place_.empty() ? what : fmt::format("{}: {}", place_, what));
@@ -65,7 +18,7 @@ void JsonValue::Complain(const std::string& what) const {
 
 std::string JsonValue::Shown() const {
   constexpr std::size_t kMost = 60;
-  const std::string text = json_->dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = json_->dump();
   return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,20 +10,17 @@
 #include <vector>
 
 #include "common/cli/parse.h"
+#include "common/json/json.h"
 #include "common/math/vec.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 inline Json VectorJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 // The double with the fewest digits that is this float: 0.2 instead of 0.20000000298023224.
 double Decimal(float number);
 
-inline constexpr int kMaxJsonDepth = 64;
-
-// The value of a file that a user names. InvalidArgument, one line: not JSON, or values that nest deeper than kMaxJsonDepth.
-Result<Json> ParseJson(std::string_view text);
+// The value of a file that a user names: no object has a name twice.
+inline Result<Json> ParseJson(std::string_view text) { return Json::Parse(text, {.names_differ = true}); }
 
 // One value. Errors are stored in `mistake`, which all values of a file share. The first mistake stays, and values read after it do not
 // matter.

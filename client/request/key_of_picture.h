@@ -1,7 +1,7 @@
 // What the colour bar and the legend of a picture say, from its request and what the service knows of its dataset. Pure.
 #pragma once
 
-#include "client/image_io/picture_key.h"
+#include "client/pictures/picture_writer.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/client_messages.h"
 

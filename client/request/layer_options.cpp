@@ -14,30 +14,28 @@ const std::string& GroupOf(std::string_view option) {
   return found->group;
 }
 
-const std::string& FileIn(const CLI::results_t& texts, const char* option) {
-  if (texts.back().empty()) throw CLI::ValidationError(std::string(option) + " needs a file");
-  return texts.back();
-}
-
 }  // namespace
 
-void AddLayerFiles(CLI::App& app, LayerFiles& files, FrameRequest* shown) {
-  app.option_defaults()->group(GroupOf("label-mode"));
-  app.add_option("--labels", CLI::callback_t([&files, shown](const CLI::results_t& texts) {
-                   SetLabelFiles(FileIn(texts, "--labels"), files);
-                   if (shown != nullptr && !shown->labels) shown->labels.emplace();
-                   return true;
-                 }),
-                 "A volume of labels, the numbers of structures, on any grid, and a table of their colours: .lut, FreeSurfer, ITK-SNAP, "
-                 "ParaView (default: X.nii.lut beside X.nii.gz, else colours of our own); with --local")
-      ->type_name("FILE[:COLOURS]");
-  app.add_option("--overlay", CLI::callback_t([&files, shown](const CLI::results_t& texts) {
-                   files.overlay = FileIn(texts, "--overlay");
-                   if (shown != nullptr && !shown->overlay) shown->overlay.emplace();
-                   return true;
-                 }),
-                 "A second volume of values, on any grid, such as a statistical map; with --local")
-      ->type_name("FILE");
+void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown) {
+  app.GroupOptions(GroupOf("label-mode"));
+  const auto set_labels = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
+    if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
+    SetLabelFiles(texts.back(), files);
+    if (shown != nullptr && !shown->labels) shown->labels.emplace();
+    return Status::Ok();
+  };
+  app.AddOption("--labels", set_labels,
+                "A volume of labels, the numbers of structures, on any grid, and a table of their colours: .lut, FreeSurfer, ITK-SNAP, "
+                "ParaView (default: X.nii.lut beside X.nii.gz, else colours of our own); with --local")
+      .TypeName("FILE[:COLOURS]");
+  const auto set_overlay = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
+    if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
+    files.overlay = texts.back();
+    if (shown != nullptr && !shown->overlay) shown->overlay.emplace();
+    return Status::Ok();
+  };
+  app.AddOption("--overlay", set_overlay, "A second volume of values, on any grid, such as a statistical map; with --local")
+      .TypeName("FILE");
 }
 
 }  // namespace slabstream

@@ -1,14 +1,13 @@
 // --labels and --overlay: the files of a volume's layers.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "common/cli/command.h"
 #include "common/frame/frame_request.h"
 #include "data/layers/layer_reader.h"
 
 namespace slabstream {
 
 // `shown`: the request that shows a layer whose file is given; may be null.
-void AddLayerFiles(CLI::App& app, LayerFiles& files, FrameRequest* shown = nullptr);
+void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown = nullptr);
 
 }  // namespace slabstream

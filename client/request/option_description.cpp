@@ -1,7 +1,5 @@
 #include "client/request/option_description.h"
 
-#include <CLI/CLI.hpp>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -14,24 +12,10 @@
 namespace slabstream {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-std::string NameOf(const CLI::Option& option) {
-  const std::vector<std::string>& names = option.get_lnames();
-  return names.empty() ? option.get_name() : names.front();
-}
-
 // "CAPTION" of "[=CAPTION]".
 std::string NameOfOptional(std::string type) {
   std::erase_if(type, [](char c) { return c == '[' || c == '=' || c == ']'; });
   return type;
-}
-
-// In order of their names: CLI11 keeps them in order of their addresses.
-Json NamesOf(const std::set<CLI::Option*>& options) {
-  std::set<std::string> names;
-  for (const CLI::Option* option : options) names.insert(NameOf(*option));
-  return names;
 }
 
 Json DescribeRenderers() {
@@ -67,44 +51,44 @@ Json DescribeWindows() {
   return windows;
 }
 
-Json Describe(CLI::Option& option) {
-  Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
-  const bool alone = option.get_items_expected_max() == 0;
-  if (!alone) json["type"] = option.get_type_name();
-  if (alone && !option.get_type_name().empty()) json["optional_value"] = NameOfOptional(option.get_type_name());
-  if (!option.get_default_str().empty()) json["default"] = option.get_default_str();
-  const OptionDomain domain = DomainOf(option);
+Json Describe(Option option) {
+  const std::string name = option.name(), type = option.type_name();
+  Json json = {{"name", name}, {"group", option.group()}};
+  const bool alone = option.most_values() == 0;
+  if (!alone) json["type"] = type;
+  if (alone && !type.empty()) json["optional_value"] = NameOfOptional(type);
+  if (!option.default_text().empty()) json["default"] = option.default_text();
+  const OptionDomain domain = option.domain();
   if (!domain.choices.empty()) json["choices"] = domain.choices;
   if (domain.range) {
     json[domain.range->min_open ? "above" : "min"] = domain.range->min;
     json["max"] = domain.range->max;
   }
-  if (option.get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll) json["repeatable"] = true;
-  if (option.get_required()) json["required"] = true;
-  if (!option.get_excludes().empty()) json["excludes"] = NamesOf(option.get_excludes());
-  if (!option.get_needs().empty()) json["needs"] = NamesOf(option.get_needs());
-  const RequestOption* const field = FindRequestOption(NameOf(option));
-  if (field != nullptr && field->help == option.get_description()) {
+  if (option.repeatable()) json["repeatable"] = true;
+  if (option.required()) json["required"] = true;
+  if (const auto others = option.excluded(); !others.empty()) json["excludes"] = others;
+  if (const auto others = option.needed(); !others.empty()) json["needs"] = others;
+  const RequestOption* const field = FindRequestOption(name);
+  if (field != nullptr && field->help == option.description()) {
     json["path"] = field->path;
     if (!field->unit.empty()) json["unit"] = field->unit;
     if (!field->ability.empty()) json["ability"] = field->ability;
     if (field->same_picture) json["same_picture"] = true;
     if (field->negatable) json["negatable"] = true;
     if (field->path == "renderer") json["renderers"] = DescribeRenderers();
-    if (option.get_type_name() == "TRANSFER") DescribePresets(json);
+    if (type == "TRANSFER") DescribePresets(json);
   }
-  if (NameOf(option) == "window") json["windows"] = DescribeWindows();
-  json["help"] = option.get_description();
+  if (name == "window") json["windows"] = DescribeWindows();
+  json["help"] = option.description();
   return json;
 }
 
 }  // namespace
 
-Json DescribeOptions(CLI::App& command) {
+Json DescribeOptions(const Command& command) {
   Json options = Json::array();
-  for (CLI::Option* option : command.get_options()) {
-    const bool help = option == command.get_help_ptr() || option == command.get_help_all_ptr();
-    if (!option->get_group().empty() && !help) options.push_back(Describe(*option));
+  for (const Option& option : command.options()) {
+    if (!option.group().empty() && !command.IsHelp(option)) options.push_back(Describe(option));
   }
   return options;
 }

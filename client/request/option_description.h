@@ -2,11 +2,9 @@
 // Python package (python/slabstream/options.json).
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include "common/json/json.h"
 
-namespace CLI {
-class App;
-}
+#include "common/cli/command.h"
 
 namespace slabstream {
 
@@ -17,6 +15,6 @@ namespace slabstream {
 // renderers, a list of {name, title, purpose, abilities, parameters: {name: default}}; and which of them auto means: automatic, {volumes,
 // grids}. Options that take a transfer function tell the names of its presets: presets, and of those that have regions: region_presets. The
 // option window tells its named ones: windows, a list of {name, width, level}.
-nlohmann::ordered_json DescribeOptions(CLI::App& command);
+Json DescribeOptions(const Command& command);
 
 }  // namespace slabstream

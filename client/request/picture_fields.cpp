@@ -15,58 +15,54 @@ namespace slabstream {
 namespace {
 
 // Its value may be left out: a flag has none, but --color-bar may have one.
-bool MayStandAlone(const CLI::Option& option) { return option.get_expected_max() == 0; }
-bool IsFlag(const CLI::Option& option) { return MayStandAlone(option) && option.get_type_name().empty(); }
+bool MayStandAlone(Option option) { return option.most_values() == 0; }
+bool IsFlag(Option option) { return MayStandAlone(option) && option.type_name().empty(); }
 
 // The options, and where their values go.
 struct RenderOptionsApp {
   RenderOptionsApp() {
-    app.set_help_flag();
-    AddRequestOption(app, *FindRequestOption("dataset"), request.frame)->required();
+    AddRequestOption(app, *FindRequestOption("dataset"), request.frame).Required();
     AddRenderPictureOptions(app, request.frame, request.format, nullptr);
   }
   TransferChoice& transfer() { return request.frame.transfer; }
 
-  CLI::App app;
+  Program app;
   RenderRequest request;
 };
 
 struct SliceOptionsApp {
   SliceOptionsApp() {
-    app.set_help_flag();
-    AddRequestOption(app, *FindRequestOption("dataset"), request.frame)->required();
+    AddRequestOption(app, *FindRequestOption("dataset"), request.frame).Required();
     AddSlicePictureOptions(app, request, nullptr);
   }
   TransferChoice& transfer() { return request.frame.transfer; }
 
-  CLI::App app;
+  Program app;
   SliceRequest request;
 };
 
-std::string NoOption(const CLI::App& app, const std::string& name) {
-  std::vector<std::string_view> names;
-  for (const CLI::Option* option : app.get_options()) {
-    if (!option->get_lnames().empty()) names.push_back(option->get_lnames().front());
-  }
+std::string NoOption(const Command& app, const std::string& name) {
+  std::vector<std::string> names;
+  for (const Option& option : app.options()) names.push_back(option.name());
   return fmt::format("there is no option '{}'{}", Printable(name.substr(0, 64)), DidYouMean(name, names));
 }
 
 // The arguments that say the same. Names are looked up here, so that no text can be taken for another option.
-Status AddArgument(CLI::App& app, const PictureField& field, std::vector<std::string>& arguments) {
+Status AddArgument(const Command& app, const PictureField& field, std::vector<std::string>& arguments) {
   const std::string name = "--" + field.name;
   const bool proper = !field.name.empty() && field.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
-  const CLI::Option* const option = proper ? app.get_option_no_throw(name) : nullptr;
-  if (option == nullptr) return Status::InvalidArgument(NoOption(app, field.name));
-  if (MayStandAlone(*option) && (field.text == "true" || field.text == "false" || field.text.empty())) {
+  const Option option = proper ? app.FindOption(name) : Option();
+  if (!option) return Status::InvalidArgument(NoOption(app, field.name));
+  if (MayStandAlone(option) && (field.text == "true" || field.text == "false" || field.text.empty())) {
     const std::string off = "--no-" + field.name;
     if (field.text != "false") {
       arguments.push_back(name);
-    } else if (option->check_name(off)) {
+    } else if (option.Has(off)) {
       arguments.push_back(off);
     }
     return Status::Ok();
   }
-  if (IsFlag(*option)) {
+  if (IsFlag(option)) {
     return Status::InvalidArgument(fmt::format("{} '{}' is neither true nor false", name, Printable(field.text.substr(0, 64))));
   }
   if (field.text.empty()) return Status::InvalidArgument(fmt::format("{} has no value", name));
@@ -86,12 +82,8 @@ Status Parse(const PictureFields& fields, OptionsApp& options) {
   for (const PictureField& field : fields) {
     if (Status status = AddArgument(options.app, field, arguments); !status.ok()) return status;
   }
-  std::ranges::reverse(arguments);  // as CLI11 wants them
-  try {
-    options.app.parse(std::move(arguments));
-  } catch (const CLI::Error& error) {
-    return Status::InvalidArgument(error.what());
-  }
+  const ParseEnd end = options.app.Parse(std::move(arguments));
+  if (end.kind != ParseEnd::Kind::kParsed) return Status::InvalidArgument(end.message);
   LetSurfacesStandAlone(options.app, options.transfer());
   return Status::Ok();
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "client/request/slice_request.h"
 #include "common/base/status.h"
@@ -15,15 +15,15 @@
 namespace slabstream {
 
 struct PictureField {
-  std::string name;  // of an option, without dashes
-  std::string text;  // of a flag, or of an option whose value is left out: "true", "false", or empty for "true"
+  std::string name;  // an option's name, without dashes
+  std::string text;  // its value. A flag, or an option whose value is left out, has "true", "false", or an empty text for "true"
 };
 using PictureFields = std::vector<PictureField>;
 
 inline constexpr std::size_t kMaxPictureFields = 256;
 
-// Of a JSON object: texts, numbers, booleans; lists of them for fields that are repeated; objects for colour maps. Null: left out.
-// InvalidArgument: another kind of value.
+// The fields of a JSON object. Values are texts, numbers or booleans; lists of them for fields that are repeated;
+// objects for colour maps. A null counts as left out. InvalidArgument: a value of another kind.
 Result<PictureFields> FieldsOfJson(const Json& object);
 
 struct RenderRequest {

@@ -4,12 +4,11 @@
 // Then --camera, --labels and --overlay are missing, and colour maps are taken as their JSON.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/request_options.h"
 #include "client/request/slice_request.h"
 #include "common/base/status.h"
+#include "common/cli/command.h"
 #include "common/frame/frame_request.h"
 #include "data/layers/layer_reader.h"
 
@@ -19,18 +18,18 @@ namespace slabstream {
 inline constexpr char kHidden[] = "";
 
 // View, clipping, look, layers, annotations and policy. The view is the default one, as far as no option says something else.
-void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files);
+void AddRenderPictureOptions(const Command& app, FrameRequest& request, PictureFormat& format, LayerFiles* files);
 
 // Plane, look and layers.
-void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* files);
+void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles* files);
 
 // An option for one field of the table.
-CLI::Option* AddRequestOption(CLI::App& app, const RequestOption& option, FrameRequest& request, ColorMaps maps = ColorMaps::kFilesToo);
+Option AddRequestOption(const Command& app, const RequestOption& option, FrameRequest& request, ColorMaps maps = ColorMaps::kFilesToo);
 
 // For what replaces the whole view.
-void ExcludeViewOptions(CLI::App& app, CLI::Option* option);
+void ExcludeViewOptions(const Command& app, Option option);
 
 // After the parse: isosurfaces without --transfer are all that is shown.
-void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer);
+void LetSurfacesStandAlone(const Command& app, TransferChoice& transfer);
 
 }  // namespace slabstream

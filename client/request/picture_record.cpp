@@ -11,8 +11,8 @@
 #include "client/request/shell_word.h"
 #include "common/base/version.h"
 #include "common/wire/request_json.h"
+#include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {
@@ -132,7 +132,7 @@ void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
 
 // Names of catalogues have no slashes, and hardly ever the ending of a volume file.
 bool IsFile(const std::string& source) {
-  return source.find('/') != std::string::npos || LooksLikeVolume(source.substr(0, source.find('?')));
+  return source.find('/') != std::string::npos || LooksLikeVolumeFile(source.substr(0, source.find('?')));
 }
 
 bool IsPlain(std::string_view word) {
@@ -156,7 +156,7 @@ FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
 
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers, const std::vector<LevelUse>& levels) {
-  Json made = Json::parse(RequestToJson(request));
+  Json made = Json::Parse(RequestToJson(request)).value();
   made.erase("dataset");  // the source says it
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
                {"source", ShownSource(source)},
@@ -168,7 +168,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
   if (std::ranges::any_of(levels, [](const LevelUse& use) { return use.level > 0; })) {
     for (const LevelUse& use : levels) json["levels"].push_back(use.level);
   }
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+  return json.dump(-1, true);
 }
 
 Result<PictureRecord> ParseRecord(std::string_view text) {

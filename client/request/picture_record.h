@@ -1,7 +1,7 @@
 // The record of a picture: how it was made, as the text that its file holds (PictureNotes). It is JSON:
 //
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
-//    "layers": {"labels", "overlay"},                                     likewise, if there are any
+//    "layers": {"labels", "overlay"},                                     paths as they were typed, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
 //    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend", "font_size",
 //                "quality", "dpi"},
@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "client/request/request_options.h"
 #include "common/base/status.h"
@@ -31,14 +31,14 @@ struct PictureRecord {
   LayerFiles layers;
   FrameRequest request;  // its dataset does not count
   PictureFormat format;
-  Json json;  // of the whole record
+  Json json;  // the whole record
 };
 
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);
 
-// The request of a picture with the renderer and the view that it was made by, so that its record names these. Of a preview: the request as
-// it is.
+// The request of a picture with the renderer and the view that it was made by, so that its record names these. The
+// request of a preview stays as it is.
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics);
 
 // ASCII, one line.

@@ -13,10 +13,11 @@
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
+#include "common/planning/balances.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "common/view/default_view.h"
-#include "common/wire/field_walk.h"
+#include "common/wire/request_walk.h"
 
 namespace slabstream {
 namespace {
@@ -46,9 +47,6 @@ Choices ChoicesOf(const std::string& list) {
   const auto add_all = [&](const auto& entries) {
     for (const auto& entry : entries) choices.Add(entry.name, entry.purpose);
   };
-  if (list == "decompositions" || list == "assignments" || list == "combining schemes") {
-    choices.Add(kAutomatic, "what should be fastest for this volume, view and service");
-  }
   if (list == "decompositions") add_all(Decompositions());
   if (list == "assignments") add_all(Assignments());
   if (list == "loads") add_all(BalanceByChoices());
@@ -69,21 +67,20 @@ Choices ChoicesOf(const std::string& list) {
 }
 
 template <class T>
-RequestOption Describe(const Field& field, const T&, std::string path, const std::string& group) {
-  const v1::About& about = AboutOf(field);
-  RequestOption option{.name = about.name(),
+RequestOption Describe(const FieldAbout& field, const T&, std::string path, const std::string& group) {
+  RequestOption option{.name = field.name,
                        .path = std::move(path),
                        .group = group,
-                       .help = about.help(),
-                       .value = about.value(),
-                       .standard = about.standard(),
-                       .unit = about.unit(),
-                       .ability = about.ability(),
-                       .same_picture = about.same_picture(),
-                       .excludes = {about.excludes().begin(), about.excludes().end()},
-                       .needs = {about.needs().begin(), about.needs().end()}};
-  if (!about.list().empty()) {
-    Choices choices = ChoicesOf(about.list());
+                       .help = field.help,
+                       .value = field.value,
+                       .standard = field.standard,
+                       .unit = field.unit,
+                       .ability = field.ability,
+                       .same_picture = field.same_picture,
+                       .excludes = field.excludes,
+                       .needs = field.needs};
+  if (!field.list.empty()) {
+    Choices choices = ChoicesOf(field.list);
     option.choices = std::move(choices.names);
     const bool told_elsewhere = option.path == "overlay.preset";  // as --transfer
     if (!told_elsewhere) option.help += choices.explained;
@@ -91,13 +88,13 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
   if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
   const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };
   if constexpr (requires(T value) { value.number(); }) {
-    option.choices = WordsOf(*field.enum_type());
+    option.choices = field.words;
   } else if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::optional<bool>>) {
     option.standard.clear();  // a flag: it is there or not
     option.negatable = !std::is_same_v<T, bool>;
     return option;
   } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::optional<float>> || std::is_same_v<T, std::optional<double>>) {
-    option.range = NumberRange{about.least(), about.most(), about.above_least()};
+    option.range = NumberRange{field.least, field.most, field.above_least};
     option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
   }
   option.repeatable = std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>;
@@ -141,12 +138,11 @@ void AddParameters(const std::string& group, std::vector<RequestOption>& table) 
 
 template <class Struct>
 void Collect(const std::string& place, const std::string& outer_group, const Struct& part, std::vector<RequestOption>& table) {
-  Walk(part, [&](const Field& field, const auto& member, std::size_t) {
+  Walk(part, [&](const FieldAbout& field, const auto& member, std::size_t) {
     using T = std::remove_cvref_t<decltype(member)>;
-    const v1::About& about = AboutOf(field);
-    const std::string& group = about.group().empty() ? outer_group : about.group();
-    const std::string path = place + field.name();
-    if (!about.name().empty()) {
+    const std::string& group = field.group.empty() ? outer_group : field.group;
+    const std::string path = place + field.field;
+    if (!field.name.empty()) {
       table.push_back(Describe(field, member, path, group));
     } else if (path == kParameters) {
       AddParameters(group, table);
@@ -164,10 +160,10 @@ void Collect(const std::string& place, const std::string& outer_group, const Str
 // there is skipped.
 template <class Struct, class Use>
 void At(std::string_view path, Struct& whole, const Use& use) {
-  Walk(whole, [&](const Field& field, auto& member, std::size_t most) {
+  Walk(whole, [&](const FieldAbout& field, auto& member, std::size_t most) {
     using T = std::remove_cvref_t<decltype(member)>;
-    if (!path.starts_with(field.name())) return;
-    const std::string_view rest = path.substr(field.name().size());
+    if (!path.starts_with(field.field)) return;
+    const std::string_view rest = path.substr(field.field.size());
     if (rest.empty()) return use(field, member, most);
     if (!rest.starts_with('.')) return;
     if constexpr (Part<T>) {
@@ -231,7 +227,7 @@ struct OptionReader {
   }
   void Read(const std::string& text, std::string& value) {
     if (!option.choices.empty()) status = Choice(text).status();
-    if (option.path == "policy.combine" && text != kAutomatic) {
+    if (option.path == "policy.combine" && !text.empty()) {
       if (const auto parsed = ParseCombining(text); !parsed.ok()) {
         status = Status::InvalidArgument(fmt::format("{} {}", shown, parsed.status().message()));
       }
@@ -283,11 +279,11 @@ std::string Text(const T& value) requires requires {
 { return TextOf(value); }
 
 template <class T>
-std::vector<std::string> Texts(const RequestOption& option, const Field& field, const T& value) {
+std::vector<std::string> Texts(const RequestOption& option, const FieldAbout& field, const T& value) {
   if constexpr (std::is_same_v<T, bool>) {
     return value ? std::vector<std::string>{"true"} : std::vector<std::string>{};
   } else if constexpr (requires { value.number(); }) {
-    return {WordOf(*field.enum_type()->FindValueByNumber(value.number()))};
+    return {field.words.at(std::size_t(value.number()) - 1)};
   } else if constexpr (requires { value.index(); }) {
     if (const auto* preset = std::get_if<std::string>(&value)) return {*preset};
     return {option.path.starts_with("overlay") ? kOverlayMapFile : kColorMapFile};
@@ -311,7 +307,7 @@ std::vector<std::string> Texts(const RequestOption& option, const Field& field, 
 
 std::vector<std::string> AllTextsOf(const RequestOption& option, const FrameRequest& request) {
   std::vector<std::string> texts;
-  At(option.path, request, [&](const Field& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
+  At(option.path, request, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
   return texts;
 }
 
@@ -347,7 +343,7 @@ Status SetOption(const RequestOption& option, const std::string& shown, std::spa
     return Status::Ok();
   }
   Status status;
-  At(option.path, request, [&](const Field&, auto& member, std::size_t most) {
+  At(option.path, request, [&](const FieldAbout&, auto& member, std::size_t most) {
     OptionReader reader{.option = option, .shown = shown, .maps = maps, .most = most};
     reader.ReadAll(texts, member);
     status = reader.status;
@@ -374,12 +370,12 @@ std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest
 }
 
 std::optional<std::vector<std::string>> TextsOfJson(const Json& value, bool repeatable) {
-  const auto dumped = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
+  const auto dumped = [](const Json& json) { return json.dump(-1, true); };
   const auto text_of = [&](const Json& item) -> std::optional<std::string> {
     if (item.is_string()) return item.get<std::string>();
     if (item.is_boolean()) return item.get<bool>() ? "true" : "false";
-    if (item.is_number_float()) return fmt::format("{}", item.get<double>());  // the fewest digits that read back the same
-    if (item.is_number() || item.is_object()) return dumped(item);
+    if (item.is_number_integer() || item.is_object()) return dumped(item);
+    if (item.is_number()) return fmt::format("{}", item.get<double>());  // the fewest digits that read back the same
     if (!item.is_array() || item.empty()) return std::nullopt;
     if (item.front().is_object()) return dumped(item);  // a colour map
     std::string joined;
@@ -423,7 +419,7 @@ Json OptionsJson(const FrameRequest& request, std::string_view place) {
     if (option.flag()) {
       json[option.name] = texts.front() == "true";
     } else if (option.range) {
-      json[option.name] = Json::parse(texts.front());
+      json[option.name] = Json::Parse(texts.front()).value();
     } else {
       json[option.name] = option.repeatable ? Json(texts) : Json(texts.front());
     }

@@ -19,13 +19,13 @@ namespace slabstream {
 
 struct RequestOption {
   std::string name;      // "clip-box"
-  std::string path;      // of the field in the request: "clipping.box"; of a renderer's parameter: "parameters.sampling-rate"
+  std::string path;      // the field's path in the request, "clipping.box"; for a renderer's parameter "parameters.sampling-rate"
   std::string group;     // heading in help texts
   std::string help;      // lines after the first one explain the choices
   std::string value;     // what the help shows for it, such as "NUMBER"; empty: a flag
   std::string standard;  // text; empty: none
   std::string unit;
-  std::string ability;               // that the renderer needs (common/renderers/ability.h); empty: none
+  std::string ability;               // the ability that the renderer needs (common/renderers/ability.h); empty: none
   std::vector<std::string> choices;  // empty: it is no choice
   std::optional<NumberRange> range;
   bool repeatable = false;
@@ -49,8 +49,8 @@ enum class ColorMaps : bool { kTexts, kFilesToo };
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
                  FrameRequest& request);
 
-// The texts that set the field to what it is in `request`; none if it has its standard value. Of a layer that is shown, there is always one
-// text. A transfer function that is no preset stands as the name of a file: see kColorMapFile.
+// The texts that set the field to what it is in `request`; none if it has its standard value. A layer that is shown has
+// always one text. A transfer function that is no preset stands as the name of a file: see kColorMapFile.
 std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest& request);
 
 // The files that a command line names for transfer functions that are not presets.

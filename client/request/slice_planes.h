@@ -11,8 +11,8 @@ namespace slabstream {
 
 struct SlicePlane {
   std::string_view name;
-  std::string_view view;  // of kNamedViews
-  Vec3 normal;            // of the world
+  std::string_view view;  // its name in kNamedViews
+  Vec3 normal;            // a direction of the world
   bool of_patient = false;
 };
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/slice_planes.h"
 #include "client/request/value_window.h"
 #include "common/base/status.h"
@@ -22,7 +22,7 @@ struct SliceRequest {
 
   std::span<const SlicePlane> planes = kSliceChoices.back().planes;
   std::optional<Vec3> at;             // a point of the world
-  std::optional<std::int32_t> index;  // of the slice; of one plane only. Neither: the volume's centre
+  std::optional<std::int32_t> index;  // the slice's number, if there is one plane only. Neither: the volume's centre
   double thickness = 0;               // unit of the world; 0: a plane
   std::optional<ValueWindow> window;  // none: `frame.transfer`
   std::optional<double> level;        // data value, in place of the window's
@@ -33,7 +33,7 @@ struct SliceRequest {
   std::optional<ValueWindow> shown_window() const {
     return window ? std::optional(ValueWindow{window->width, level.value_or(window->level)}) : std::nullopt;
   }
-  ImageSize size() const { return {frame.size.width * int(planes.size()), frame.size.height}; }  // of the whole picture
+  ImageSize size() const { return {frame.size.width * int(planes.size()), frame.size.height}; }  // the size of the whole picture
 };
 
 // A frame for each plane, from left to right, all of them valid. InvalidArgument.

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/math/vec.h"

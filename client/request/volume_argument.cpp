@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "common/base/did_you_mean.h"
-#include "common/base/files.h"
 #include "common/base/find_named.h"
-#include "common/base/url.h"
+#include "common/files/files.h"
+#include "common/text/url.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {

@@ -69,7 +69,8 @@ class Child {
   std::optional<ChildEnd> ended_;
 };
 
-// Of a line such as "ready client=tcp://127.0.0.1:7420 workers=...", as the coordinator says it: the value of `key`; empty: it has none.
+// The value of `key` in a line of the coordinator such as "ready client=tcp://127.0.0.1:7420 workers=..."; empty: the
+// line has no such key.
 std::string ValueIn(const std::string& line, const std::string& key);
 
 // The last line of a log; empty if there is none.

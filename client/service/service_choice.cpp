@@ -14,14 +14,14 @@ ParseText EndpointText(bool allow_wildcard) {
   };
 }
 
-CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
-  CLI::Option* endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false),
-                                    "Endpoint of the service; with --service, another way to it, such as a tunnel")
-                              ->type_name("ENDPOINT")
-                              ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
-  app.add_option("--service", service.file, "Service file of a service with keys: its endpoint and a key")
-      ->type_name("FILE")
-      ->default_str("$SLABSTREAM_SERVICE, if there is no --endpoint");
+Option AddService(const Command& app, ServiceChoice& service) {
+  Option endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false),
+                              "Endpoint of the service; with --service, another way to it, such as a tunnel")
+                        .TypeName("ENDPOINT")
+                        .Default("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
+  app.AddText("--service", service.file, "Service file of a service with keys: its endpoint and a key")
+      .TypeName("FILE")
+      .Default("$SLABSTREAM_SERVICE, if there is no --endpoint");
   return endpoint;
 }
 

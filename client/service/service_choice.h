@@ -1,7 +1,6 @@
 // Which service a program is a client of: its options.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "common/cli/add_option.h"
@@ -17,6 +16,6 @@ struct ServiceChoice {
 // For AddParsed: an endpoint, as ParseEndpoint takes it.
 ParseText EndpointText(bool allow_wildcard);
 // --endpoint and --service; returns the former.
-CLI::Option* AddService(CLI::App& app, ServiceChoice& service);
+Option AddService(const Command& app, ServiceChoice& service);
 
 }  // namespace slabstream

@@ -12,12 +12,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "client/service/process.h"
-#include "common/base/files.h"
 #include "common/base/time.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
 #include "common/service/service_file.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/this_machine.h"
@@ -35,11 +35,14 @@ std::string FileFor(const std::string& directory, const std::string& endpoint) {
 std::optional<ServiceState> Load(const std::string& path) {
   const Result<std::string> text = ReadTextFile(path, kMaxStateBytes);
   if (!text.ok()) return std::nullopt;
-  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
+  const Result<Json> json = Json::Parse(*text);
+  if (!json.ok()) return std::nullopt;
   try {
-    return ServiceState{json.at("endpoint"),      json.at("started_unix"),       json.at("coordinator"),       json.at("workers"),
-                        json.at("log_directory"), json.value("keys_folder", ""), json.value("unlisted", false)};
-  } catch (const nlohmann::json::exception&) {
+    return ServiceState{json->at("endpoint").text(),          json->at("started_unix").get<double>(),
+                        json->at("coordinator").get<pid_t>(), json->at("workers").get<std::vector<pid_t>>(),
+                        json->at("log_directory").text(),     json->value("keys_folder", std::string()),
+                        json->value("unlisted", false)};
+  } catch (const std::runtime_error&) {
     return std::nullopt;
   }
 }
@@ -77,9 +80,13 @@ Result<std::string> StateDirectory() {
 Status SaveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
-  const nlohmann::json json = {{"endpoint", state.endpoint}, {"started_unix", state.started_unix},   {"coordinator", state.coordinator},
-                               {"workers", state.workers},   {"log_directory", state.log_directory}, {"keys_folder", state.keys_folder},
-                               {"unlisted", state.unlisted}};
+  const Json json = {{"coordinator", state.coordinator},
+                     {"endpoint", state.endpoint},
+                     {"keys_folder", state.keys_folder},
+                     {"log_directory", state.log_directory},
+                     {"started_unix", state.started_unix},
+                     {"unlisted", state.unlisted},
+                     {"workers", state.workers}};
   return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
 }
 

@@ -27,7 +27,7 @@ struct ServiceState {
   std::vector<pid_t> workers;
   std::string log_directory;  // a subdirectory of StateDirectory()
   std::string keys_folder;    // empty: it has no keys
-  bool unlisted = false;      // of one `view`: only who names its endpoint means it
+  bool unlisted = false;      // one `view` started it: only who names its endpoint means it
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 

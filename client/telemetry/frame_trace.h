@@ -28,7 +28,7 @@ class WallClock {
 // A span that belongs to `parent`, with its trace.
 TraceSpan ChildOf(const TraceSpan& parent, std::string name, std::int64_t begin_ns, std::int64_t end_ns);
 
-inline constexpr std::size_t kMaxTracedStages = 1024;  // of a frame
+inline constexpr std::size_t kMaxTracedStages = 1024;  // in the trace of a frame
 
 // Adds a frame that lasted from `begin` to `end`, by this process's clock, as a child of `parent`. Times at the service that do not lie
 // between the two are by the clock of another host: they are moved, so that the service ends with the frame. Stages beyond

@@ -10,14 +10,15 @@
 
 namespace slabstream {
 
-// The name that is most like `text`: it differs in case or dashes alone, `text` begins it or is a part of it (3 letters or more), or few
-// letters are wrong, missing, too many or swapped. Empty: none is alike. Of several that are equally alike the first. Valid as `names` are.
+// The name that is most like `text`: it differs in case or dashes alone, `text` begins it or is a part of it (3 letters
+// or more), or few letters are wrong, missing, too many or swapped. Empty: none is alike. If several are equally alike,
+// it is the first. Valid as `names` are.
 std::string_view MostAlike(std::string_view text, std::span<const std::string_view> names);
 
 // The end of a message about a name that does not exist: "; did you mean 'raycast'?", or nothing.
 std::string DidYouMean(std::string_view text, std::span<const std::string_view> names);
 
-// Of a list of entries with a `name` (find_named.h), or of texts.
+// MostAlike for a list of entries with a `name` (find_named.h), or of texts.
 template <std::ranges::range Entries>
 requires(!std::convertible_to<Entries, std::span<const std::string_view>>) std::string
     DidYouMean(std::string_view text, const Entries& entries) {

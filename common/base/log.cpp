@@ -6,7 +6,7 @@
 #include <atomic>
 #include <string>
 
-#include "common/base/url.h"
+#include "common/text/url.h"
 
 namespace slabstream {
 namespace {

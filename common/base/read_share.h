@@ -6,8 +6,8 @@
 namespace slabstream {
 
 struct ReadShare {
-  int percent = 0;                     // of the samples, [0, 100]; 0: not known
-  std::uint64_t bytes_per_second = 0;  // of samples
+  int percent = 0;                     // how much of the samples is read, [0, 100]; 0: not known
+  std::uint64_t bytes_per_second = 0;  // bytes of samples that are read in a second
 };
 
 }  // namespace slabstream

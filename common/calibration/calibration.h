@@ -14,11 +14,11 @@ namespace slabstream::calibration {
 //   balance_bench VOLUME --decomposition kd-tree --balance-by occupied
 namespace splat {
 inline constexpr double kBox = 39e-6;
-inline constexpr double kSlice = 1e-6;       // of a box
-inline constexpr double kRow = 49e-9;        // of samples, in each slice, if it is not empty
-inline constexpr double kSegment = 7.5e-9;   // of a row, a cell long, if it is not empty
-inline constexpr double kRun = 16e-9;        // of such segments
-inline constexpr double kOctet = 18e-9;      // of voxels that are shaded
+inline constexpr double kSlice = 1e-6;       // a slice of a box
+inline constexpr double kRow = 49e-9;        // a row of samples, in each slice, if it is not empty
+inline constexpr double kSegment = 7.5e-9;   // a segment of a row, a cell long, if it is not empty
+inline constexpr double kRun = 16e-9;        // a run of such segments
+inline constexpr double kOctet = 18e-9;      // an octet of voxels that are shaded
 inline constexpr float kOpaqueDepth = 1.5F;  // mean optical depth of a segment's rays when the last one ends, as a multiple of that ray's
 }  // namespace splat
 
@@ -28,15 +28,15 @@ inline constexpr float kOpaqueDepth = 1.5F;  // mean optical depth of a segment'
 namespace zbuffer {
 inline constexpr double kBox = 1.5e-6;
 inline constexpr double kSurfaceCell = 230e-9;  // a cell through which a surface passes
-inline constexpr double kPixel = 1.5e-9;        // of the image
+inline constexpr double kPixel = 1.5e-9;        // a pixel of the image
 }  // namespace zbuffer
 
 // Ray casting (common/renderers/raycast). Measured with the two spheres of 256 voxels a side that `slabstream bench` renders.
 //   balance_bench VOLUME --renderer raycast --decomposition kd-tree --balance-by occupied
 namespace raycast {
 inline constexpr double kBox = 30e-6;
-inline constexpr double kPixel = 60e-9;   // that the box covers
-inline constexpr double kSample = 11e-9;  // that is shaded
+inline constexpr double kPixel = 60e-9;   // a pixel that the box covers
+inline constexpr double kSample = 11e-9;  // a sample that is shaded
 }  // namespace raycast
 
 // Multi-pass shears (common/renderers/shear).
@@ -44,7 +44,7 @@ inline constexpr double kSample = 11e-9;  // that is shaded
 namespace shear {
 inline constexpr double kBox = 50e-6;
 inline constexpr double kResample = 4e-9;  // a voxel of a cell that is drawn, at a pixel a voxel
-inline constexpr double kSample = 6e-9;    // that is shaded
+inline constexpr double kSample = 6e-9;    // a sample that is shaded
 }  // namespace shear
 
 // Projections of values (common/renderers/projection_kind.h).
@@ -67,36 +67,27 @@ inline constexpr double kSample = 8e-9;
 //   balance_bench VOLUME
 inline constexpr double kMacrocellWork = 512;
 
-// Pixels of the picture (coordinator/tuning/frame_predictor.cpp).
-//   simulation_bench CASE  (laboratory/measure/frame_costs.h)
-namespace picture {
-inline constexpr double kResample = 4.5e-9;  // the accumulated frame to a pixel of the picture
-inline constexpr double kResolve = 1.5e-9;   // a supersampled pixel, averaged
-inline constexpr double kEncode = 2.5e-9;
-inline constexpr double kReceive = 1.2e-9;  // checked and decoded at the client
-}  // namespace picture
-
-// A worker's combining thread, for each pixel that is not empty (CombiningCosts), if images travel in messages and if they are lent.
+// A worker's combining thread, for each pixel that is not empty (CombiningCosts), if images travel in messages.
 //   simulation_bench CASE  (laboratory/measure/combining_costs.h)
 namespace combining {
-inline constexpr double kScan = 0.2e-9, kLentScan = 0.03e-9;        // searched for runs, empty or not
-inline constexpr double kEncode = 1.5e-9;                           // copied into a message
-inline constexpr double kCombine = 1.5e-9, kLentCombine = 0.45e-9;  // onto what is there; from a message: checked, too
-inline constexpr double kLocal = 1e-9, kLentLocal = 0.45e-9;        // of one image of this worker onto another one
-inline constexpr double kHidden = 0.1e-9;                           // of the frame: searched for opaque tiles
+inline constexpr double kScan = 0.2e-9;     // searched for runs, empty or not
+inline constexpr double kEncode = 1.5e-9;   // copied into a message
+inline constexpr double kCombine = 1.5e-9;  // onto what is there, and checked
+inline constexpr double kLocal = 1e-9;      // of one image of this worker onto another one
+inline constexpr double kHidden = 0.1e-9;   // a pixel of the frame, searched for opaque tiles
 }  // namespace combining
 
 // Threads and processes of the service (MachineModel).
 //   simulation_bench CASE  (laboratory/measure/calibrate.h; plan, message and client are estimates)
 namespace service {
-inline constexpr double kAwake = 25e-6, kAsleep = 60e-6, kDoze = 500e-6;   // WakeUps
-inline constexpr double kSerialShare = 0.02;                               // of rendering and making a picture
-inline constexpr double kMemorySlowdown = 0.03;                            // share of a host's speed, by each busy thread
-inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;  // of the coordinator
-inline constexpr double kCipherByte = 0.19e-9;  // of processor time at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench)
-inline constexpr double kCurveByte = 1.2e-9;    // of processor time to encrypt and send, or receive and decrypt, a byte over CURVE
-inline constexpr double kLoopbackRate = 6e9;    // bytes a second between processes of a host: 16 MiB in 2.7 ms (combining_bench)
-inline constexpr double kVoxelRate = 5e8;       // bytes a second of voxels that reach a new owner: an order of magnitude
+inline constexpr double kAwake = 25e-6, kAsleep = 60e-6, kDoze = 500e-6;  // WakeUps
+inline constexpr double kSerialShare = 0.02;  // share of rendering and of making a picture that one thread does alone
+// What the coordinator does for a plan, a message and a client.
+inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;
+// Processor time of a byte at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench).
+inline constexpr double kCipherByte = 0.19e-9;
+inline constexpr double kCurveByte = 1.2e-9;  // processor time to encrypt and send, or receive and decrypt, a byte over CURVE
+inline constexpr double kVoxelRate = 5e8;     // bytes a second of voxels that reach a new owner: an order of magnitude
 }  // namespace service
 
 }  // namespace slabstream::calibration

@@ -36,8 +36,8 @@ struct ClassificationTable {
   }
 };
 
-// The data values between which a function changes: beyond them its curves are constant, and no isosurface stands. Of a function without
-// points first > last.
+// The data values between which a function changes: beyond them its curves are constant, and no isosurface stands. If
+// the function has no points, first > last.
 struct NodeRange {
   double first = std::numeric_limits<double>::infinity(), last = -first;
 };

@@ -1,7 +1,5 @@
 #include "common/classification/count_occupied.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -10,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/classification/occupancy_layers.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -72,7 +71,7 @@ void Count(const VoxelBricks& voxels, const ClassificationTable& table, Occupanc
   const Occupied<T> occupied(table);
   const Index3 cells = OccupancyCells(grid.size);
   constexpr std::int32_t kCellsOfBrick = kBrick / kOccupancyCell;
-  tbb::parallel_for(0, cells.y * cells.z, [&](std::int32_t row) {
+  ParallelFor(0, cells.y * cells.z, [&](std::int32_t row) {
     Index3 cell = {0, row % cells.y, row / cells.y};
     CellOccupancy* out = &grid.cells[std::size_t(row) * std::size_t(cells.x)];
     for (; cell.x < cells.x; ++cell.x) {

@@ -12,9 +12,9 @@ namespace slabstream {
 // of a whole volume, from voxel 0 on. Parallel, with the same result for any number of threads; bricks of one value cost next to nothing.
 OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table);
 
-// Of an unstructured grid, on its lattice: a voxel is occupied if the space that it fills touches the bounding box of a cell that may be
-// visible, because an opacity between its least and its greatest value is above zero. Nothing is visible of a cell with a value that is not
-// finite. Parallel, with the same result for any number of threads.
+// Counts the voxels of an unstructured grid's lattice. A voxel is occupied if the space that it fills touches the
+// bounding box of a cell that may be visible, because an opacity between the cell's least and greatest value is above
+// zero. A cell with a value that is not finite is invisible. Parallel, with the same result for any number of threads.
 OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
 
 }  // namespace slabstream

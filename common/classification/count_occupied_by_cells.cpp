@@ -1,4 +1,3 @@
-#include <tbb/parallel_for.h>
 
 #include <atomic>
 
@@ -6,6 +5,7 @@
 #include "common/classification/count_occupied.h"
 #include "common/classification/occupancy_layers.h"
 #include "common/mesh/mesh_cell.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -48,7 +48,7 @@ class VoxelBits {
 
   OccupancyGrid Count() const {
     OccupancyGrid grid{size_, std::vector<CellOccupancy>(CountIn(cells_))};
-    tbb::parallel_for(std::size_t{0}, grid.cells.size(), [&](std::size_t cell) {
+    ParallelFor(0, grid.cells.size(), [&](std::size_t cell) {
       for (std::int32_t z = 0; z < kOccupancyCell; ++z) {
         AddLayer(grid.cells[cell], z, layers_[kOccupancyCell * cell + std::size_t(z)].load(std::memory_order_relaxed));
       }
@@ -67,7 +67,7 @@ OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& la
   CHECK(lattice.mapping == ValueMapping{});
   const VisibleRanges visible(table);
   VoxelBits voxels(lattice.geometry.size);
-  tbb::parallel_for(std::size_t{0}, mesh.tetrahedra.size(), [&](std::size_t cell) {
+  ParallelFor(0, mesh.tetrahedra.size(), [&](std::size_t cell) {
     if (visible(ValuesIn(mesh, cell))) voxels.Set(VoxelsTouched(BoundsOf(mesh, cell), lattice.geometry.size));
   });
   return voxels.Count();

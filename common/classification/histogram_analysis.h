@@ -20,7 +20,7 @@ VolumeSummary WithoutOutliers(const VolumeSummary& summary);
 // Consecutive bins on one side of the background, [first, last]; first > last: none.
 struct MaterialBins {
   int first = 0, last = -1;
-  double share = 0;  // of all voxels, in [0, 1]
+  double share = 0;  // their share of all voxels, in [0, 1]
 };
 
 struct Foreground {

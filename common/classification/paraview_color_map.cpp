@@ -4,18 +4,16 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <ranges>
 #include <string_view>
 #include <utility>
 
 #include "common/base/printable.h"
 #include "common/classification/transfer_function.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::size_t kNumbersPerPoint = 4;  // of both curves
 
@@ -173,14 +171,10 @@ Result<TransferFunction> ReadPreset(const Json& preset) {
 
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name) {
   const auto failed = [&](const std::string& why) { return Printable(Status::InvalidArgument(std::string(name) + ": " + why)); };
-  Json document;
-  try {
-    document = Json::parse(json);
-  } catch (const Json::exception& error) {
-    return failed("not JSON: " + std::string(error.what()));
-  }
-  if (document.is_array() && document.empty()) return failed("not a colour map: the array is empty");
-  Result<TransferFunction> transfer = ReadPreset(document.is_array() ? document.front() : document);
+  const Result<Json> document = Json::Parse(json);
+  if (!document.ok()) return failed(document.status().message());
+  if (document->is_array() && document->empty()) return failed("not a colour map: the array is empty");
+  Result<TransferFunction> transfer = ReadPreset(document->is_array() ? document->front() : *document);
   if (!transfer.ok()) return failed(transfer.status().message());
   return transfer;
 }
@@ -189,7 +183,7 @@ std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string
   std::vector<double> colors, opacities;
   for (const ColorPoint& p : transfer.colors) colors.insert(colors.end(), {p.value, p.color.r, p.color.g, p.color.b});
   for (const OpacityPoint& p : transfer.opacities) opacities.insert(opacities.end(), {p.value, p.opacity, p.midpoint, p.sharpness});
-  nlohmann::ordered_json preset = {{"Name", name}};
+  Json preset = {{"Name", name}};
   if (transfer.regions.empty()) {
     preset.update({{"ColorSpace", "RGB"}, {"RGBPoints", colors}, {"Points", opacities}});
   }
@@ -201,7 +195,7 @@ std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string
   for (const auto& [field, number] : kMaterialFields) {
     if (transfer.material) preset[kMaterial][std::string(field)] = (*transfer.material).*number;
   }
-  return nlohmann::ordered_json::array({preset}).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return Json::array({preset}).dump(2) + "\n";
 }
 
 }  // namespace slabstream

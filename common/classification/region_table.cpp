@@ -1,10 +1,10 @@
 #include "common/classification/region_table.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 
@@ -36,7 +36,7 @@ RegionTable MakeRegionTable(const TransferFunction& transfer, const Classificati
     slopes.push_back(share * share * steepest);
     factors.push_back(transfer.gradient_opacities.empty() ? 1 : GradientOpacity(transfer.gradient_opacities, slopes.back()));
   }
-  tbb::parallel_for(0, RegionTable::kValues, [&](int row) {
+  ParallelFor(0, RegionTable::kValues, [&](int row) {
     const double value = mapping.FromStored(table.stored_origin + stored_range * row / (RegionTable::kValues - 1));
     if (!(value >= least && value <= greatest)) return;
     float* entry = &of.entries[4 * std::size_t(row) * RegionTable::kSlopes];

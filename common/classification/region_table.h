@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "common/base/aligned_buffer.h"
 #include "common/classification/classification_table.h"
+#include "common/memory/aligned_buffer.h"
 
 namespace slabstream {
 

@@ -27,10 +27,10 @@
 
 namespace slabstream {
 
-inline constexpr int kMaxTransferPoints = 4096;     // of each curve
+inline constexpr int kMaxTransferPoints = 4096;     // points of each curve
 inline constexpr double kMaxOpacityDistance = 1e6;  // voxel lengths
 inline constexpr int kMaxIsosurfaces = 8;
-inline constexpr double kMaxScalar = 1e300;  // of isovalues, slopes and the ends of scalar ranges; either sign
+inline constexpr double kMaxScalar = 1e300;  // limit of isovalues, slopes and the ends of scalar ranges; either sign
 
 // Each channel times the factor, at most 1 (FrameRequest::brightness).
 Rgb Brightened(Rgb color, double factor);

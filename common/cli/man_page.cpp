@@ -46,24 +46,27 @@ std::string Paragraphs(const std::string& text) {
   return list ? page + ".RE\n" : page;
 }
 
-std::vector<const CLI::App*> CommandsOf(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* command) { return !command->get_group().empty(); });
+std::vector<Command> CommandsOf(const Command& app) {
+  std::vector<Command> commands = app.commands();
+  std::erase_if(commands, [](const Command& command) { return command.group().empty(); });
+  return commands;
 }
 
-std::vector<const CLI::Option*> OptionsOf(const CLI::App& app, bool positional, const std::string& group) {
-  return app.get_options([&](const CLI::Option* option) {
-    return option->get_positional() == positional && !option->get_group().empty() && (positional || option->get_group() == group);
+std::vector<Option> OptionsOf(const Command& app, bool arguments, const std::string& group) {
+  std::vector<Option> options = app.options();
+  std::erase_if(options, [&](const Option& option) {
+    return option.is_argument() != arguments || option.group().empty() || (!arguments && option.group() != group);
   });
+  return options;
 }
 
-std::string Synopsis(const CLI::App& app, const std::string& name) {
+std::string Synopsis(const Command& app, const std::string& name) {
   std::string line = fmt::format(".B {}\n[OPTIONS]", Escaped(name));
-  for (const CLI::Option* option : OptionsOf(app, true, "")) {
-    const std::string several = option->get_items_expected_max() > 1 ? "..." : "";
-    const std::string argument = Escaped(option->get_name(true)) + several;
-    line += option->get_required() ? " " + argument : " [" + argument + "]";
+  for (const Option& option : OptionsOf(app, true, "")) {
+    const std::string argument = Escaped(option.argument_name()) + (option.most_values() > 1 ? "..." : "");
+    line += option.required() ? " " + argument : " [" + argument + "]";
   }
-  if (!CommandsOf(app).empty()) line += app.get_require_subcommand_min() > 0 ? " COMMAND" : " [COMMAND]";
+  if (!CommandsOf(app).empty()) line += app.needs_command() ? " COMMAND" : " [COMMAND]";
   return line + "\n";
 }
 
@@ -75,44 +78,42 @@ std::string WithoutMachine(std::string text) {
   return text;
 }
 
-std::string OptionList(const std::vector<const CLI::Option*>& options) {
-  const HelpFormatter formatter;
+std::string OptionList(const std::vector<Option>& options) {
   std::string list;
-  for (const CLI::Option* option : options) {
-    const std::string name = formatter.make_option_name(option, option->get_positional()) + formatter.make_option_opts(option);
-    list += fmt::format(".TP\n.B {}\n{}", Escaped(name), Paragraphs(WithoutMachine(OptionText(*option))));
+  for (const Option& option : options) {
+    list += fmt::format(".TP\n.B {}\n{}", Escaped(OptionTitle(option)), Paragraphs(WithoutMachine(OptionText(option))));
   }
   return list;
 }
 
 // `section`: the macro that begins a section, .SH, or within one .SS.
-std::string Options(const CLI::App& app, std::string_view section) {
+std::string Options(const Command& app, std::string_view section) {
   std::string page;
-  const auto add = [&](const std::string& title, const std::vector<const CLI::Option*>& options) {
+  const auto add = [&](const std::string& title, const std::vector<Option>& options) {
     if (options.empty()) return;
     page += section == ".SH" ? fmt::format(".SH \"{}\"\n", Escaped(title)) : std::string();
     page += OptionList(options);
   };
   add("Arguments", OptionsOf(app, true, ""));
-  for (const std::string& group : app.get_groups()) {
+  for (const std::string& group : app.option_groups()) {
     if (!group.empty()) add(group, OptionsOf(app, false, group));
   }
   return page;
 }
 
 // Of a command and of all below it.
-std::string Details(const CLI::App& app, const std::string& name) {
+std::string Details(const Command& app, const std::string& name) {
   std::string page;
-  for (const CLI::App* command : CommandsOf(app)) {
-    const std::string full_name = name + " " + command->get_name();
-    page += fmt::format(".SS {}\n{}\n", Escaped(full_name), Paragraphs(command->get_description() + "."));
-    page += fmt::format(".PP\n{}{}{}", Synopsis(*command, full_name), Options(*command, ".SS"), Details(*command, full_name));
+  for (const Command& command : CommandsOf(app)) {
+    const std::string full_name = name + " " + command.name();
+    page += fmt::format(".SS {}\n{}\n", Escaped(full_name), Paragraphs(command.description() + "."));
+    page += fmt::format(".PP\n{}{}{}", Synopsis(command, full_name), Options(command, ".SS"), Details(command, full_name));
   }
   return page;
 }
 
-std::string Examples(const CLI::App& app) {
-  const HelpPage* const page = HelpFormatter::PageOf(app);
+std::string Examples(const Command& app) {
+  const HelpPage* const page = HelpPageOf(app);
   if (page == nullptr || page->examples.empty()) return "";
   std::string text = ".SH EXAMPLES\n";
   for (const HelpExample& example : page->examples) {
@@ -121,20 +122,20 @@ std::string Examples(const CLI::App& app) {
   return text;
 }
 
-std::string CommandList(const CLI::App& app, const std::string& name) {
+std::string CommandList(const Command& app, const std::string& name) {
   std::string list;
-  for (const CLI::App* command : CommandsOf(app)) {
-    const std::string page = PageName(name + " " + command->get_name());
-    list += fmt::format(".TP\n.BR {} (1)\n{}", Escaped(page), Paragraphs(command->get_description()));
+  for (const Command& command : CommandsOf(app)) {
+    const std::string page = PageName(name + " " + command.name());
+    list += fmt::format(".TP\n.BR {} (1)\n{}", Escaped(page), Paragraphs(command.description()));
   }
   return list;
 }
 
 }  // namespace
 
-std::string ManPage(const CLI::App& app, const std::string& name) {
-  const bool program = app.get_parent() == nullptr;
-  const std::string page_name = PageName(name), text = app.get_description();
+std::string ManPage(const Command& app, const std::string& name) {
+  const bool program = app.is_program();
+  const std::string page_name = PageName(name), text = app.description();
   std::string purpose = text;  // of a program it begins "Slabstream renders" or "Slabstream worker: renders"
   if (const std::size_t colon = text.find(": "); program && colon != std::string::npos) {
     purpose.erase(0, colon + 2);

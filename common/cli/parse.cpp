@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "common/base/did_you_mean.h"
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <exception>
 #include <iostream>
-#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -15,37 +14,31 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/background_tasks.h"
 #include "common/base/did_you_mean.h"
-#include "common/base/large_buffers.h"
 #include "common/base/log.h"
-#include "common/base/open_files.h"
 #include "common/base/printable.h"
 #include "common/base/process_limits.h"
-#include "common/base/url.h"
 #include "common/cli/add_option.h"
-#include "common/cli/help_formatter.h"
-#include "common/cli/man_page.h"
+#include "common/files/open_files.h"
+#include "common/memory/large_buffers.h"
+#include "common/text/url.h"
+#include "common/threads/background_tasks.h"
 
 namespace slabstream {
 
 namespace {
 
 // The command that was typed last: `keys rotate` of `slabstream`.
-const CLI::App& LastCommand(const CLI::App& app) {
-  const CLI::App* last = &app;
-  for (auto used = last->get_subcommands(); !used.empty(); used = last->get_subcommands()) last = used.back();
-  return *last;
+Command LastCommand(const Command& program) {
+  Command last = program;
+  for (auto used = last.typed(); !used.empty(); used = last.typed()) last = used.back();
+  return last;
 }
 
-std::string FullName(const CLI::App& app) {
-  return app.get_parent() == nullptr ? app.get_name() : FullName(*app.get_parent()) + " " + app.get_name();
-}
-
-std::vector<std::string> CommandNames(const CLI::App& app) {
+std::vector<std::string> CommandNames(const Command& of) {
   std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands(nullptr)) {
-    if (!command->get_group().empty()) names.push_back(command->get_name());
+  for (const Command& command : of.commands()) {
+    if (!command.group().empty()) names.push_back(command.name());
   }
   return names;
 }
@@ -56,29 +49,29 @@ std::string Joined(const std::vector<std::string>& names) {
   return joined;
 }
 
-Status NoOption(const CLI::App& command, const std::string& typed) {
+Status NoOption(const Command& command, const std::string& typed) {
   std::vector<std::string> names;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back(name);
+  for (const Option& option : command.options()) {
+    for (const std::string& name : option.long_names()) names.push_back(name);
   }
   const std::string name = typed.substr(0, typed.find('='));
   const std::string_view bare = std::string_view(name).substr(std::min(name.find_first_not_of('-'), name.size()));
   const std::string_view meant = MostAlike(bare, std::vector<std::string_view>(names.begin(), names.end()));
-  return Status::InvalidArgument("`" + FullName(command) + "` has no option '" + Printable(name) + "'" +
+  return Status::InvalidArgument("`" + command.full_name() + "` has no option '" + Printable(name) + "'" +
                                  (meant.empty() ? "" : "; did you mean '--" + std::string(meant) + "'?"));
 }
 
 // What CLI11 says of arguments that nothing takes, and of a command that is missing, names neither the culprit nor what was meant.
-Status WhatIsWrong(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App& command = LastCommand(app);
-  const std::vector<std::string> left = app.remaining(true);
+Status WhatIsWrong(const Program& program, const ParseEnd& end) {
+  const Command command = LastCommand(program);
+  const std::vector<std::string> left = program.not_taken();
   // A misspelled option is also one that is missing, so it comes first.
   const auto option = std::ranges::find_if(left, [](const std::string& text) { return text.size() > 1 && text.starts_with('-'); });
   if (option != left.end()) return NoOption(command, *option);
-  const bool needs_command = command.get_require_subcommand_min() > 0 && dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+  const bool needs_command = command.needs_command() && end.kind == ParseEnd::Kind::kMissing;
   if (needs_command && left.empty()) return Status::InvalidArgument("a command is needed: " + Joined(CommandNames(command)));
-  const bool not_taken = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
-  if (left.empty() || !(not_taken || needs_command)) return Status::InvalidArgument(error.what());
+  const bool not_taken = end.kind == ParseEnd::Kind::kNotTaken;
+  if (left.empty() || !(not_taken || needs_command)) return Status::InvalidArgument(end.message);
   if (!CommandNames(command).empty()) return NoCommand(command, left.front());
   return Status::InvalidArgument("'" + Printable(left.front()) + "' is one argument too many");
 }
@@ -147,58 +140,42 @@ Status ReportAll(const std::string& who, const std::vector<Status>& failures) {
   return failures.empty() ? Status::Ok() : failures.back();
 }
 
-void SetUp(CLI::App& app, const std::string& version) {
-  app.formatter(std::make_shared<HelpFormatter>());
-  app.set_help_flag("-h,--help", "Print this text");
-  app.set_version_flag("--version", version, "Print the version");
-  // For the build, which makes manual pages.
-  const auto print_page = [&app] {
-    std::cout << ManPage(app, app.get_name());
-    throw CLI::Success();
-  };
-  app.add_flag_callback("--man", print_page, "Print the manual page")->group("");
-}
-
-Status NoCommand(const CLI::App& app, const std::string& word) {
-  const std::vector<std::string> commands = CommandNames(app);
+Status NoCommand(const Command& command, const std::string& word) {
+  const std::vector<std::string> commands = CommandNames(command);
   return Status::NotFound("there is no command '" + Printable(word) + "', but " + Joined(commands) + DidYouMean(word, commands));
 }
 
-std::string CommandName(const CLI::App& app) {
-  const auto used = app.get_subcommands();
-  return used.empty() ? app.get_name() : app.get_name() + " " + used.front()->get_name();
+std::string CommandName(const Command& program) {
+  const std::vector<Command> used = program.typed();
+  return used.empty() ? program.name() : used.front().full_name();
 }
 
-std::optional<int> Parse(CLI::App& app, std::vector<std::string> arguments) {
-  if (Status status = CheckValues(arguments); !status.ok()) return Finish(app.get_name(), status);
-  std::ranges::reverse(arguments);  // as CLI11 wants them
-  try {
-    app.parse(std::move(arguments));
-  } catch (const CLI::Success& asked) {  // --help, --version
-    return app.exit(asked);
-  } catch (const CLI::ParseError& error) {
-    return Finish(CommandName(app), WhatIsWrong(app, error));
-  }
-  return std::nullopt;
+std::optional<int> Parse(const Program& program, std::vector<std::string> arguments) {
+  if (Status status = CheckValues(arguments); !status.ok()) return Finish(program.name(), status);
+  const ParseEnd end = program.Parse(std::move(arguments));
+  if (end.kind == ParseEnd::Kind::kParsed) return std::nullopt;
+  if (end.kind == ParseEnd::Kind::kAnswered) return 0;
+  return Finish(CommandName(program), WhatIsWrong(program, end));
 }
 
-int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
-  if (const std::optional<int> ended = Parse(app, std::vector<std::string>(argv + 1, argv + argc))) return *ended;
-  return Finish(app.get_name(), run());
+int ParseAndRun(const Program& program, int argc, const char* const* argv, const std::function<Status()>& run) {
+  if (const std::optional<int> ended = Parse(program, std::vector<std::string>(argv + 1, argv + argc))) return *ended;
+  return Finish(program.name(), run());
 }
 
-CLI::Option* AddLogLevel(CLI::App& app, std::string& level) {
+Option AddLogLevel(const Command& app, std::string& level) {
   std::vector<std::string_view> levels;
   for (const auto& [name, unused] : LogLevelNames()) levels.push_back(name);
-  CLI::Option* const option =
-      AddParsed(app, "--log-level", level, OneOf(levels), "Least level logged to stderr: debug, info, warning, error or off");
-  return NoteChoices(option->type_name("NAME"), levels);
+  return AddParsed(app, "--log-level", level, OneOf(levels), "Least level logged to stderr: debug, info, warning, error or off")
+      .TypeName("NAME")
+      .Choices(levels);
 }
 
-int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {
+int RunService(const Program& program, int argc, const char* const* argv, const std::string& log_name,
+               const std::function<Status()>& serve) {
   std::string log_level = "warning";
-  AddLogLevel(app, log_level)->default_str(log_level);
-  return ParseAndRun(app, argc, argv, [&] {
+  AddLogLevel(program, log_level).Default(log_level);
+  return ParseAndRun(program, argc, argv, [&] {
     InitLog(log_name, LogLevelNames().at(log_level));
     constexpr std::uint64_t kLeastFiles = 128;  // with fewer it would wait for ever for some of its own sockets
     if (const std::uint64_t files = AllowOpenFiles(); files < kLeastFiles) {

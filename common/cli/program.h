@@ -1,13 +1,13 @@
 // What the main functions of all programs share: the style of their help, one line on stderr for what fails, and the exit status.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/cli/command.h"
 
 namespace slabstream {
 
@@ -30,26 +30,24 @@ Status ReportAll(const std::string& who, const std::vector<Status>& failures);
 void PrintNote(const std::string& message);
 void PrintWarning(const std::string& message);
 
-// The style of help texts, --help, --version, and --man for the build, which help texts do not mention.
-void SetUp(CLI::App& app, const std::string& version);
-
 // The program, or the command of it that was parsed: "slabstream render".
-std::string CommandName(const CLI::App& app);
+std::string CommandName(const Command& program);
 
 // NotFound: the program, or a command of it, has no command `word`. The message says which there are.
-Status NoCommand(const CLI::App& app, const std::string& word);
+Status NoCommand(const Command& command, const std::string& word);
 
 // Parses the arguments, in the order in which they were typed. The exit status, if the program ends here: it has printed the help that was
 // asked for, or a line on stderr that says what is wrong. A command or an option that does not exist is told with the one that was meant.
-std::optional<int> Parse(CLI::App& app, std::vector<std::string> arguments);
+std::optional<int> Parse(const Program& program, std::vector<std::string> arguments);
 
 // Parses, and runs `run`. Returns the exit status.
-int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);
+int ParseAndRun(const Program& program, int argc, const char* const* argv, const std::function<Status()>& run);
 
 // --log-level; the text stays as it is if the option is not given.
-CLI::Option* AddLogLevel(CLI::App& app, std::string& level);
+Option AddLogLevel(const Command& app, std::string& level);
 
 // A program that is one service: adds --log-level, parses, begins to log as `log_name`, and runs `serve`. Returns the exit status.
-int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve);
+int RunService(const Program& program, int argc, const char* const* argv, const std::string& log_name,
+               const std::function<Status()>& serve);
 
 }  // namespace slabstream

@@ -2,48 +2,42 @@
 
 #include <fmt/format.h>
 
-#include <list>
+#include <algorithm>
 #include <mutex>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/lru_map.h"
 #include "common/combining/schemes.h"
 
 namespace slabstream {
 namespace {
 
-// The last schedules that were derived, latest first.
+// The last schedules that were derived.
 class RecentSchedules {
  public:
   SharedSchedule Find(const ScheduleName& name, PixelRange frame) {
     const std::lock_guard lock(mutex_);
-    for (auto it = entries_.begin(); it != entries_.end(); ++it) {
-      if (it->name != name || it->frame != frame) continue;
-      entries_.splice(entries_.begin(), entries_, it);
-      return entries_.front().schedule;
-    }
-    return nullptr;
+    const SharedSchedule* const found = schedules_.Find({name, frame});
+    return found == nullptr ? nullptr : *found;
   }
 
   void Keep(const ScheduleName& name, PixelRange frame, const SharedSchedule& schedule) {
+    // Of a few steps it weighs as much as if these were more, so that there are at most so many.
+    constexpr std::size_t kMostKept = 64;
     const std::lock_guard lock(mutex_);
-    entries_.push_front({name, frame, schedule});
-    std::size_t steps = 0, kept = 0;
-    for (auto it = entries_.begin(); it != entries_.end(); ++kept) {
-      steps += it->schedule->steps().size();
-      it = kept > 0 && (steps > kMaxSteps || kept == kMostKept) ? entries_.erase(it) : std::next(it);
-    }
+    schedules_.Put({name, frame}, schedule, std::max<std::size_t>(schedule->steps().size(), kMaxSteps / kMostKept));
+    schedules_.DropBeyond(kMaxSteps);
   }
 
  private:
-  static constexpr std::size_t kMostKept = 64;
-  struct Entry {
+  struct Key {
     ScheduleName name;
     PixelRange frame;
-    SharedSchedule schedule;
+    friend bool operator==(const Key&, const Key&) = default;
   };
   std::mutex mutex_;
-  std::list<Entry> entries_;
+  LruMap<Key, SharedSchedule> schedules_;
 };
 
 }  // namespace

@@ -18,7 +18,8 @@ inline constexpr std::size_t kMaxShares = 64;
 struct ScheduleName {
   std::string scheme;  // as --combine spells it, for example "radix-k:4x4"
   Rank ranks = 0;      // [0, kMaxRanks]; 0: a group without images, which needs no scheme
-  // As in a Schedule: 1 ... kMaxShares, each below `ranks`, 0 if there are none. Several shares: at most kMaxSteps ranks in all of them.
+  // Schedule's roots: 1 ... kMaxShares, each below `ranks`, 0 if there are none. If there are several shares, all of
+  // them together have at most kMaxSteps ranks.
   std::vector<Rank> roots = {0};
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };
@@ -54,7 +55,8 @@ class IndexedSchedule {
 using SharedSchedule = std::shared_ptr<const IndexedSchedule>;
 
 // The schedule of that name over all pixels of a frame. Errors: as CheckScheduleName. Groups and frames repeat names, and a process may
-// hold many workers, so recent schedules are kept and shared: at most kMaxSteps steps, but always the latest one. Any thread may call.
+// hold many workers, so recent schedules are kept and shared: at most 64 of them and kMaxSteps steps, but always the latest one. Any thread
+// may call.
 Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame);
 
 }  // namespace slabstream

@@ -5,8 +5,8 @@
 
 #include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
-#include "common/base/parse_number.h"
 #include "common/combining/schemes.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

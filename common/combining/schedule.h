@@ -23,7 +23,7 @@ namespace slabstream {
 
 using Rank = std::uint32_t;
 inline constexpr Rank kMaxRanks = 65536;
-inline constexpr std::uint32_t kMaxSteps = std::uint32_t{1} << 20;  // of a schedule
+inline constexpr std::uint32_t kMaxSteps = std::uint32_t{1} << 20;  // steps of a schedule
 
 // Half-open interval of ranks whose images have been combined.
 struct RankInterval {
@@ -62,7 +62,7 @@ constexpr PixelRange Share(const PixelRange& pixels, std::uint64_t part, std::ui
 struct ScheduleRequest {
   Rank ranks = 1;
   Rank root = 0;                         // rank that holds the result
-  PixelRange pixels;                     // that end there
+  PixelRange pixels;                     // pixels that end there
   std::uint32_t most_steps = kMaxSteps;  // limits the number of strips
 };
 

@@ -43,8 +43,8 @@ class ScheduleRunner {
 
   struct Taken {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
-    std::uint32_t index = 0, turn = 0;  // of the step
-    Rank rank = 0;                      // that takes it; kMove: one of the two
+    std::uint32_t index = 0, turn = 0;  // the step's numbers
+    Rank rank = 0;                      // the rank that takes it; kMove: one of the two
     bool last = true;                   // as StepOrder says
     const Step* step = nullptr;
     // kSend, kMove: what `from` held of the step's pixels, perhaps not all; now removed from it. Valid until the next call.
@@ -68,7 +68,7 @@ class ScheduleRunner {
   StepOrder order_;
   PixelRange frame_;
   std::map<Rank, Fragments<Value>> held_;
-  typename Fragments<Value>::List parts_;  // that were taken last
+  typename Fragments<Value>::List parts_;  // the parts that were taken last
 };
 
 }  // namespace slabstream

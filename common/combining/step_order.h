@@ -1,10 +1,11 @@
 // StepOrder: which steps of a schedule may be taken next at some of its ranks: those of one worker, or all of them.
 //
-// A step may be taken at a rank when the rank is rendered and all its earlier steps on the same pixels are taken. Nothing may be combined
-// for the rank meanwhile, unless the step receives: the caller combines in the order of the steps. So the same images meet in any order of
-// arrival, and steps of disjoint pixels do not wait for each other. Of the steps that may be taken at a rank, those that send come first:
-// others wait for what they send, and nobody else for what it combines. For each step the object counts what it still waits for, so an
-// event costs no scan over the open steps. Memory grows with the steps of its own ranks.
+// A step may be taken at a rank when the rank is rendered and all its earlier steps on the same pixels are taken.
+// Nothing may be combined for the rank meanwhile, unless the step receives: the caller combines in the order of the
+// steps. So the same images meet in any order of arrival, and steps of disjoint pixels do not wait for each other. If
+// several steps may be taken at a rank, those that send come first: others wait for what they send, and nobody else for
+// what it combines. For each step the object counts what it still waits for, so an event costs no scan over the open
+// steps. Memory grows with the steps of its own ranks.
 #pragma once
 
 #include <cstdint>
@@ -41,7 +42,7 @@ class StepOrder {
     Kind kind = Kind::kSend;
     std::uint32_t step = 0;
     std::uint32_t turn = 0;  // kMove: one of the two
-    Rank rank = 0;           // of that turn
+    Rank rank = 0;           // the turn's rank
     bool last = true;        // false: more of the step's pixels are to arrive
   };
   // A step that may be taken now; it counts as taken. None: wait for the next event.
@@ -89,9 +90,9 @@ class StepOrder {
 
   SharedSchedule schedule_;
   std::vector<Rank> numbers_;
-  std::vector<RankState> ranks_;        // of numbers_; most lookups touch only these
+  std::vector<RankState> ranks_;        // by numbers_; most lookups touch only these
   std::vector<Turn> turns_;             // rank by rank, each in order of steps
-  std::vector<std::uint32_t> waiters_;  // of turns with many: their number, then they
+  std::vector<std::uint32_t> waiters_;  // who waits for turns with many waiters: their number, then they
   IndexSet sendable_;                   // turns that send elsewhere and wait only for their rank to be free
   IndexSet possible_;                   // other turns that wait only for their ranks to be free
   IndexSet changed_;                    // ranks at which a turn may have become possible

@@ -8,7 +8,7 @@ const std::vector<DecompositionEntry>& Decompositions() {
       {"beam", "boxes cut along two axes, --axis first", MakeBeams, "voxels", false},
       {"subcube", "boxes cut along all three axes", MakeSubcubes, "voxels", false},
       {"octree", "octants of octants, at least as many as requested", MakeOctree, "voxels", false},
-      {"kd-tree", "boxes that fit tightly round occupied voxels, with empty space cut away", MakeKdTree, "occupied", false, kKdTreeShapes},
+      {"kd-tree", "boxes that fit tightly round occupied voxels, with empty space cut away", MakeKdTree, "bricks", false, kKdTreeShapes},
   };
   return entries;
 }

@@ -1,8 +1,8 @@
 // GrowTree makes slabs, beams, subcubes and kd-trees alike: as kd-trees, by recursive bisection in proportion.
 //
-// A box to be divided into n boxes is cut across its longest side (of the axes allowed), so that floor(n / 2) and ceil(n / 2) of them get
-// their shares of the work; both parts are divided likewise. Successive cuts along one axis are quantiles of the box that the first of them
-// cut: each is rounded once, and errors do not add up.
+// A box to be divided into n boxes is cut across its longest side (of the axes allowed), so that floor(n / 2) and
+// ceil(n / 2) of them get their shares of the work; both parts are divided in the same way. Successive cuts along one
+// axis are quantiles of the box that the first of them cut: each is rounded once, and errors do not add up.
 #pragma once
 
 #include <array>

@@ -37,7 +37,7 @@ class WorkField {
   explicit WorkField(const Index3& size) : size_(size) {}
   void SumUp(std::span<const double> steps);
   double Before(const Index3& corner) const;                     // steps in [0, corner)
-  double StepsOf(const Index3& begin, const Index3& end) const;  // of whole cells
+  double StepsOf(const Index3& begin, const Index3& end) const;  // steps in a box of whole cells
 
   Index3 size_;
   Index3 corners_;            // cells + 1

@@ -12,10 +12,10 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/parse_number.h"
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/frame/layer_look.h"
+#include "common/text/parse_number.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "common/view/shading.h"
@@ -25,7 +25,7 @@ namespace slabstream {
 inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
-inline constexpr int kMaxLevels = 64;  // of a dataset
+inline constexpr int kMaxLevels = 64;  // levels of a dataset
 inline constexpr std::size_t kMaxNameBytes = 256;
 inline constexpr std::string_view kAutomatic = "auto";  // in place of a name: the service chooses
 
@@ -37,13 +37,13 @@ inline constexpr std::array<std::string_view, 5> kAxisChoiceNames = {"x", "y", "
 constexpr std::string_view NameOf(AxisChoice axis) { return kAxisChoiceNames.at(std::size_t(axis)); }
 
 struct Policy {
-  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
-  std::string balance_by = "auto";     // of BalanceByChoices(): what boxes have equal shares of
+  std::string decomposition = "kd-tree";  // a name of Decompositions()
+  std::string balance_by = "auto";        // of BalanceByChoices(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
-  std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
+  std::string assignment = "cyclic";  // of Assignments(): who owns which box
   std::string balance = "static";     // of Balances(): whether boxes change between frames
-  std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
+  std::string combine;                // a scheme with its arguments (common/combining/schemes.h); empty: StandardCombining
   // How much a channel of the picture may change because workers send colours in fewer bits: [0, kMaxPixelError]; 0: not at all.
   double pixel_error = 0;
   int teams = 1;  // [1, kMaxTeams]: render frames in turn (common/planning/team.h); 1: all workers share every frame
@@ -58,8 +58,8 @@ struct TransferChoice {
   // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
   // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
   std::optional<ScalarRange> scalar_range = {};
-  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (Ability::kIsosurfaces)
-  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (Ability::kGradientOpacity)
+  std::vector<Isosurface> isosurfaces = {};                   // only renderers with Ability::kIsosurfaces draw them
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // only renderers with Ability::kGradientOpacity use them
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
@@ -86,13 +86,13 @@ struct FrameRequest {
   std::string dataset;  // a name of the catalogue, 1 ... kMaxNameBytes
   std::string renderer{
       kAutomatic};            // a name of Renderers() (common/renderers/registry.h), or kAutomatic: one that can do it (RenderersFor)
-  ParameterTexts parameters;  // of the renderer
+  ParameterTexts parameters;  // the renderer's parameters
   ImageSize size;
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
   std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
-  std::optional<OverlayChoice> overlay = {};  // likewise
+  std::optional<OverlayChoice> overlay = {};  // none: the dataset's overlay, if it has one, is not shown
   Shading shading;
   double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never

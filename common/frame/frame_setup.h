@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/classification/transfer_function.h"
+#include "common/frame/dataset_id.h"
 #include "common/frame/frame_request.h"
 #include "common/frame/layer_look.h"
 #include "common/frame/opaque_front.h"
@@ -24,8 +25,6 @@ namespace slabstream {
 
 class RendererKind;  // common/renderers/renderer_kind.h
 
-using DatasetId = std::uint64_t;  // a volume under a name: the same in every coordinator's life, another one for other voxels. 0: none
-
 // The light volume of a dataset whose voxels the coordinator holds (common/volume/light_volume.h).
 constexpr DatasetId LightVolumeOf(DatasetId dataset) {
   constexpr DatasetId kMask = 0x6C69676874766F6C;
@@ -35,8 +34,8 @@ constexpr DatasetId LightVolumeOf(DatasetId dataset) {
 // A coarser level of a frame's volume, from which some of the boxes are drawn.
 struct CoarserLevel {
   DatasetId dataset = 0;
-  VolumeDescription description;        // of the same part of the world, type and mapping as the frame's volume
-  std::optional<StoredAt> stored = {};  // as in the setup
+  VolumeDescription description;        // the same part of the world, type and mapping as the frame's volume
+  std::optional<StoredAt> stored = {};  // FrameSetup::stored, for this level
   friend bool operator==(const CoarserLevel&, const CoarserLevel&) = default;
 };
 
@@ -45,19 +44,20 @@ struct FrameSetup {
   DatasetId dataset = 0;
   double unit = 1;  // in that of the volume's world; a power of two (common/frame/frame_unit.h)
   VolumeDescription description;
-  LayerTypes layers;                        // that the dataset has
-  ValueRange range;                         // data values that the classification table is made for
-  std::optional<StoredAt> stored = {};      // none: the coordinator holds the voxels
-  std::vector<CoarserLevel> coarser = {};   // finest first
-  std::optional<CoarserLevel> light = {};   // the light volume, if shading.needs_light_volume()
-  const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
-  std::vector<double> parameters;           // one value for each of renderer->parameters()
-  PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers
-  Camera camera;                            // of the picture, perhaps supersampled
-  SheetGrid sheets;                         // the frame grid of renderers that work along slices; empty: the camera's grid
-  ClipRegion clip;                          // empty: all is drawn
+  LayerTypes layers;                       // layers that the dataset has
+  ValueRange range;                        // data values that the classification table is made for
+  std::optional<StoredAt> stored = {};     // none: the coordinator holds the voxels
+  std::vector<CoarserLevel> coarser = {};  // finest first
+  std::optional<CoarserLevel> light = {};  // the light volume, if shading.needs_light_volume()
+  const RendererKind* renderer = nullptr;  // one of Renderers(); lives as long as the program
+  std::vector<double> parameters;          // one value for each of renderer->parameters()
+  // The format of local images: renderer->FormatOf(parameters), so that combining need not know renderers.
+  PixelFormat format = PixelFormat::kRgba;
+  Camera camera;     // the picture's camera, perhaps supersampled
+  SheetGrid sheets;  // the frame grid of renderers that work along slices; empty: the camera's grid
+  ClipRegion clip;   // empty: all is drawn
   TransferFunction transfer;
-  LayerLooks looks;  // of the layers that are shown, which the dataset has
+  LayerLooks looks;  // the looks of those layers that the dataset has and the picture shows
   Shading shading;
   double termination = kDefaultTermination;
   std::int32_t halo = kHalo;  // voxels that a worker keeps round a box

@@ -13,7 +13,7 @@ namespace slabstream {
 // In the unit of the volume's world.
 double FrameUnitOf(const VolumeGeometry& geometry);
 
-// The same in a unit of this length. Of a transfer function, what is said of slopes.
+// The same things in a unit of this length. In a transfer function, only slopes have lengths.
 VolumeGeometry InUnit(VolumeGeometry geometry, double unit);
 ViewParameters InUnit(ViewParameters view, double unit);
 ClipRegion InUnit(ClipRegion clip, double unit);

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/wildcard.h"
 #include "common/classification/transfer_function.h"
+#include "common/text/wildcard.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
 
@@ -25,7 +25,7 @@ inline constexpr std::size_t kMaxLabelRanges = 1024;
 // Values of labels, both ends included: 1 <= first <= last <= kMaxLabelValue. Or if there is a name, the labels of that name.
 struct LabelRange {
   std::uint32_t first = 1, last = 1;
-  std::string name = {};  // may be a pattern (common/base/wildcard.h); at most kMaxNameBytes
+  std::string name = {};  // may be a pattern (common/text/wildcard.h); at most kMaxNameBytes
   friend bool operator==(const LabelRange&, const LabelRange&) = default;
 };
 inline bool Covers(const LabelRange& range, const Label& label) {
@@ -41,9 +41,10 @@ struct LabelOpacity {
 
 struct LabelChoice {
   LabelMode mode = LabelMode::kTint;
-  double tint = kDefaultTint;           // [0, 1]: share of the label's colour; not of kSurface
-  std::vector<LabelOpacity> opacities;  // of labels that are not named: 1; no label twice; at most kMaxLabels
-  std::vector<LabelRange> shown;        // empty: all; at most kMaxLabelRanges
+  double tint = kDefaultTint;  // [0, 1]: share of the label's colour; not of kSurface
+  // Opacities of labels; a label that is not named has 1, none is named twice; at most kMaxLabels.
+  std::vector<LabelOpacity> opacities;
+  std::vector<LabelRange> shown;  // empty: all; at most kMaxLabelRanges
   friend bool operator==(const LabelChoice&, const LabelChoice&) = default;
 };
 
@@ -58,7 +59,7 @@ struct LabelLook {
   };
   LabelMode mode = LabelMode::kTint;  // or kSurface; kHighlight is kTint with labels that are not shown
   double tint = kDefaultTint;
-  std::vector<Entry> entries;  // of label number i: entries[i - 1]
+  std::vector<Entry> entries;  // entries[i - 1] is that of label number i
   friend bool operator==(const LabelLook&, const LabelLook&) = default;
 
   // The label is material under any transfer function.

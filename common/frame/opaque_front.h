@@ -22,7 +22,7 @@ struct FrameSetup;
 
 struct OpaqueFront {
   static constexpr std::int32_t kMostTiles = 32;  // along an axis
-  static constexpr std::uint8_t kNever = 255;     // of `depths`
+  static constexpr std::uint8_t kNever = 255;     // a value of `depths`
   using Depths = std::array<std::uint8_t, kOcclusionSteps>;
 
   std::int32_t tile = 0;  // side of a tile in pixels of the frame: FrontTile, or 0: nothing is known

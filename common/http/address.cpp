@@ -9,9 +9,9 @@
 #include <cctype>
 #include <utility>
 
-#include "common/base/files.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

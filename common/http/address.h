@@ -47,7 +47,7 @@ class OriginRules {
   // `proxy_origin`: of the proxy in front; empty: there is none.
   OriginRules(ListenAddress listen, bool tls, std::string proxy_origin);
 
-  // Of the two headers of a request, `origin` if it has one. nullopt: fine; else what is wrong, for a line to the client.
+  // What is wrong with the headers Host and, if the request has one, Origin, in a line to the client. nullopt: nothing.
   std::optional<std::string> Refusal(std::string_view host, std::optional<std::string_view> origin) const;
 
  private:

@@ -290,7 +290,7 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
     CloseNow();
   }
 
-  websocket::stream<Stream> socket_;
+  websocket::stream<Stream, false> socket_;  // false: without compression, which pictures have already
   WebSocketAccepted accepted_;
   asio::steady_timer timer_;
   beast::flat_buffer buffer_;

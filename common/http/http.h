@@ -24,12 +24,12 @@ namespace slabstream {
 struct HttpLimits {
   std::size_t header_bytes = std::size_t{16} << 10;
   std::size_t body_bytes = std::size_t{1} << 20;
-  std::size_t message_bytes = std::size_t{1} << 20;  // of a WebSocket's message
+  std::size_t message_bytes = std::size_t{1} << 20;  // bytes of a WebSocket's message
   std::size_t connections = 256;                     // one more takes the place of the slowest, or is closed at once
   std::size_t connections_an_address = 128;          // the same; so one address alone cannot keep others out
   Duration reading = std::chrono::seconds(30);       // for a request to arrive, also on a connection that waits for one
   Duration writing = std::chrono::seconds(30);       // for a response or message to leave
-  Duration silence = std::chrono::seconds(30);       // of a WebSocket, pings and their answers included
+  Duration silence = std::chrono::seconds(30);       // how long a WebSocket may be silent, pings and their answers included
 };
 
 using Gone = std::shared_ptr<std::function<void()>>;
@@ -62,7 +62,7 @@ struct HttpReply {
   std::string type = "application/json";
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers = {};  // more of them
-  std::shared_ptr<BodyStream> rest = nullptr;                     // of the body, if it is not all there; HTTP/1.1 sends it in chunks
+  std::shared_ptr<BodyStream> rest = nullptr;  // the rest of the body, if it is not all there; HTTP/1.1 sends it in chunks
 };
 
 // The other end of a WebSocket.
@@ -98,7 +98,7 @@ class HttpApplication {
   virtual std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) = 0;
   // What goes into every response.
   virtual std::vector<std::pair<std::string, std::string>> CommonHeaders() const = 0;
-  // Of what the application does not see: "connections", "slow reader", "header", ...
+  // Counts what the application does not see: "connections", "slow reader", "header", ...
   virtual void CountRefusal(std::string_view reason) = 0;
 };
 

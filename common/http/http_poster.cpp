@@ -1,94 +1,64 @@
 #include "common/http/http_poster.h"
 
+#include <curl/curl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
-#include <optional>
+#include <cstring>
 #include <utility>
+
+#include "common/base/check.h"
 
 namespace slabstream {
 namespace {
 
-namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
-using asio::ip::tcp;
-using Error = beast::error_code;
+using Easy = std::unique_ptr<CURL, void (*)(CURL*)>;
+using Headers = std::unique_ptr<curl_slist, void (*)(curl_slist*)>;
 
-// One request, from the name of the server to the end of the answer. Whatever is not finished ends with the io_context's work.
-class Exchange : public std::enable_shared_from_this<Exchange> {
- public:
-  Exchange(asio::io_context& io, const HttpUrl& url, std::string_view type, const std::string& body)
-      : resolver_(io), stream_(io), request_(http::verb::post, url.target, 11) {
-    request_.set(http::field::host, HostOf(url));
-    request_.set(http::field::user_agent, "slabstream");
-    request_.set(http::field::content_type, beast::string_view(type.data(), type.size()));
-    request_.keep_alive(false);
-    request_.body() = body;
-    request_.prepare_payload();
-    parser_.body_limit(HttpPoster::kMostAnswerBytes);
-  }
+// libcurl calls it with the next bytes of the answer. Fewer than these: they end the exchange.
+std::size_t Append(const char* bytes, std::size_t, std::size_t size, void* to) {
+  std::string& body = *static_cast<std::string*>(to);
+  if (body.size() + size > HttpPoster::kMostAnswerBytes) return 0;
+  body.append(bytes, size);
+  return size;
+}
 
-  void Start(const HttpUrl& url) {
-    const auto found = [self = shared_from_this()](Error error, const tcp::resolver::results_type& addresses) {
-      if (error || self->ended_) return self->End(error);
-      self->stream_.async_connect(addresses, [self](Error connected, const tcp::endpoint&) {
-        if (connected || self->ended_) return self->End(connected);
-        self->Send();
-      });
-    };
-    resolver_.async_resolve(url.host, std::to_string(url.port), found);
-  }
-
-  void GiveUp() {
-    ended_ = true;
-    resolver_.cancel();
-    stream_.close();
-  }
-
-  bool ended() const { return ended_; }
-  const Error& error() const { return error_; }
-  HttpAnswer TakeAnswer() { return {.status = parser_.get().result_int(), .body = std::move(parser_.get().body())}; }
-
- private:
-  void Send() {
-    http::async_write(stream_, request_, [self = shared_from_this()](Error written, std::size_t) {
-      if (self->ended_) return;
-      // A server that refuses may answer before it has read everything, and close the connection: its answer says more.
-      self->written_ = written;
-      // The header by itself: Beast misses a body that is too long if it comes in one piece with its header.
-      http::async_read_header(self->stream_, self->buffer_, self->parser_, [self](Error read, std::size_t) {
-        if (read) return self->End(self->written_ ? self->written_ : read);
-        http::async_read(self->stream_, self->buffer_, self->parser_, [self](Error rest, std::size_t) { self->End(rest); });
-      });
-    });
-  }
-
-  void End(const Error& error) {
-    if (std::exchange(ended_, true)) return;
-    error_ = error;
-    stream_.close();
-  }
-
-  tcp::resolver resolver_;
-  beast::tcp_stream stream_;
-  http::request<http::string_body> request_;
-  http::response_parser<http::string_body> parser_;
-  beast::flat_buffer buffer_;
-  Error written_, error_;
-  bool ended_ = false;
-};
+std::string WhyNot(CURL* easy, CURLcode result, const char* reason) {
+  long error = 0;
+  if (result == CURLE_COULDNT_CONNECT) curl_easy_getinfo(easy, CURLINFO_OS_ERRNO, &error);
+  if (error != 0) return std::strerror(int(error));
+  if (result == CURLE_WRITE_ERROR) return fmt::format("the answer is longer than {} bytes", HttpPoster::kMostAnswerBytes);
+  return *reason != '\0' ? reason : curl_easy_strerror(result);
+}
 
 }  // namespace
 
 struct HttpPoster::Impl {
-  asio::io_context io{1};
+  Impl() {
+    static const CURLcode started = curl_global_init(CURL_GLOBAL_DEFAULT);
+    CHECK_EQ(int(started), int(CURLE_OK));
+    multi = curl_multi_init();
+    CHECK(multi != nullptr) << "no memory for requests";
+  }
+  ~Impl() { curl_multi_cleanup(multi); }
+
+  // Works on the one exchange until it ends. False: the time has come first.
+  bool Run(Time begin, Duration time, Time& end) {
+    for (int running = 1; running > 0;) {
+      end = std::min(begin + time, limit.load());
+      const Duration left = end - MonotonicNow();
+      if (left <= Duration::zero()) return false;
+      curl_multi_perform(multi, &running);
+      // Longer than it takes: EndBy wakes it up.
+      constexpr auto kMost = std::chrono::milliseconds(std::chrono::hours(1));
+      const auto wait = std::min(kMost, std::chrono::ceil<std::chrono::milliseconds>(left));
+      if (running > 0) curl_multi_poll(multi, nullptr, 0, int(wait.count()), nullptr);
+    }
+    return true;
+  }
+
+  CURLM* multi = nullptr;
   std::atomic<Time> limit{Time::max()};
 };
 
@@ -97,27 +67,48 @@ HttpPoster::~HttpPoster() = default;
 
 Result<HttpAnswer> HttpPoster::Post(std::string_view type, const std::string& body, Duration time) {
   const Time begin = MonotonicNow();
-  const auto exchange = std::make_shared<Exchange>(impl_->io, url_, type, body);
-  exchange->Start(url_);
-  impl_->io.restart();
-  while (!exchange->ended()) {
-    const Time limit = std::min(begin + time, impl_->limit.load());
-    if (MonotonicNow() >= limit) {
-      exchange->GiveUp();
-      impl_->io.poll();  // what was cancelled
-      const double allowed = std::chrono::duration<double>(std::max(limit - begin, Duration(0))).count();
-      return Status::DeadlineExceeded(fmt::format("{} has not answered within {:.1f} s", HostOf(url_), allowed));
-    }
-    impl_->io.run_one_until(limit);
+  const Easy easy(curl_easy_init(), curl_easy_cleanup);
+  Headers headers(curl_slist_append(nullptr, fmt::format("Content-Type: {}", type).c_str()), curl_slist_free_all);
+  if (easy == nullptr || headers == nullptr) return Status::ResourceExhausted("no memory for a request");
+  curl_slist_append(headers.get(), "Expect:");  // the body leaves at once
+  HttpAnswer answer;
+  char reason[CURL_ERROR_SIZE] = {};
+  const auto set = [&](CURLoption option, auto value) { CHECK_EQ(int(curl_easy_setopt(easy.get(), option, value)), int(CURLE_OK)); };
+  set(CURLOPT_URL, ToString(url_).c_str());
+  set(CURLOPT_PATH_AS_IS, 1L);
+  set(CURLOPT_NOPROXY, "*");
+  set(CURLOPT_NOSIGNAL, 1L);
+  set(CURLOPT_QUICK_EXIT, 1L);  // nobody waits for a name that is still looked up
+  set(CURLOPT_FORBID_REUSE, 1L);
+  set(CURLOPT_USERAGENT, "slabstream");
+  set(CURLOPT_HTTPHEADER, headers.get());
+  set(CURLOPT_POSTFIELDSIZE_LARGE, curl_off_t(body.size()));
+  set(CURLOPT_POSTFIELDS, body.data());
+  set(CURLOPT_WRITEFUNCTION, Append);
+  set(CURLOPT_WRITEDATA, static_cast<void*>(&answer.body));
+  set(CURLOPT_ERRORBUFFER, reason);
+
+  curl_multi_add_handle(impl_->multi, easy.get());
+  Time end;
+  const bool ended = impl_->Run(begin, time, end);
+  int left = 0;
+  const CURLMsg* const message = curl_multi_info_read(impl_->multi, &left);
+  const CURLcode result = message != nullptr ? message->data.result : CURLE_OK;
+  curl_multi_remove_handle(impl_->multi, easy.get());
+  if (!ended) {
+    const double allowed = std::chrono::duration<double>(std::max(end - begin, Duration::zero())).count();
+    return Status::DeadlineExceeded(fmt::format("{} has not answered within {:.1f} s", HostOf(url_), allowed));
   }
-  impl_->io.poll();
-  if (exchange->error()) return Status::Unavailable(fmt::format("{}: {}", HostOf(url_), exchange->error().message()));
-  return exchange->TakeAnswer();
+  if (result != CURLE_OK) return Status::Unavailable(fmt::format("{}: {}", HostOf(url_), WhyNot(easy.get(), result, reason)));
+  long status = 0;
+  curl_easy_getinfo(easy.get(), CURLINFO_RESPONSE_CODE, &status);
+  answer.status = unsigned(status);
+  return answer;
 }
 
 void HttpPoster::EndBy(Time limit) {
   impl_->limit = limit;
-  asio::post(impl_->io, [] {});  // so that Post looks at it
+  curl_multi_wakeup(impl_->multi);
 }
 
 }  // namespace slabstream

@@ -1,14 +1,12 @@
 #include "common/image/add_image.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 #include "common/base/check.h"
 #include "common/image/local_image.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 
@@ -17,8 +15,8 @@ void AddImage(LocalImage& sum, const LocalImage& share) {
   CHECK(sum.bounds.Contains(share.bounds));
   const auto width = std::size_t(share.bounds.width());
   constexpr std::int32_t kRows = 16;
-  tbb::parallel_for(tbb::blocked_range<std::int32_t>(share.bounds.y_begin, share.bounds.y_end, kRows), [&](const auto& rows) {
-    for (std::int32_t y = rows.begin(); y < rows.end(); ++y) {
+  ParallelForRanges(share.bounds.y_begin, share.bounds.y_end, kRows, [&](std::int32_t begin, std::int32_t end) {
+    for (std::int32_t y = begin; y < end; ++y) {
       const std::size_t from = std::size_t(y - share.bounds.y_begin) * width;
       const std::size_t to =
           std::size_t(y - sum.bounds.y_begin) * std::size_t(sum.bounds.width()) + std::size_t(share.bounds.x_begin - sum.bounds.x_begin);

@@ -5,9 +5,9 @@ namespace slabstream {
 
 struct LocalImage;
 
-// Adds the pixels of `share` to `sum`, which has the same format and whose bounds contain those of the share. Of a pixel that both have,
-// colours are added and the smaller depth stays. Both store all their pixels and have no voxel plane, as pictures do. Rows are added in
-// parallel, within the caller's task arena.
+// Adds the pixels of `share` to `sum`, which has the same format and whose bounds contain those of the share. Where
+// both have a pixel, colours are added and the smaller depth stays. Both store all their pixels and have no voxel
+// plane, as pictures do. Rows are added in parallel, within the caller's task arena.
 void AddImage(LocalImage& sum, const LocalImage& share);
 
 }  // namespace slabstream

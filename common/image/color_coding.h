@@ -15,7 +15,7 @@ namespace slabstream {
 
 enum class ColorCoding : std::uint8_t { kFloat32 = 1, kHalf = 2, kFixed16 = 3, kStraight8 = 4 };
 
-inline constexpr float kLargestColor = 1 + 0x1p-18F;  // that can be coded
+inline constexpr float kLargestColor = 1 + 0x1p-18F;  // the largest colour that can be coded
 
 constexpr std::size_t BytesPerChannel(ColorCoding coding) {
   return coding == ColorCoding::kFloat32 ? 4 : coding == ColorCoding::kStraight8 ? 1 : 2;

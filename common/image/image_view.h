@@ -21,7 +21,7 @@ struct ImageView {
   // One span for each row of the bounds, within the width. Pixels outside it are empty; their stored values do not matter.
   std::vector<ColumnSpan> rows;
 
-  std::size_t pixel_bytes() const;  // of the spans' colours
+  std::size_t pixel_bytes() const;  // bytes of a pixel in the spans' colours
 };
 
 // All pixels.

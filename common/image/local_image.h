@@ -9,9 +9,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 

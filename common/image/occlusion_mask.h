@@ -25,7 +25,7 @@ struct OcclusionMask {
   std::vector<std::uint8_t> steps;  // [y][x], [0, kOcclusionSteps]; tiles_x * tiles_y of them
 
   bool empty() const { return steps.empty(); }
-  // Of the tile of a pixel, which lies in the frame.
+  // The steps of the tile that holds a pixel of the frame.
   std::uint8_t StepsAt(std::int32_t x, std::int32_t y) const {
     return empty() ? 0 : steps[std::size_t(y / kOcclusionTile) * std::size_t(tiles_x) + std::size_t(x / kOcclusionTile)];
   }

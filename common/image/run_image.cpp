@@ -1,7 +1,6 @@
 #include "common/image/run_image.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +13,7 @@
 #include "common/image/image_view.h"
 #include "common/image/run_payload.h"
 #include "common/image/sample_codes.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -155,7 +155,7 @@ void ForEachRun(const PixelBounds& runs_bounds, const RunPayload& runs, const Pi
   const std::size_t corner = std::size_t(runs_bounds.y_begin - bounds.y_begin) * width + std::size_t(runs_bounds.x_begin - bounds.x_begin);
   const auto place_of = [&](const Run& run) { return corner + std::size_t{run.row} * width + run.column; };
   const std::vector<std::size_t> first_pixels = FirstPixels(runs);
-  tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
+  ParallelFor(0, first_pixels.size(), [&](std::size_t task) {
     const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
     std::size_t source = first_pixels[task], before = 0;
     if (begin > 0) {
@@ -206,7 +206,7 @@ RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
   result.header.bounds = view.bounds;
 
   std::vector<Band> bands((view.rows.size() + kBandRows - 1) / kBandRows);
-  tbb::parallel_for(std::size_t{0}, bands.size(), [&](std::size_t i) {
+  ParallelFor(0, bands.size(), [&](std::size_t i) {
     Band& band = bands[i];
     for (std::size_t y = i * kBandRows; y < std::min((i + 1) * kBandRows, view.rows.size()); ++y) {
       const std::size_t row = y * view.stride;
@@ -235,7 +235,7 @@ RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
   result.payload.resize(PayloadBytes(result.header));
   const PayloadWriter writer(result.header, result.payload.data());
   std::atomic<bool> coded = true;
-  tbb::parallel_for(std::size_t{0}, bands.size(), [&](std::size_t i) {
+  ParallelFor(0, bands.size(), [&](std::size_t i) {
     std::size_t index = bands[i].first_run, pixel = bands[i].first_pixel;
     for (const Run& run : bands[i].runs) {
       if (!writer.Write(index++, run, pixel, view, run.row * view.stride + run.column)) coded = false;

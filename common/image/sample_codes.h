@@ -7,7 +7,7 @@
 
 namespace slabstream {
 
-// Of each sample. Of premultiplied colours these are the colours over black.
+// The code of each sample. If colours are premultiplied, the codes are those of the colours over black.
 void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes);
 
 // `premultiplied`: [pixel][4], as `codes`, which hold the colours before they were multiplied by alpha; 0 where the code of alpha is 0.

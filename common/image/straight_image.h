@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "common/base/pooled_vector.h"
 #include "common/image/pixel_bounds.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 

@@ -7,7 +7,7 @@
 
 namespace slabstream {
 
-// Of tile (x, y), `side` x `side` pixels, cut at the border of a frame of width x height pixels.
+// The pixels of tile (x, y), `side` x `side` of them, cut at the border of a frame of width x height pixels.
 constexpr PixelBounds TileBounds(std::int32_t side, std::int32_t x, std::int32_t y, std::int32_t width, std::int32_t height) {
   return Intersection(PixelBounds{x * side, y * side, (x + 1) * side, (y + 1) * side}, {0, 0, width, height});
 }

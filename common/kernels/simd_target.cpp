@@ -38,6 +38,10 @@ std::vector<std::string> SimdTargets() {
 Status LimitSimdTargetByEnvironment() {
   disabled = 0;
   hwy::DisableTargets(disabled);
+  if (Targets().empty()) {
+    return Status::InvalidArgument("compiled for " + NameOf(HWY_STATIC_TARGET) +
+                                   ", which this processor does not have: compile for every processor (deploy/build --portable)");
+  }
   const char* name = std::getenv("SLABSTREAM_SIMD");
   if (name == nullptr || *name == '\0') return Status::Ok();
   std::string known;

@@ -8,11 +8,12 @@
 
 namespace slabstream {
 
-// Instruction sets that this program has code for and this CPU runs, best first: "avx512", "avx2", "sse4", "sse2", "neon", ...
+// Instruction sets that this program has code for and this processor runs, best first: "avx512", "avx2", "sse2", "neon".
 std::vector<std::string> SimdTargets();
 
 // Limits kernels to the one of SimdTargets() that the environment variable SLABSTREAM_SIMD names, or worse ones, if it is set: for
-// measuring, and for running the tests under each instruction set. Call it before the first kernel runs. InvalidArgument: no such name.
+// measuring, and for running the tests under each instruction set. Call it before the first kernel runs. InvalidArgument: no such name,
+// or the program was compiled for one instruction set (SLABSTREAM_NATIVE) that this processor does not have.
 Status LimitSimdTargetByEnvironment();
 
 }  // namespace slabstream

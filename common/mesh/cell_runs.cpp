@@ -1,11 +1,11 @@
 #include "common/mesh/cell_runs.h"
 
-#include <tbb/parallel_for.h>
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 
 CellRuns::CellRuns(const Mesh& mesh) : runs_((mesh.tetrahedra.size() + kCells - 1) / kCells) {
-  tbb::parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t run) {
+  ParallelFor(0, runs_.size(), [&](std::size_t run) {
     CellBounds& hull = runs_[run];
     hull = BoundsOf(mesh, run * kCells);
     for (std::size_t cell = run * kCells; cell < std::min((run + 1) * kCells, mesh.tetrahedra.size()); ++cell) {

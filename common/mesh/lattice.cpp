@@ -1,11 +1,10 @@
 #include "common/mesh/lattice.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 
@@ -33,7 +32,7 @@ VolumeGeometry LatticeOf(const Bounds3& bounds, std::int64_t cells, std::optiona
 }
 
 void MoveToLattice(const VolumeGeometry& lattice, Mesh& mesh) {
-  tbb::parallel_for(std::size_t{0}, mesh.points.size(), [&](std::size_t i) {
+  ParallelFor(0, mesh.points.size(), [&](std::size_t i) {
     for (int axis = 0; axis < 3; ++axis) {
       const double place = double(mesh.points[i][axis]) / lattice.spacing[axis] - 0.5;
       mesh.points[i][axis] = float(std::clamp(place, -0.5, lattice.size[axis] - 0.5));  // rounding ends at the sides

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/mesh/cells.h"
 
 namespace slabstream {
@@ -22,7 +22,7 @@ constexpr std::string_view NameOf(ValuesAt at) { return at == ValuesAt::kPoints 
 // Immutable once shared between threads.
 struct Mesh {
   AlignedVector<Vector3<float>> points;  // finite; in data space of the lattice under the grid (lattice.h), unless it says otherwise
-  std::vector<Tetrahedron> tetrahedra;   // of `points`; none has a point twice
+  std::vector<Tetrahedron> tetrahedra;   // indices of `points`; none has a point twice
   ValuesAt at = ValuesAt::kPoints;
   AlignedVector<float> values;  // by point or by tetrahedron; may not be finite: nothing is seen there
   // By point, for light (PointGradients); what a MeshCutter cuts out has them. Empty: not known.

@@ -1,8 +1,8 @@
 // The gradients of a mesh's values, by which its matter is lit.
 #pragma once
 
-#include "common/base/aligned_buffer.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/mesh/mesh.h"
 
 namespace slabstream {

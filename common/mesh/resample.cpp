@@ -3,7 +3,6 @@
 //
 // f_i   six times the volume of the tetrahedron of a voxel's centre and the face that lies opposite point i: above 0 on the point's side.
 //       Divided by that of the whole cell it is the weight of the point's value (barycentric coordinates; Moebius 1827).
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +12,7 @@
 
 #include "common/mesh/cell_runs.h"
 #include "common/mesh/lattice.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -135,7 +135,7 @@ Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice) {
   volume.block = MakeVoxelBlock(lattice.bounds(), ScalarType::kFloat32);
   const CellRuns runs(mesh);
   const Index3 size = lattice.size, bricks = CubesOver(size, kBrick);
-  tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row) {
+  ParallelFor(0, bricks.y * bricks.z, [&](std::int32_t row) {
     const Index3 begin = kBrick * Index3{0, row % bricks.y, row / bricks.y};
     const Box box = Intersection({begin, {size.x, begin.y + kBrick, begin.z + kBrick}}, lattice.bounds());
     for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {

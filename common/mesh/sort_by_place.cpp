@@ -1,6 +1,4 @@
 // Along the curve of Morton (1966, "A computer oriented geodetic data base and a new technique in file sequencing").
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/mesh/lattice.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -64,13 +63,12 @@ void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh) {
   const std::size_t count = mesh.tetrahedra.size();
   // The number decides between those in one voxel, so that the order is one for any number of threads.
   std::vector<std::uint64_t> order(count);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t cell) {
-    order[cell] = std::uint64_t{PlaceOf(mesh, mesh.tetrahedra[cell], lattice.size)} << 32 | cell;
-  });
-  tbb::parallel_sort(order.begin(), order.end());
+  ParallelFor(0, count,
+              [&](std::size_t cell) { order[cell] = std::uint64_t{PlaceOf(mesh, mesh.tetrahedra[cell], lattice.size)} << 32 | cell; });
+  ParallelSort(order);
   const auto in_order = [&](const auto& unsorted) {
     auto sorted = unsorted;
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { sorted[i] = unsorted[order[i] & 0xFFFFFFFF]; });
+    ParallelFor(0, count, [&](std::size_t i) { sorted[i] = unsorted[order[i] & 0xFFFFFFFF]; });
     return sorted;
   };
   mesh.tetrahedra = in_order(mesh.tetrahedra);

@@ -1,5 +1,3 @@
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,8 @@
 #include "common/base/check.h"
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_cell.h"
+#include "common/parallel/parallel.h"
+#include "common/parallel/per_thread.h"
 
 namespace slabstream {
 namespace {
@@ -32,10 +32,10 @@ struct MacrocellRanges {
 MacrocellRanges RangesOf(const Mesh& mesh, const Index3& size) {
   const Index3 counts = CubesOver(size, kBrick);
   const MacrocellRanges none{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet), std::vector<std::uint32_t>(CountIn(counts))};
-  tbb::enumerable_thread_specific<MacrocellRanges> parts(none);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size()), [&](const tbb::blocked_range<std::size_t>& cells) {
-    MacrocellRanges& part = parts.local();
-    for (std::size_t cell = cells.begin(); cell < cells.end(); ++cell) {
+  PerThread<MacrocellRanges> parts;
+  ParallelForRanges(0, mesh.tetrahedra.size(), 1, [&](std::size_t first_cell, std::size_t end_cell) {
+    MacrocellRanges& part = parts.Mine([&] { return none; });
+    for (std::size_t cell = first_cell; cell < end_cell; ++cell) {
       const ValueRange values = ValuesIn(mesh, cell);
       if (values.min > values.max) continue;
       Widen(part.whole, values);
@@ -55,11 +55,11 @@ MacrocellRanges RangesOf(const Mesh& mesh, const Index3& size) {
     }
   });
   MacrocellRanges all = none;
-  for (const MacrocellRanges& part : parts) {
+  parts.ForEach([&](const MacrocellRanges& part) {
     Widen(all.whole, part.whole);
     for (std::size_t brick = 0; brick < all.bricks.size(); ++brick) Widen(all.bricks[brick], part.bricks[brick]);
     std::ranges::transform(all.cells, part.cells, all.cells.begin(), std::plus<>());
-  }
+  });
   return all;
 }
 
@@ -67,15 +67,15 @@ using Histogram = std::array<std::uint64_t, kHistogramBins>;
 
 Histogram HistogramOf(const Volume& volume, const ValueRange& range) {
   const float* const samples = volume.block.samples<float>();
-  tbb::enumerable_thread_specific<Histogram> parts;
-  tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, volume.block.box.voxel_count()), [&](const tbb::blocked_range<std::int64_t>& run) {
-    Histogram& part = parts.local();
-    for (std::int64_t i = run.begin(); i < run.end(); ++i) {
+  PerThread<Histogram> parts;
+  ParallelForRanges(0, volume.block.box.voxel_count(), 1, [&](std::int64_t begin, std::int64_t end) {
+    Histogram& part = parts.Mine();
+    for (std::int64_t i = begin; i < end; ++i) {
       if (std::isfinite(samples[i])) ++part[std::size_t(HistogramBin(range, double(samples[i])))];
     }
   });
   Histogram all{};
-  for (const Histogram& part : parts) std::ranges::transform(all, part, all.begin(), std::plus<>());
+  parts.ForEach([&](const Histogram& part) { std::ranges::transform(all, part, all.begin(), std::plus<>()); });
   return all;
 }
 

@@ -31,7 +31,7 @@ class TimeHistogram {
 
  private:
   friend class Exposition;
-  std::array<std::uint64_t, kBounds.size()> counts_{};  // of times up to each bound
+  std::array<std::uint64_t, kBounds.size()> counts_{};  // how many times are at most each bound
   std::uint64_t count_ = 0;
   double seconds_ = 0;
 };

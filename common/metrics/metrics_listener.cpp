@@ -2,17 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <thread>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/cli/add_option.h"
 #include "common/http/http.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {
@@ -34,16 +33,15 @@ HttpReply Refusal(unsigned status, std::string_view why) {
 
 }  // namespace
 
-void AddMetricsOptions(CLI::App& app, MetricsOptions& options) {
+void AddMetricsOptions(const Command& app, MetricsOptions& options) {
   AddParsed(app, "--metrics", options.listen, ParseMetricsAddress,
             "Serve metrics for Prometheus at http://HOST:PORT/metrics; HOST is 127.0.0.1 unless given, port 0 takes any free port")
-      ->type_name("[HOST:]PORT")
-      ->default_str("no metrics");
-  app.add_option(
-         "--metrics-token-file", options.token_file,
-         "Serve metrics to those who send the token in this file, as 'Authorization: Bearer TOKEN': 16 to 128 letters, digits, - and "
-         "_. Required for addresses that are not loopback")
-      ->type_name("FILE");
+      .TypeName("[HOST:]PORT")
+      .Default("no metrics");
+  app.AddText("--metrics-token-file", options.token_file,
+              "Serve metrics to those who send the token in this file, as 'Authorization: Bearer TOKEN': 16 to 128 letters, digits, - and "
+              "_. Required for addresses that are not loopback")
+      .TypeName("FILE");
 }
 
 Result<ListenAddress> ParseMetricsAddress(std::string_view option, std::string_view text) {

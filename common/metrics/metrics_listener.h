@@ -10,11 +10,8 @@
 #include <string_view>
 
 #include "common/base/status.h"
+#include "common/cli/command.h"
 #include "common/http/address.h"
-
-namespace CLI {
-class App;
-}
 
 namespace slabstream {
 
@@ -24,7 +21,7 @@ struct MetricsOptions {
 };
 
 // --metrics and --metrics-token-file.
-void AddMetricsOptions(CLI::App& app, MetricsOptions& options);
+void AddMetricsOptions(const Command& app, MetricsOptions& options);
 
 // "[HOST:]PORT". InvalidArgument.
 Result<ListenAddress> ParseMetricsAddress(std::string_view option, std::string_view text);

@@ -14,7 +14,7 @@ namespace slabstream {
 void AddStageSeconds(Exposition& out, std::string_view name, std::string_view help, const StageTimes& times);    // by `stage`
 void AddRefused(Exposition& out, std::string_view name, std::string_view help, const RefusedRequests& refused);  // by `reason`
 
-// Of web servers that hold volumes, each by `server`.
+// Names of metrics about web servers that hold volumes, each by `server`.
 struct WebTrafficNames {
   std::string_view requests, bytes, seconds;
 };

@@ -2,14 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "common/base/version.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // 64-bit integers are strings, as in all JSON of Protobuf.
 std::string Decimal(std::int64_t number) { return std::to_string(number); }
@@ -58,17 +55,16 @@ std::string OtlpTraces(const TraceSource& source, std::span<const TraceSpan> spa
   const Json json = {
       {"resourceSpans",
        {{{"resource", {{"attributes", AttributesJson(resource)}}}, {"scopeSpans", {{{"scope", scope}, {"spans", std::move(list)}}}}}}}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json.dump();
 }
 
 std::string RejectionIn(std::string_view answer) {
-  const Json json = Json::parse(answer, nullptr, false);
-  const auto partial = json.is_object() ? json.find("partialSuccess") : json.end();
-  if (partial == json.end() || !partial->is_object()) return {};
-  const auto text = [&](const char* field) -> std::string {
-    const auto found = partial->find(field);
-    if (found == partial->end()) return {};
-    return found->is_string() ? found->get<std::string>() : found->is_number() ? found->dump() : std::string();
+  const Result<Json> json = Json::Parse(answer);
+  const Json* const partial = json.ok() ? json->find("partialSuccess") : nullptr;
+  if (partial == nullptr) return {};
+  const auto text = [&](const char* field) {
+    const Json found = partial->value(field, Json());
+    return found.is_string() ? found.text() : found.is_number() ? found.dump() : std::string();
   };
   const std::string rejected = text("rejectedSpans");
   if (rejected.empty() || rejected == "0") return {};

@@ -36,10 +36,10 @@ struct TraceSpan {
 struct TraceSource {
   std::string program;  // "slabstream-gateway"
   std::string version;
-  std::string instance;  // of this process alone
+  std::string instance;  // names this process alone
 };
 
-// Of this process: its version, and an instance that is random.
+// This process as a source: its version, and an instance that is random.
 TraceSource ThisProcess(std::string program);
 
 // Text that is not UTF-8 is repaired.

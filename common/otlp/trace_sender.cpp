@@ -7,8 +7,8 @@
 #include <iterator>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/base/printable.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {

@@ -32,7 +32,7 @@ double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const d
 double LostSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
 // Voxels that slots must receive to change over: of each box in `to`, with halo, those that no box of its slot in `from` holds. BoxFetcher
-// (worker/box_fetcher.h) then requests exactly these.
+// (worker/machine/box_fetcher.h) then requests exactly these.
 std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 
 // Keeps the boxes. Moves one after the other from the busiest slot to the least busy one, as long as that helps. `seconds` by box.

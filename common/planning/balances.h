@@ -1,5 +1,5 @@
 // The ways in which boxes change from frame to frame. Each is one file and one line in Balances(). docs/adding.md says how to add one, and
-// how to compare it with the others.
+// how to compare it with others first.
 #pragma once
 
 #include <optional>
@@ -23,9 +23,9 @@ struct BalanceRequest {
   const Layout* now = nullptr;          // the layout of the last frames
   std::span<const double> seconds;      // measured render time of each box of `now`, newer frames count more; 0: not rendered
   const LayoutRequest* make = nullptr;  // what `now` was made for, with known.cost
-  int frames_seen = 1;                  // of `now` since it was made, >= 1
-  std::optional<double> noise = {};     // of a box's time in a frame (FrameNoise); none: not known yet
-  MoveSeconds move = {};                // of the volume's earlier layouts
+  int frames_seen = 1;                  // frames of `now` since it was made, >= 1
+  std::optional<double> noise = {};     // how much a box's time in a frame scatters (FrameNoise); none: not known yet
+  MoveSeconds move = {};                // what moves took in the volume's earlier layouts
 };
 
 // A mean time of a box scatters no less than one over so many frames, since newer frames count more.
@@ -36,21 +36,11 @@ struct BalanceEntry {
   std::string_view purpose;  // one line for --help
   // The layout to change to, if any. Pure: no picture may depend on it, and the same times give the same layout. Null: boxes never change.
   std::optional<Layout> (*change)(const BalanceRequest&) = nullptr;
-  bool hands_over = false;  // it changes who owns a box and never the boxes, so it needs several boxes a worker (--groups)
-  bool weighs = false;      // it weighs what a change costs, so it need not be asked after every frame
+  bool weighs = false;  // it weighs what a change costs, so it need not be asked after every frame
 };
 
 // The only list; the standard one first.
 const std::vector<BalanceEntry>& Balances();
 inline constexpr std::string_view kDynamicBalance = "dynamic";
-
-// Planes of the partition move to where both sides took as long, each time, whatever that costs to move: after Marchesin, Mongenet and
-// Dischler, "Dynamic load balancing for parallel volume rendering", EGPGV 2006.
-std::optional<Layout> MovePlanes(const BalanceRequest& request);
-
-// Busy workers hand boxes over to those that have least to do, each time, so that a worker's boxes need not touch: a simple form of what
-// Walldén, Markidis, Okita and Ino do in two layers of groups, "Memory efficient load balancing for distributed large-scale volume
-// rendering using a two-layered group structure", IEICE Transactions E102-D, 2019.
-std::optional<Layout> HandOver(const BalanceRequest& request);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// CostEstimator: the time that boxes of a volume take, for layouts, the choice of a policy and predicted frames.
+// CostEstimator: the time that boxes of a volume take, for layouts.
 //
 // Without measured frames it returns the renderer's analytic cost (AnalyticCost) for the view. With them it returns the measured cost of
 // each part of the volume, an average over the frames' views (MeasuredCost).

@@ -17,7 +17,7 @@ class FrameNoise {
   std::optional<double> deviation() const;
 
  private:
-  static constexpr double kLeastWeight = 0.1;  // of a frame, however many came before it
+  static constexpr double kLeastWeight = 0.1;  // the least weight of a frame, however many came before it
 
   double square_ = 0;
   int frames_ = 0;

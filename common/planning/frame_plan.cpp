@@ -9,6 +9,7 @@
 #include "common/frame/frame_unit.h"
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/placement.h"
+#include "common/planning/standard_combining.h"
 #include "common/renderers/registry.h"
 #include "common/volume/light_volume.h"
 
@@ -30,6 +31,10 @@ Result<CoarserLevel> LightVolumeFrom(const std::string& name, DatasetId dataset,
                     name, kMaxLightSide, size.x, size.y, size.z));
   }
   return light;
+}
+
+std::int64_t PicturePixels(const Camera& camera) {
+  return std::int64_t{camera.width / camera.supersample} * (camera.height / camera.supersample);
 }
 
 // Towards a light beside the viewer, above on the left.
@@ -109,7 +114,7 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   plan.layout = std::move(layout);
   plan.slots = std::uint32_t(roster.slots.size());
   plan.slab_axis = policy.axis;
-  plan.combine = policy.combine;
+  plan.combine = policy.combine.empty() ? StandardCombining(roster.slots.size(), PicturePixels(plan.setup.camera)) : policy.combine;
   plan.alternates = policy.assignment->alternates;
   plan.pixel_error = policy.pixel_error;
   PlaceBoxes(plan);
@@ -124,17 +129,14 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                             std::int64_t box_bytes_target) {
   const Result<ResolvedRequest> resolved = ResolveRequest(request, dataset, std::make_shared<const VolumeSummary>(summary));
   if (!resolved.ok()) return resolved.status();
-  if (!resolved->policy) {
-    return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
-  }
   Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   auto layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                            .volume = &resolved->volume,
-                                                           .policy = &*resolved->policy,
+                                                           .policy = &resolved->policy,
                                                            .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                            .box_bytes_target = box_bytes_target}));
-  return PlanFrame(*std::move(setup), *resolved->policy, roster, std::move(layout), {}, {.straight8 = request.straight8});
+  return PlanFrame(*std::move(setup), resolved->policy, roster, std::move(layout), {}, {.straight8 = request.straight8});
 }
 
 }  // namespace slabstream

@@ -17,20 +17,19 @@
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
 #include "common/planning/resolved_request.h"
+#include "common/planning/worker_id.h"
 #include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
-
-using WorkerId = std::uint32_t;  // unique within one coordinator's life, never reused. 0: nobody
 
 // One rank of a group: which box, and who renders it. After the loss of a worker, another one may hold several ranks of a group.
 struct Placement {
   BoxId id = 0;
   Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
-  std::uint8_t level = 0;              // that it is drawn from: LevelBox
-  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read; only at level 0
+  std::uint8_t level = 0;              // the level that it is drawn from: LevelBox
+  std::vector<FilledBox> filled = {};  // parts of the padded box that need not be read; only at level 0
 
   LevelBox at() const { return {box, level}; }
   friend bool operator==(const Placement&, const Placement&) = default;
@@ -61,7 +60,7 @@ struct ClientTakes {
   // Not 0: it puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do if there
   // is one group (SharesOf).
   std::uint64_t share_pixels = 0;
-  bool straight8 = false;  // as in FrameRequest
+  bool straight8 = false;  // FrameRequest::straight8
   friend bool operator==(const ClientTakes&, const ClientTakes&) = default;
 };
 
@@ -70,8 +69,8 @@ struct FramePlan {
   std::shared_ptr<const Layout> layout;  // never null; equal plans share it
   std::uint32_t slots = 1;               // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
-  double pixel_error = 0;         // as in the policy
-  std::string combine;            // the combining scheme, as in the policy
+  double pixel_error = 0;         // the policy's pixel_error
+  std::string combine;            // the combining scheme, never empty
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
   Turn turn;
@@ -98,8 +97,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 // the roster has.
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
                             const Turn& turn = {}, const ClientTakes& client = {});
-// Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
-// for a policy that leaves a choice.
+// Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             std::int64_t box_bytes_target = kBoxBytesTarget);
 

@@ -325,6 +325,7 @@ struct LayoutMaker::State {
   // on average may each be the slowest in some view; boxes that are equal by this measure are equal in all views.
   struct Predicted {
     double frame = 0;
+    double shared_out = 0;  // the same if all slots had equal work
     std::vector<BoxSeconds> shares;
   };
   Predicted Predict(const Layout& layout) {
@@ -342,6 +343,7 @@ struct LayoutMaker::State {
     }
     for (std::size_t view = 0; view < kViews; ++view) {
       if (sum[view] == 0) continue;
+      predicted.shared_out += sum[view] / (kViews * request.slots);
       for (std::size_t i = 0; i < times.size(); ++i) {
         predicted.shares[i].seconds = std::max(predicted.shares[i].seconds, times[i][view] / sum[view]);
       }
@@ -383,6 +385,27 @@ struct LayoutMaker::State {
     return std::move(best->best);
   }
 
+  // The whole volume in one box, if it is not too large: with a single worker there is nothing to divide, and no look changes its box.
+  std::optional<Partition> OneBox(int groups) {
+    if (groups * request.slots > 1) return std::nullopt;
+    Partition whole = MakeSlabs({.work = &fields.Of(BalanceBy::kVoxels)});
+    return BoxesFit(whole) ? std::optional(std::move(whole)) : std::nullopt;
+  }
+
+  // Voxels that move take time, and so does cutting a volume for each of many looks. So earlier boxes stay while workers have about the
+  // same to do, or if new boxes gain little.
+  Layout MakeByBricks(const ResolvedPolicy& policy, int groups) {
+    constexpr double kEven = 1.1, kLeastGain = 0.1;
+    if (std::optional<Partition> whole = OneBox(groups)) return Assign(*std::move(whole), policy);
+    if (request.earlier == nullptr || !BoxesFit(*request.earlier)) return MakeByPredictedCost(policy, groups);
+    Layout kept = Assign(*request.earlier, policy);
+    const Predicted now = Predict(kept);
+    const bool in_groups = now.shares.size() <= std::size_t(groups) * request.slots;
+    if (in_groups && now.frame <= kEven * now.shared_out) return kept;
+    Layout anew = MakeByPredictedCost(policy, groups);
+    return in_groups && Predict(anew).frame >= (1 - kLeastGain) * now.frame ? kept : anew;
+  }
+
   const LayoutRequest request;
   WorkFields fields;
   std::optional<CostEstimator> costs;
@@ -407,7 +430,8 @@ Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
   if (state_->request.summary->stored) return state_->Assign(state_->MakeStoredPartition(policy), policy);
   const BalanceBy metric = policy.balance_by;
   const int groups = FewestGroups(policy);
-  if (metric == BalanceBy::kOccupied || (metric == BalanceBy::kCost && state_->request.known.cost == nullptr)) {
+  if (metric == BalanceBy::kBricks) return state_->MakeByBricks(policy, groups);
+  if (metric != BalanceBy::kVoxels && (metric != BalanceBy::kCost || state_->request.known.cost == nullptr)) {
     return state_->MakeByPredictedCost(policy, groups);
   }
   return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(metric), state_->request.resized), policy);

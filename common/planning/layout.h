@@ -28,7 +28,7 @@ struct Layout {
   std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
   // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
-  LeastExtinction extinction = {};  // of the volume; empty: not known
+  LeastExtinction extinction = {};  // the volume's least extinction; empty: not known
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 
@@ -44,22 +44,25 @@ inline constexpr std::int64_t kBoxBytesTarget = std::int64_t{256} << 20;
 
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
-  const ClassifiedVolume* volume = nullptr;  // which has this summary
+  const ClassifiedVolume* volume = nullptr;  // it has this summary
   const ResolvedPolicy* policy = nullptr;
   std::uint32_t slots = 1;  // >= 1
   std::int64_t box_bytes_target = kBoxBytesTarget;
-  // As in ResolvedRequest; null: one level.
+  // ResolvedRequest::map and coarser; null: one level
   const LevelMap* map = nullptr;
   std::span<const CoarserVolume> coarser = {};
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
-  std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped
+  // Partition of the same volume by the same policy under another look; null: none. Boxes by bricks stay what they were there unless new
+  // ones are predicted to gain much, so that a change of the look moves few voxels.
+  const Partition* earlier = nullptr;
+  std::stop_token stop = {};  // once it is told to stop, the layout comes soon, and is of no use but to be dropped
 };
 
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their
-// assignment. If boxes are split by what is occupied, they are cut repeatedly by their analytic costs (AnalyticCost), as they would be by
-// measured costs (MeasuredCost). The result is the layout with the quickest frame, on average over views along x and along y and with the
-// renderer's default parameters: a layout stays for all views.
+// assignment. If boxes are split by what bricks show or by what is occupied, they are cut repeatedly by their analytic costs
+// (AnalyticCost), as they would be by measured costs (MeasuredCost). The result is the layout with the quickest frame, on average over
+// views along x and along y and with the renderer's default parameters: a layout stays for all views.
 Layout MakeLayout(const LayoutRequest& request);
 
 // Makes layouts by several policies; computes what they share once.

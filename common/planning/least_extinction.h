@@ -33,7 +33,7 @@ struct LeastExtinction {
 // has layers that show or voxels without a value, or is read in parts.
 LeastExtinction FindLeastExtinction(const VolumeSummary& summary, const ClassifiedVolume& volume);
 
-// Of a frame of this volume, which uses masks. Empty: nothing is known.
+// The front of a frame of this volume, which uses masks. Empty: nothing is known.
 OpaqueFront FindOpaqueFront(const LeastExtinction& extinction, const FrameSetup& setup);
 
 }  // namespace slabstream

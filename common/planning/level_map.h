@@ -13,7 +13,8 @@ namespace slabstream {
 struct LevelMap {
   static constexpr std::uint8_t kOutside = 255;  // a zone that the picture does not show
 
-  std::vector<int> levels = {0};      // of the dataset, finest first; not empty. The voxels of the first one are the frame's grid
+  // Levels of the dataset, finest first; not empty. The voxels of the first one are the frame's grid.
+  std::vector<int> levels = {0};
   Index3 side;                        // side in voxels of that grid, by axis; the last zones may be cut off
   Index3 counts;                      // zones by axis
   std::vector<std::uint8_t> of_zone;  // index into `levels`, or kOutside; x fastest. Empty: all is drawn from the first level

@@ -18,10 +18,10 @@ struct LevelPartition {
 };
 
 struct LevelPartitionRequest {
-  const LevelMap* map = nullptr;  // of several levels
-  Index3 size;                    // of the frame's grid
-  int least_boxes = 1;            // of those that the picture shows, as far as zones can be divided
-  std::int64_t most_bytes = 0;    // of one box
+  const LevelMap* map = nullptr;  // a map of several levels
+  Index3 size;                    // the size of the frame's grid
+  int least_boxes = 1;            // the least number of boxes that the picture shows, as far as zones can be divided
+  std::int64_t most_bytes = 0;    // the most bytes of one box
   std::function<std::int64_t(const LevelBox&)> bytes_of;
   // A box that is divided within a zone is divided at multiples of this, if there is one within: of a level's blocks, in voxels of the
   // grid.

@@ -19,11 +19,12 @@ namespace slabstream {
 
 struct VolumeLevels {
   std::vector<VolumeDescription> levels;  // finest first; more than one
-  // Of the level that statistics are taken from: its range and histogram are those of the dataset, at every level.
+  // The summary of the level that statistics are taken from: its range and histogram are those of the dataset, at every
+  // level.
   std::shared_ptr<const VolumeSummary> overview;
 };
 
-// Of the dataset, without bricks.
+// The dataset's statistics, without bricks.
 VolumeSummary StatisticsOf(const VolumeLevels& levels);
 
 // The coarsest level whose voxels are at most request.detail pixels wide (0: as 1) wherever the picture shows the volume, or the one that

@@ -7,7 +7,8 @@
 
 namespace slabstream {
 
-// Of a box of voxels, or of several neighbouring ones: their cells, half a voxel around their centres. `map`: to the camera's grid.
+// The image of the cells of a box of voxels, or of several neighbouring ones: half a voxel around their centres. `map`
+// leads to the camera's grid.
 inline Camera::ImageExtent ExtentOf(const Box& box, const GridMap& map, const Camera& camera) {
   Vec3 low, high;
   for (const Axis axis : kAxes) {

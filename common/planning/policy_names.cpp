@@ -6,9 +6,10 @@ namespace slabstream {
 
 const std::vector<NamedChoice>& BalanceByChoices() {
   static const std::vector<NamedChoice> choices = {
-      {kAutomatic, "chosen to suit the decomposition"},
+      {kAutomatic, "what suits the rest of the policy: bricks for kd-tree, voxels for others, occupied where costs count"},
       {"voxels", "equal voxels"},
-      {"occupied", "equal work, by visibility under the transfer function"},
+      {"bricks", "equal work, by the bricks of voxels that may show something; no voxel is counted"},
+      {"occupied", "equal work, by the voxels that show something, which are counted before the first frame"},
       {"cost", "equal render time, as measured in earlier frames; occupied until then"},
   };
   return choices;

@@ -13,21 +13,20 @@ namespace slabstream {
 namespace {
 
 template <class Entry>
-Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries, bool may_be_open = false) {
-  if ((may_be_open && name == kAutomatic) || FindNamed(entries, name) != nullptr) return Status::Ok();
-  const std::string open = may_be_open ? fmt::format("{}, ", kAutomatic) : "";
+Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries) {
+  if (FindNamed(entries, name) != nullptr) return Status::Ok();
   return Status::InvalidArgument(
-      fmt::format("{} is '{}', but must be one of: {}{}{}", field, name, open, NamesOf(entries), DidYouMean(name, entries)));
+      fmt::format("{} is '{}', but must be left out or one of: {}{}", field, name, NamesOf(entries), DidYouMean(name, entries)));
 }
 
 }  // namespace
 
 Status CheckNames(const Policy& policy) {
-  if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions(), true); !s.ok()) return s;
+  if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions()); !s.ok()) return s;
   if (Status s = CheckName("policy.balance_by", policy.balance_by, BalanceByChoices()); !s.ok()) return s;
-  if (Status s = CheckName("policy.assignment", policy.assignment, Assignments(), true); !s.ok()) return s;
+  if (Status s = CheckName("policy.assignment", policy.assignment, Assignments()); !s.ok()) return s;
   if (Status s = CheckName("policy.balance", policy.balance, Balances()); !s.ok()) return s;
-  if (policy.combine == kAutomatic) return Status::Ok();
+  if (policy.combine.empty()) return Status::Ok();
   if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
     return Status::InvalidArgument("policy.combine " + scheme.status().message());
   }
@@ -41,7 +40,6 @@ Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry
 }
 
 ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometry) {
-  CHECK(!LeavesChoice(policy));
   const DecompositionEntry* const decomposition = FindNamed(Decompositions(), policy.decomposition);
   return {.decomposition = decomposition,
           .balance_by = FindBalanceBy(BalanceByOf(policy)).value(),
@@ -49,18 +47,6 @@ ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometr
           .groups = policy.groups,
           .assignment = FindNamed(Assignments(), policy.assignment),
           .balance = FindNamed(Balances(), policy.balance),
-          .combine = policy.combine,
-          .pixel_error = policy.pixel_error,
-          .teams = policy.teams};
-}
-
-Policy AskFor(const ResolvedPolicy& policy) {
-  return {.decomposition = std::string(policy.decomposition->name),
-          .balance_by = std::string(NameOf(policy.balance_by)),
-          .axis = AxisChoice(policy.axis),
-          .groups = policy.groups,
-          .assignment = std::string(policy.assignment->name),
-          .balance = std::string(policy.balance->name),
           .combine = policy.combine,
           .pixel_error = policy.pixel_error,
           .teams = policy.teams};
@@ -78,17 +64,24 @@ Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const 
   return longest;
 }
 
-std::string_view BalanceByOf(const Policy& policy) {
-  if (policy.balance_by != kAutomatic || policy.decomposition == kAutomatic) return policy.balance_by;
-  return FindNamed(Decompositions(), policy.decomposition)->balance_by;
-}
-
 bool IsDynamic(const Policy& policy) { return FindNamed(Balances(), policy.balance)->change != nullptr; }
 
+namespace {
+
+// Whether boxes change, or find their owners, by what they cost.
+bool UsesCosts(const Policy& policy) { return IsDynamic(policy) || FindNamed(Assignments(), policy.assignment)->by_cost; }
+
+}  // namespace
+
+std::string_view BalanceByOf(const Policy& policy) {
+  if (policy.balance_by != kAutomatic) return policy.balance_by;
+  const std::string_view suits = FindNamed(Decompositions(), policy.decomposition)->balance_by;
+  return FindBalanceBy(suits) == BalanceBy::kBricks && UsesCosts(policy) ? NameOf(BalanceBy::kOccupied) : suits;
+}
+
 bool NeedsOccupancy(const Policy& policy) {
-  if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
-  return FindBalanceBy(BalanceByOf(policy)) != BalanceBy::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
-         IsDynamic(policy);
+  const BalanceBy metric = FindBalanceBy(BalanceByOf(policy)).value();
+  return metric == BalanceBy::kOccupied || metric == BalanceBy::kCost || UsesCosts(policy);
 }
 
 }  // namespace slabstream

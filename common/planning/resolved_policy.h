@@ -1,5 +1,5 @@
-// ResolvedPolicy: how a frame is made, with nothing left open. A Policy is what a client asks for: its names may be "auto", and its axis
-// may depend on the view. Names are looked up once, here; planning works with the entries of the lists.
+// ResolvedPolicy: how a frame is made. A Policy is what a client asks for: its axis may depend on the view. Names are looked up once, here;
+// planning works with the entries of the lists.
 #pragma once
 
 #include <string>
@@ -16,25 +16,22 @@
 namespace slabstream {
 
 struct ResolvedPolicy {
-  const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
+  const DecompositionEntry* decomposition = nullptr;  // one of Decompositions(), never null
   BalanceBy balance_by = BalanceBy::kVoxels;
   Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
-  const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
-  const BalanceEntry* balance = nullptr;        // of Balances(), never null
-  std::string combine;                          // ParseCombining takes it
-  double pixel_error = 0;                       // as in Policy
-  int teams = 1;                                // as in Policy
+  const AssignmentEntry* assignment = nullptr;  // one of Assignments(), never null
+  const BalanceEntry* balance = nullptr;        // one of Balances(), never null
+  std::string combine;                          // ParseCombining takes it; empty: StandardCombining of the frame
+  double pixel_error = 0;                       // Policy::pixel_error
+  int teams = 1;                                // Policy::teams
   friend bool operator==(const ResolvedPolicy&, const ResolvedPolicy&) = default;
 };
 
-// The policy is valid and settled (SettledPolicy), has known names (CheckNames) and leaves no choice (LeavesChoice).
+// The policy is valid and settled (SettledPolicy), and has known names (CheckNames).
 ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometry);
 
-// The policy that asks for exactly this.
-Policy AskFor(const ResolvedPolicy& policy);
-
-// InvalidArgument that says which names there are, if a name of the policy is in no list and not kAutomatic.
+// InvalidArgument that says which names there are, if a name of the policy is in no list.
 Status CheckNames(const Policy& policy);
 
 // The request's policy with an axis that no longer depends on the view (AxisChoice::kView). The request must be valid.
@@ -44,14 +41,14 @@ Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry
 // kView.
 Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const Index3& size);
 
-// The policy's load metric. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be
-// known.
+// The policy's load metric. "auto" becomes what suits the decomposition; where costs of boxes count, too, voxels are counted. The policy's
+// names must be known.
 std::string_view BalanceByOf(const Policy& policy);
 
 // Whether boxes may change between frames (Balances). The policy's names must be known.
 bool IsDynamic(const Policy& policy);
 
-// Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
+// Whether the policy's layout needs an exact OccupancyGrid. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);
 
 }  // namespace slabstream

@@ -140,8 +140,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
     request.view.fit = false;
   }
   request.policy = SettledPolicy(request, geometry);
-  std::optional<ResolvedPolicy> policy;
-  if (!LeavesChoice(request.policy)) policy = ResolvePolicy(request.policy, geometry);
+  ResolvedPolicy policy = ResolvePolicy(request.policy, geometry);
   return ResolvedRequest{.frame = std::move(request),
                          .volume = {dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers)},
                          .summary = std::move(summary),

@@ -27,11 +27,12 @@ struct ResolvedRequest {
   FrameRequest frame;                            // with its renderer's name, its whole view and a settled policy (SettledPolicy)
   ClassifiedVolume volume;                       // how it shows the dataset, whatever its view
   std::shared_ptr<const VolumeSummary> summary;  // of the dataset; never null
-  std::optional<ResolvedPolicy> policy;          // none: a choice is left (LeavesChoice)
+  ResolvedPolicy policy;
   // If the picture is drawn from several levels: which one each part, and those beside the summary's, finest first. Null: there are none.
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
-  // Of a dataset with several levels, if the request shows shadows or ambient occlusion: the level that its light volume is made from.
+  // The level that the light volume is made from, if the dataset has several levels and the request shows shadows or
+  // ambient occlusion.
   std::optional<CoarserVolume> light = {};
   std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
 };

@@ -1,8 +1,6 @@
 #include "common/planning/shown_zones.h"
 
 #include <algorithm>
-#include <cmath>
-#include <set>
 #include <utility>
 
 #include "common/planning/picture_extent.h"
@@ -54,20 +52,6 @@ class ShownParts {
   Found found_;
 };
 
-// In which order zones matter: what is near first, since it may hide what is far, in layers about two zones thick. Of a layer, what is
-// in the middle of the picture first.
-std::pair<double, double> Place(const Box& zone, const Camera& camera) {
-  constexpr double kZonesInLayer = 2;
-  const Camera::ImageExtent extent = ExtentOf(zone, {}, camera);
-  const Vec3 sides = ToVec3(zone.size()) * camera.spacing;
-  const double layer = kZonesInLayer * std::max({sides.x, sides.y, sides.z});
-  const auto beside = [](double begin, double end, int size) {
-    return std::abs(std::clamp(0.5 * (begin + end), 0.0, double(size)) / size - 0.5);
-  };
-  const double x = beside(extent.x_begin, extent.x_end, camera.width), y = beside(extent.y_begin, extent.y_end, camera.height);
-  return {std::floor(extent.nearest / layer), x * x + y * y};
-}
-
 }  // namespace
 
 std::shared_ptr<const LevelMap> ShownZones(const FrameSetup& setup) {
@@ -81,32 +65,6 @@ std::shared_ptr<const LevelMap> ShownZones(const FrameSetup& setup) {
   });
   find.Find({{0, 0, 0}, map.counts});
   return 2 * shown > geometry.bounds().voxel_count() ? nullptr : std::make_shared<const LevelMap>(std::move(map));
-}
-
-std::vector<Box> ShownBlocks(const FrameSetup& setup, std::size_t most) {
-  const VolumeGeometry& geometry = setup.description.geometry;
-  const Index3& side = setup.stored->block.end;
-  const LevelMap map = EmptyMap(geometry.size, side);
-  std::vector<std::pair<std::pair<double, double>, Box>> zones;  // by Place
-  ShownParts find(setup, map.side, [&](const Index3&, const Box& zone) { zones.emplace_back(Place(zone, setup.camera), zone); });
-  find.Find({{0, 0, 0}, map.counts});
-  std::ranges::sort(zones);
-  std::vector<Box> blocks;
-  std::set<Box> met;
-  for (const auto& [place, zone] : zones) {
-    const Box padded = Grown(zone, setup.halo, geometry.bounds());
-    const Index3 first = padded.begin / side, last = (padded.end - Uniform(1)) / side;
-    for (Index3 at = first; at.z <= last.z; ++at.z) {
-      for (at.y = first.y; at.y <= last.y; ++at.y) {
-        for (at.x = first.x; at.x <= last.x; ++at.x) {
-          if (blocks.size() == most) return blocks;
-          const Box block = Intersection({at * side, (at + Uniform(1)) * side}, geometry.bounds());
-          if (met.insert(block).second) blocks.push_back(block);
-        }
-      }
-    }
-  }
-  return blocks;
 }
 
 }  // namespace slabstream

@@ -18,8 +18,4 @@ namespace slabstream {
 // half of it; its boxes are then those of all views.
 std::shared_ptr<const LevelMap> ShownZones(const FrameSetup& setup);
 
-// Pure. The blocks (StoredAt::block) of the frame's volume, which is read in parts, that boxes of the zones need that the picture shows: no
-// more than `most`, those that matter first. Near before far, and of what is about as near, in the middle of the picture before its edge.
-std::vector<Box> ShownBlocks(const FrameSetup& setup, std::size_t most);
-
 }  // namespace slabstream

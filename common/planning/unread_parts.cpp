@@ -1,11 +1,10 @@
 #include "common/planning/unread_parts.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
 #include "common/volume/box_assembly.h"
 #include "common/volume/bricks.h"
@@ -33,8 +32,8 @@ UnreadParts::UnreadParts(const VolumeSummary& summary, ClassificationTable drawn
       drawn_(summary.indexed->size()) {
   const BrickVisibility visibility(summary, *summary.indexed, std::move(drawn), layers);
   constexpr std::size_t kGrain = 4096;  // bricks
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, drawn_.size(), kGrain), [&](const auto& bricks) {
-    for (std::size_t i = bricks.begin(); i < bricks.end(); ++i) drawn_[i] = visibility.AnyVisible(i) ? 1 : 0;
+  ParallelForRanges(0, drawn_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) drawn_[i] = visibility.AnyVisible(i) ? 1 : 0;
   });
 }
 

@@ -2,13 +2,11 @@
 // worker/rays/project.h), and values become colours at the end. Every box draws, since any may change a ray's value.
 #pragma once
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <memory>
 
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
@@ -28,15 +26,15 @@ class ProjectionKind : public RendererKind {
   static LocalImage ColorPixels(const LocalImage& frame, const FrameSetup& setup, Color&& color) {
     LocalImage picture = MakeLocalImage(PixelFormat::kRgba, frame.bounds);
     constexpr std::size_t kGrain = 4096;  // pixels
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, frame.rgba.size() / 4, kGrain), [&](const auto& pixels) {
-      for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) color(&frame.rgba[4 * i], &picture.rgba[4 * i]);
+    ParallelForRanges(0, frame.rgba.size() / 4, kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) color(&frame.rgba[4 * i], &picture.rgba[4 * i]);
     });
     return Resolve(picture, setup.camera.supersample);
   }
 };
 
-// Of a pixel of format kSum that holds a sum of values in [0, 1]: the sums over all samples of the bytes of min(floor(value * 2^24),
-// 2^24 - 1), highest first, and the number of samples. Exact up to 65793 samples of a ray.
+// The sum of values in [0, 1] that a pixel of format kSum holds. Its channels are sums over all samples: of the bytes
+// of min(floor(value * 2^24), 2^24 - 1), highest first, and the number of samples. Exact up to 65793 samples of a ray.
 inline double SumOfValues(const float* pixel) {
   return double(pixel[0]) * 0x1p-8 + double(pixel[1]) * 0x1p-16 + double(pixel[2]) * 0x1p-24;
 }

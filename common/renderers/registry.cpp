@@ -7,7 +7,7 @@
 #include <array>
 
 #include "common/base/check.h"
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 // Each renderer's folder defines Kind() in a namespace with the renderer's name.
 #define SLABSTREAM_RENDERER(folder) \

@@ -1,8 +1,5 @@
 #include "common/renderers/renderer_kind.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,6 +7,7 @@
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
 #include "common/kernels/resample.h"
+#include "common/parallel/parallel.h"
 #include "common/view/supersampled_voxel.h"
 
 namespace slabstream {
@@ -35,10 +33,10 @@ LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
   const PixelBounds reached = ReachedPixels(frame.bounds, setup.sheets.from_picture, setup.camera.width, setup.camera.height);
   LocalImage picture = MakeUnwrittenImage(frame.format, reached);
   constexpr std::int32_t kRows = 16;
-  tbb::parallel_for(tbb::blocked_range<std::int32_t>(reached.y_begin, reached.y_end, kRows), [&](const auto& rows) {
+  ParallelForRanges(reached.y_begin, reached.y_end, kRows, [&](std::int32_t begin, std::int32_t end) {
     const std::size_t row_floats = 4 * std::size_t(reached.width());
-    std::fill_n(picture.rgba.data() + std::size_t(rows.begin() - reached.y_begin) * row_floats, rows.size() * row_floats, 0.0F);
-    ResampleRows(frame, setup.sheets.from_picture, rows.begin(), rows.end(), picture);
+    std::fill_n(picture.rgba.data() + std::size_t(begin - reached.y_begin) * row_floats, std::size_t(end - begin) * row_floats, 0.0F);
+    ResampleRows(frame, setup.sheets.from_picture, begin, end, picture);
   });
   return picture;
 }

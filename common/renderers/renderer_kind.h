@@ -48,7 +48,7 @@ struct RendererParameter {
 // The direction and scale of a view whose cost is asked for.
 struct CostView {
   Axis along = Axis::kY;        // data axis nearest to the view direction
-  double pixels_per_voxel = 1;  // of the frame, for the smallest side of a voxel, > 0
+  double pixels_per_voxel = 1;  // pixels of the frame that the smallest side of a voxel takes, > 0
 };
 
 // The view of a setup's frame.
@@ -73,12 +73,13 @@ struct CostBasis {
 class RendererKind {
  public:
   struct Facts {
-    std::string_view name;                    // of --renderer and of messages: "splat"
-    std::string_view title;                   // in reports: "splatting"
-    std::string_view purpose;                 // one line for --help
-    PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
-    std::int32_t reach = kHalo;               // voxels round a box that it reads, [0, kHalo]
-    double derived_from_stored = 1;           // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 2]
+    std::string_view name;     // the name in --renderer and in messages: "splat"
+    std::string_view title;    // in reports: "splatting"
+    std::string_view purpose;  // one line for --help
+    // The format of local images with default parameters; says how they combine (common/kernels/combine.h).
+    PixelFormat format = PixelFormat::kRgba;
+    std::int32_t reach = kHalo;      // voxels round a box that it reads, [0, kHalo]
+    double derived_from_stored = 1;  // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 2]
     // The opacity of a place depends on the values next to it alone: it is Table's of a value between the least and the greatest of them.
     bool opacity_by_value = false;
     bool along_slices = false;                     // the frame is an image along the slices (SheetGrid), else the camera's

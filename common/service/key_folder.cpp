@@ -9,16 +9,14 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
 #include "common/wire/any_message.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 
@@ -52,21 +50,24 @@ Status KeyFolder::Read() {
   const std::string path = path_ + "/keys.json";
   const Result<std::string> text = ReadPrivateTextFile(path, kMaxFileBytes);
   if (!text.ok()) return text.status();
+  const Result<Json> json = Json::Parse(*text);
+  const auto damaged = [&] { return Status::InvalidArgument(fmt::format("'{}' is damaged; delete it to make new keys", path)); };
+  if (!json.ok()) return damaged();
   try {
-    const Json json = Json::parse(*text);
-    server_.secret_key = json.at("server_secret_key");
+    server_.secret_key = json->at("server_secret_key").text();
     const std::optional<std::string> public_key = PublicKeyOf(server_.secret_key);
     if (!public_key) return Status::InvalidArgument(fmt::format("'{}': server_secret_key is no key", path));
     server_.public_key = *public_key;
-    for (const Json& entry : json.at("admitted")) {
-      const std::optional<Role> role = FindRole(entry.at("role").get<std::string>());
-      AdmittedKey key{entry.at("public_key"), role.value_or(Role::kClient), entry.at("made"), entry.value("name", std::string())};
+    for (const Json& entry : json->at("admitted")) {
+      const std::optional<Role> role = FindRole(entry.at("role").text());
+      AdmittedKey key{entry.at("public_key").text(), role.value_or(Role::kClient), entry.at("made").text(),
+                      entry.value("name", std::string())};
       if (!role || !IsKey(key.public_key))
         return Status::InvalidArgument(fmt::format("'{}': an admitted key has no role or is none", path));
       admitted_.push_back(std::move(key));
     }
-  } catch (const Json::exception&) {
-    return Status::InvalidArgument(fmt::format("'{}' is damaged; delete it to make new keys", path));
+  } catch (const std::runtime_error&) {
+    return damaged();
   }
   return Status::Ok();
 }

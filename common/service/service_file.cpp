@@ -4,16 +4,14 @@
 #include <sys/stat.h>
 
 #include <limits>
-#include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 16;
 
@@ -23,16 +21,16 @@ class Reader {
   Reader(const std::string& path, const Json& json) : path_(path), json_(json) {}
 
   std::string Text(const char* field) {
-    const auto found = json_.find(field);
-    if (found != json_.end() && found->is_string()) return found->get<std::string>();
+    const Json* const found = json_.find(field);
+    if (found != nullptr && found->is_string()) return found->text();
     Complain(field, "is missing or no text");
     return "";
   }
   template <class T>
   T Number(const char* field) {
-    const auto found = json_.find(field);
+    const Json* const found = json_.find(field);
     constexpr T kMost = std::numeric_limits<T>::max();
-    if (found != json_.end() && found->is_number_unsigned() && found->get<std::uint64_t>() <= kMost) return found->get<T>();
+    if (found != nullptr && found->is_number_unsigned() && found->get<std::uint64_t>() <= kMost) return found->get<T>();
     Complain(field, fmt::format("is missing or no whole number in [0, {}]", kMost));
     return 0;
   }
@@ -55,19 +53,20 @@ class Reader {
 }  // namespace
 
 Status WriteServiceFile(const std::string& path, const ServiceFile& file) {
-  const nlohmann::ordered_json json = {{"role", NameOf(file.role)},         {"endpoint", file.endpoint},
-                                       {"server_key", file.server_key},     {"public_key", file.own.public_key},
-                                       {"secret_key", file.own.secret_key}, {"epoch", file.epoch},
-                                       {"wire_version", file.wire_version}, {"made", file.made}};
+  const Json json = {{"role", NameOf(file.role)},         {"endpoint", file.endpoint},
+                     {"server_key", file.server_key},     {"public_key", file.own.public_key},
+                     {"secret_key", file.own.secret_key}, {"epoch", file.epoch},
+                     {"wire_version", file.wire_version}, {"made", file.made}};
   return WritePrivateTextFile(path, json.dump(2) + "\n");
 }
 
 Result<ServiceFile> ReadServiceFile(const std::string& path) {
   const Result<std::string> text = ReadPrivateTextFile(path, kMaxFileBytes);
   if (!text.ok()) return text.status();
-  const Json json = Json::parse(*text, nullptr, false);
-  if (!json.is_object()) return Status::InvalidArgument(fmt::format("'{}' is no service file: it is not one JSON object", path));
-  Reader reader(path, json);
+  const Result<Json> json = Json::Parse(*text);
+  if (!json.ok() || !json->is_object())
+    return Status::InvalidArgument(fmt::format("'{}' is no service file: it is not one JSON object", path));
+  Reader reader(path, *json);
   ServiceFile file;
   const std::optional<Role> role = FindRole(reader.Text("role"));
   if (!role) reader.Complain("role", "is not client, worker or admin");

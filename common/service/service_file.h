@@ -13,10 +13,10 @@ namespace slabstream {
 
 struct ServiceFile {
   Role role = Role::kClient;
-  std::string endpoint;     // of the plane that the role uses: the workers' for workers, else the clients'
+  std::string endpoint;     // the endpoint of the plane that the role uses: the workers' for workers, else the clients'
   std::string server_key;   // the coordinator's public key
-  KeyPair own;              // of the role
-  std::uint64_t epoch = 0;  // of the coordinator that wrote the file last
+  KeyPair own;              // the role's own keys
+  std::uint64_t epoch = 0;  // the epoch of the coordinator that wrote the file last
   std::uint32_t wire_version = 0;
   std::string made;  // UTC, such as "2026-11-21T10:00:00Z"
 

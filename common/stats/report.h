@@ -46,10 +46,10 @@ struct RankReport {
   StageTimes stage_ns{};
   std::vector<Span> spans;            // at most kMaxSpans
   std::uint64_t occupied_voxels = 0;  // in the box, under this transfer function
-  std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
+  std::uint64_t drawn_voxels = 0;     // voxels that went through splat or Z-buffer
   std::uint64_t voxel_bytes = 0;      // received for this group since the last report (0: all was cached)
   std::uint64_t image_bytes = 0;      // payload sent to other workers
-  PixelBounds image_bounds;           // of the box's own image, in the frame
+  PixelBounds image_bounds;           // pixels of the box's own image, in the frame
   std::uint64_t image_pixels = 0;     // pixels in image_bounds that are not empty: an estimate (SamplePixels)
   std::uint64_t stored_bytes = 0;     // read from the dataset's source for what was received, as they are stored (Chunk::stored_bytes)
   friend bool operator==(const RankReport&, const RankReport&) = default;

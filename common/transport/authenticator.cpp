@@ -11,8 +11,8 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "common/base/guarded.h"
 #include "common/base/limited_log.h"
+#include "common/threads/guarded.h"
 #include "common/transport/context_impl.h"
 #include "common/transport/latest_seals.h"
 #include "common/transport/socket.h"

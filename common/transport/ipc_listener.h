@@ -36,7 +36,7 @@ class IpcListener {
 
   std::string path_;
   int descriptor_;
-  dev_t device_ = 0;  // of the file, to know it again
+  dev_t device_ = 0;  // the file's device, to know it again
   ino_t inode_ = 0;
 };
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <zmq.hpp>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 

@@ -20,8 +20,8 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
-#include "common/base/pooled_vector.h"
+#include "common/memory/bytes.h"
+#include "common/memory/pooled_vector.h"
 #include "common/transport/keys.h"
 
 struct evp_cipher_ctx_st;
@@ -40,8 +40,9 @@ namespace slabstream {
 // All frames of a message but the last one have kSealedFrameBytes.
 inline constexpr std::size_t kSealedFrameBytes = std::size_t{1} << 18;  // those under way stay in a cache
 inline constexpr std::size_t kSealedPlaceBytes = 12, kSealedTagBytes = 16, kSealedSizesBytes = 12;
-inline constexpr std::size_t kSealedPartBytes = kSealedFrameBytes - kSealedPlaceBytes - kSealedTagBytes;  // of the plaintext
-inline constexpr std::size_t kMaxSealedHeaderBytes = kSealedPartBytes - kSealedSizesBytes;                // headers fit in the first frame
+// Bytes of plaintext in a frame.
+inline constexpr std::size_t kSealedPartBytes = kSealedFrameBytes - kSealedPlaceBytes - kSealedTagBytes;
+inline constexpr std::size_t kMaxSealedHeaderBytes = kSealedPartBytes - kSealedSizesBytes;  // headers fit in the first frame
 
 // The frames of the largest message.
 constexpr std::size_t SealedFrames(std::uint64_t payload_bytes) { return std::size_t(payload_bytes / kSealedPartBytes) + 2; }
@@ -107,7 +108,7 @@ class Unsealer {
   // `scratch` may be any vector; to use the same one for all seals of a thread spares each a frame's memory.
   std::variant<Forged, More, Message> Open(std::span<const std::byte> frame, std::vector<std::byte>& scratch);
 
-  Place last() const { return last_; }  // of the frames that were opened
+  Place last() const { return last_; }  // the last of the frames that were opened
 
  private:
   struct Partial {

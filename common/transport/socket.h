@@ -24,9 +24,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/context.h"
 #include "common/transport/keys.h"
 
@@ -47,7 +47,7 @@ struct SocketOptions {
   int receive_high_water_mark = 4096;
   Duration linger = std::chrono::milliseconds(500);        // how long unsent messages outlive the socket
   std::int64_t max_message_bytes = std::int64_t{2} << 30;  // a larger frame closes the connection
-  std::size_t max_connections = 2048;                      // that a router accepts at a time; further ones are closed
+  std::size_t max_connections = 2048;                      // connections that a router accepts at a time; further ones are closed
   bool ends_connections = false;                           // routers: EndConnection works
   Duration handshake = std::chrono::seconds(5);            // how long a connection may take to become one
   // With keys, tcp connections are encrypted; without, endpoints that leave this machine are refused. ipc and inproc are never encrypted.

@@ -62,7 +62,7 @@ struct ViewParameters {
   friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
 };
 
-// Of the bounding sphere, physical.
+// The radius of the bounding sphere, physical.
 inline double BoundingRadius(const VolumeGeometry& geometry) { return 0.5 * Length(ToVec3(geometry.size) * geometry.spacing); }
 
 // InvalidArgument naming field, value and limits: a valid view that cannot be had of this volume.
@@ -77,7 +77,7 @@ struct Camera {
   Vec3 eye;                   // data space; orthographic: the point of the eye plane on the central ray
   Vec3 view_direction;        // physical space, unit, away from the eye
   Vec3 right, up;             // physical space, unit
-  Vec3 spacing;               // of the volume: physical = spacing * data
+  Vec3 spacing;               // the volume's spacing: physical = spacing * data
   int width = 0, height = 0;  // pixels of the (supersampled) grid
   int supersample = 1;        // power of two
   double target_depth = 1;    // depth of the target, which the picture's centre shows; perspective: its distance from the eye, > 0
@@ -91,7 +91,8 @@ struct Camera {
   };
   ImagePoint Project(const Vec3& data_point) const;  // the point must lie before the eye (perspective)
 
-  // Of all points p with low <= p <= high on every axis. The projection of a convex body is bounded by its corners.
+  // The image of all points p with low <= p <= high on every axis. The projection of a convex body is bounded by its
+  // corners.
   struct ImageExtent {
     double x_begin = 1e9, y_begin = 1e9, x_end = -1e9, y_end = -1e9;
     double nearest = 1e300;  // depth

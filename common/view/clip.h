@@ -25,7 +25,7 @@ enum class ClipMode : std::uint8_t {
 enum class ClipUnit : std::uint8_t {
   kWorld = 1,    // along the axes of the world (common/volume/orientation.h)
   kVoxels = 2,   // indices: voxels low <= v < high, along the axes of the voxels
-  kPercent = 3,  // of the volume's sides, along the axes of the voxels; 0 and 100 are its borders
+  kPercent = 3,  // percent of the volume's sides, along the axes of the voxels; 0 and 100 are its borders
 };
 
 // low < high along each axis; each in [-kMaxCoordinate, kMaxCoordinate]. A bound there does not clip.
@@ -46,7 +46,7 @@ struct ClipPlane {
 // What lies within thickness / 2 of the plane through `through` that is perpendicular to `normal`. Thickness 0: a slice, that is, a slab so
 // thin that values hardly change in it.
 struct ClipSlab {
-  Vec3 normal = {0, 0, 1};      // of the world, not zero
+  Vec3 normal = {0, 0, 1};      // a direction of the world, not zero
   std::optional<Vec3> through;  // a point of the world; none: the volume's centre
   // Instead of `through`: the slice with this index along the axis of the voxels that is nearest to the normal, in its middle.
   std::optional<std::int32_t> index;  // [0, kMaxVolumeSide)

@@ -13,7 +13,8 @@ namespace slabstream {
 // What users' options begin with: all of the default view.
 inline constexpr ViewParameters kUnstatedView = {.azimuth_degrees = std::nullopt, .elevation_degrees = std::nullopt, .fit = std::nullopt};
 
-inline constexpr double kDefaultAzimuthDegrees = 30, kDefaultElevationDegrees = 20;  // of a volume that is no patient
+// The first view of a volume that is no patient.
+inline constexpr double kDefaultAzimuthDegrees = 30, kDefaultElevationDegrees = 20;
 
 // The view with azimuth, elevation and `fit`. With an eye there are no angles. A view that says where it looks, or from where, frames
 // nothing unless it says so.

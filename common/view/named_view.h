@@ -7,7 +7,7 @@
 namespace slabstream {
 
 struct NamedView {
-  std::string_view name;     // of the side that one looks at
+  std::string_view name;     // the side that one looks at
   std::string_view purpose;  // for help texts
   double azimuth_degrees = 0, elevation_degrees = 0;
   bool of_patient = false;  // makes sense only for volumes with a patient's orientation

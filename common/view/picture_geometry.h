@@ -12,7 +12,7 @@
 namespace slabstream {
 
 struct PictureGeometry {
-  World world = World::kVoxels;  // whose axes these are
+  World world = World::kVoxels;  // the world whose axes these are
   LengthUnit unit = LengthUnit::kVoxel;
   Projection projection = Projection::kOrthographic;
   // Unit vectors at right angles, along the world's axes: to the right and upwards in the picture, and away from the viewer.
@@ -23,10 +23,10 @@ struct PictureGeometry {
   friend bool operator==(const PictureGeometry&, const PictureGeometry&) = default;
 };
 
-// Of lengths in the volume's world.
+// The unit of lengths in the volume's world.
 LengthUnit UnitOf(const VolumeGeometry& volume);
 
-// Of the finished picture, without supersampling. `camera` is of a view of `volume`.
+// The geometry of the finished picture, without supersampling. `camera` is of a view of `volume`.
 PictureGeometry GeometryOf(const Camera& camera, const VolumeGeometry& volume);
 
 }  // namespace slabstream

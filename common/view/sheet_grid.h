@@ -8,8 +8,9 @@
 // (i + 0.5, j + 0.5). Orthographic: w = 1. A pixel of the grid is one ray, the same for all slices; the frame that workers combine is made
 // of such pixels, and the display worker resamples it to the picture by a projective map (ResamplePicture) at the end.
 //
-// Resolution: at the volume's centre, a column is as wide as a pixel of the picture, but at least half a voxel (a footprint has no finer
-// detail to show) and at most two voxels (so that a footprint reaches a bounded number of voxels). Likewise rows.
+// Resolution: at the volume's centre, a column is as wide as a pixel of the picture, but at least half a voxel (a
+// footprint has no finer detail to show) and at most two voxels (so that a footprint reaches a bounded number of
+// voxels). Rows have the same limits.
 #pragma once
 
 #include <array>
@@ -34,7 +35,7 @@ struct SheetGrid {
   double x_u = 1, x_c = 0, x_0 = 0;
   double y_v = 1, y_c = 0, y_0 = 0;
   double w_c = 0, w_0 = 1;
-  double shear_u = 0, shear_v = 0;     // of the central ray: voxels along u and v from one slice to the next
+  double shear_u = 0, shear_v = 0;     // the central ray's slope: voxels along u and v from one slice to the next
   double footprint = 1;                // footprints are so many times as wide as usual, [1, kMaxFootprint]
   std::int32_t width = 0, height = 0;  // pixels, at least 1
   // Row major. With (X, Y, W) = from_picture (x, y, 1): the point (x, y) of the picture lies at (X / W, Y / W) in the grid; W <= 0: its ray
@@ -45,7 +46,7 @@ struct SheetGrid {
   friend bool operator==(const SheetGrid&, const SheetGrid&) = default;
 };
 
-inline constexpr double kMaxFootprint = 3;  // of SheetGrid::footprint
+inline constexpr double kMaxFootprint = 3;  // the largest SheetGrid::footprint
 
 // The grid for the picture of `camera` (not supersampled). Its sides may exceed kMaxGridSide under perspective, if an oblique view sees
 // many slices that lie hundreds of voxel widths apart: PlanFrame refuses such views.

@@ -3,7 +3,8 @@
 
 namespace slabstream {
 
-// Of points and distances, either sign: practically any. A bound of a clip box there does not clip.
+// The limit of coordinates and distances, either sign: practically any number is allowed. A bound of a clip box there
+// does not clip.
 inline constexpr double kMaxCoordinate = 1e300;
 
 }  // namespace slabstream

@@ -1,11 +1,10 @@
 #include "common/volume/bricks.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstring>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -104,7 +103,7 @@ void BrickedVoxels::Write(const Box& box, std::uint64_t begin, std::span<const s
 
 BrickedVoxels::BrickedVoxels(const VoxelBlock& block) : BrickedVoxels(block.box, block.type) {
   const std::size_t slice_bytes = block.bytes.size() / std::size_t(std::max(block.box.size().z, 1));
-  tbb::parallel_for(0, grid_.counts.z, [&](std::int32_t layer) {
+  ParallelFor(0, grid_.counts.z, [&](std::int32_t layer) {
     const Box bricks = grid_.BoxOf({grid_.first.x, grid_.first.y, grid_.first.z + layer});
     const std::size_t begin = std::size_t(bricks.begin.z - block.box.begin.z) * slice_bytes;
     Write(block.box, begin, std::span(block.bytes).subspan(begin, std::size_t(bricks.size().z) * slice_bytes));

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/large_array.h"
+#include "common/memory/large_array.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {

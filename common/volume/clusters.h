@@ -16,7 +16,7 @@ struct ClusterRequest {
   int size = 512;           // N, [8, 4096]
   double occupancy = 0.05;  // [0.001, 0.3]
   int balls = 24;           // [1, 1000]
-  std::uint64_t seed = 1;   // of their places
+  std::uint64_t seed = 1;   // the seed of their places
   double time = 0;          // [0, 1]: at 0 they lie dense near the corner of the first voxel, at 1 at the opposite end of x
   friend bool operator==(const ClusterRequest&, const ClusterRequest&) = default;
 };

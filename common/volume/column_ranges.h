@@ -39,7 +39,7 @@ void FoldRow(const T* __restrict row, std::size_t count, T* __restrict low, T* _
   }
 }
 
-// Of rows of one length.
+// The range of each column, over rows of one length.
 template <class T>
 class ColumnRanges {
  public:

@@ -5,7 +5,7 @@
 
 namespace slabstream {
 
-// Of GNU C++ and clang: what sums and differences of integers of 64 bits need.
+// A type that GNU C++ and clang have. Sums and differences of integers of 64 bits need it.
 __extension__ using Int128 = __int128;
 
 // The data value is value + rest. The rest is what the nearest double leaves of a whole number of 64 bits: in [-1024, 1024], mostly 0.

@@ -10,7 +10,7 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxFilled = 4096;  // of a padded box
+inline constexpr std::size_t kMaxFilled = 4096;  // filled boxes of one padded box
 
 struct FilledBox {
   Box box;

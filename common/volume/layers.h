@@ -22,7 +22,7 @@ namespace slabstream {
 enum class Layer : std::uint8_t { kVolume = 0, kLabels = 1, kOverlay = 2 };
 inline constexpr std::array kLayers = {Layer::kVolume, Layer::kLabels, Layer::kOverlay};
 
-// Of stored samples. nullopt: there is no such layer.
+// The types of stored samples. nullopt: there is no such layer.
 struct LayerTypes {
   std::optional<ScalarType> labels = {}, overlay = {};
   bool cells = false;  // the volume has cells
@@ -56,8 +56,8 @@ struct SampleTypes {
 
 // ---- labels
 
-inline constexpr std::uint32_t kMaxLabelValue = 1U << 24;  // of a file: float32 holds all integers up to here
-inline constexpr std::size_t kMaxLabels = 4096;            // that one label volume may hold, beside 0
+inline constexpr std::uint32_t kMaxLabelValue = 1U << 24;  // the largest label of a file: float32 holds all integers up to here
+inline constexpr std::size_t kMaxLabels = 4096;            // labels that one label volume may hold, beside 0
 inline constexpr std::size_t kMaxLabelNameBytes = 128;
 
 struct Label {

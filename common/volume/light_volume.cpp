@@ -1,13 +1,13 @@
 #include "common/volume/light_volume.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
 #include <type_traits>
 #include <vector>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -69,7 +69,7 @@ Volume FromSlabs(const VolumeDescription& description, SamplesOf&& samples_of) {
   const Index3& blocks = light.description.geometry.size;
   light.block = MakeVoxelBlock(light.description.geometry.bounds(), description.type);
   VisitScalarType(description.type, [&]<class T>(const T*) {
-    tbb::parallel_for(std::int32_t{0}, blocks.z, [&](std::int32_t k) {
+    ParallelFor(0, blocks.z, [&](std::int32_t k) {
       const Box slab = {{0, 0, k * block.z}, {size.x, size.y, std::min((k + 1) * block.z, size.z)}};
       std::vector<std::byte> room;
       const std::byte* const samples = samples_of(slab, room);

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <string>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

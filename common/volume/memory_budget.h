@@ -34,11 +34,11 @@ std::uint64_t MachineMemoryBytes();
 std::int64_t ControlGroupLimit(const std::string& memberships, const std::filesystem::path& mounted);
 
 // What a process of the service takes before it does anything, with its threads and the blocks that it keeps for reuse (KeepBlocks,
-// common/base/large_buffers.h): a sixteenth of its limit, at least half of kIdleMemoryBytes.
+// common/memory/large_buffers.h): a sixteenth of its limit, at least half of kIdleMemoryBytes.
 inline constexpr std::uint64_t kIdleMemoryBytes = std::uint64_t{192} << 20;
 inline constexpr std::uint64_t KeptBytes(std::uint64_t limit) { return std::max(kIdleMemoryBytes / 2, limit / 16); }
 inline constexpr std::uint64_t IdleMemoryBytes(std::uint64_t limit) { return kIdleMemoryBytes / 2 + KeptBytes(limit); }
-// Of a limit: for chunks that a process reads and decodes, if it does.
+// The part of a process's limit for chunks that it reads and decodes, if it does.
 inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit > kIdleMemoryBytes ? (limit - kIdleMemoryBytes) / 4 : 0; }
 // Limits of a process that may be stated.
 inline constexpr std::uint64_t kLeastMemoryBytes = std::uint64_t{256} << 20, kMostMemoryBytes = std::uint64_t{1} << 50;
@@ -54,7 +54,7 @@ struct MemoryShares {
 // A third for the coordinator, the rest for `workers` >= 1 workers in equal parts. InvalidArgument: less than kLeastMemoryBytes for one.
 Result<MemoryShares> ShareMemory(std::uint64_t bytes, int workers);
 
-// Of a coordinator's limit: for the voxels of datasets. 0: there is no limit.
+// The part of a coordinator's limit for the voxels of datasets. 0: there is no limit.
 inline constexpr std::uint64_t DatasetShare(std::uint64_t limit) { return limit == 0 ? UINT64_MAX : limit / 4 * 3; }
 
 // Without --memory a service takes three quarters of its machine. A coordinator or a worker that is started by itself takes what

@@ -21,11 +21,11 @@ enum class World : std::uint8_t {
 };
 constexpr std::string_view NameOf(World world) { return world == World::kVoxels ? "voxels" : world == World::kScene ? "scene" : "patient"; }
 
-// Of lengths in a world.
+// The units of lengths in a world.
 enum class LengthUnit : std::uint8_t {
   kVoxel = 1,       // nothing is known: the distance of neighbouring voxels
-  kFile = 2,        // of the file's spacing, which states none
-  kMillimetre = 3,  // of patients, and of files that state it, like those below
+  kFile = 2,        // the unit of the file's spacing, for which the file states no name
+  kMillimetre = 3,  // the unit of patients, and of files that state it, like those below
   kMicrometre = 4,
   kNanometre = 5,
   kAngstrom = 6,
@@ -42,9 +42,9 @@ constexpr std::string_view PluralOf(LengthUnit unit) {
 
 struct Orientation {
   World world = World::kVoxels;
-  Vec3 origin;                                                               // of the centre of voxel 0, 0, 0; finite
+  Vec3 origin;                                                               // the centre of voxel 0, 0, 0; finite
   std::array<Vec3, 3> axes = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};  // unit, at right angles, right-handed
-  // Of the world, as the file states it: kMillimetre or below in the list. None: it states none, or a patient's mm.
+  // The world's unit, as the file states it: kMillimetre or below in the list. None: it states none, or a patient's mm.
   std::optional<LengthUnit> unit = {};
 
   // A direction of the world as seen from the voxels' axes, and back. Lengths stay.

@@ -13,8 +13,8 @@ inline constexpr std::size_t kMaxSourceBytes = 8192;
 
 struct StoredAt {
   std::string source;         // an absolute path, perhaps with options for reading it
-  int level = 0;              // of the source
-  std::uint64_t version = 0;  // of its files: whoever finds another one there sees other files
+  int level = 0;              // the source's level
+  std::uint64_t version = 0;  // the version of its files: whoever finds another one there sees other files
   // Begins at 0 and has the size of the blocks in which the source is read; they lie at multiples of it.
   Box block = {{0, 0, 0}, {1, 1, 1}};
   friend bool operator==(const StoredAt&, const StoredAt&) = default;

@@ -1,8 +1,5 @@
 #include "common/volume/summary.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +7,8 @@
 #include <utility>
 #include <variant>
 
+#include "common/parallel/parallel.h"
+#include "common/parallel/per_thread.h"
 #include "common/volume/column_ranges.h"
 
 namespace slabstream {
@@ -43,7 +42,7 @@ template <class T, class Local, class Met, class Found>
 void ForEachRowOfBricks(const VoxelBlock& piece, Local&& local, Met&& met, Found&& found) {
   const Index3 begin = piece.box.begin, end = piece.box.end;
   const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
-  tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
+  ParallelFor(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
     auto* const part = local();
     ColumnRanges<T> columns(std::size_t(end.x - begin.x));
     const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
@@ -107,7 +106,7 @@ class PiecesOf {
  public:
   void Add(const VoxelBlock& piece, VolumeSummary& summary) {
     ForEachRowOfBricks<T>(
-        piece, [&] { return &parts_.local(); }, [](Part<T>& part, const T* row, std::int32_t width) { part.counts.Add(row, width); },
+        piece, [&] { return &parts_.Mine(); }, [](Part<T>& part, const T* row, std::int32_t width) { part.counts.Add(row, width); },
         [&](Part<T>& part, const Index3& brick, const StoredRange<T>& range) {
           part.range.Include(range);
           summary.bricks[NumberIn(summary.brick_counts, brick)] = ToDataValues(range, summary.description.mapping, kNoFiniteValue);
@@ -116,8 +115,8 @@ class PiecesOf {
 
   void AddSample(const VoxelBlock& piece) {
     const Index3 size = piece.box.size();
-    tbb::parallel_for(0, size.z, [&](std::int32_t z) {
-      Part<T>& part = parts_.local();
+    ParallelFor(0, size.z, [&](std::int32_t z) {
+      Part<T>& part = parts_.Mine();
       ColumnRanges<T> columns{std::size_t(size.x)};
       for (std::int32_t y = 0; y < size.y; ++y) {
         const T* const samples = piece.samples<T>() + piece.Offset(piece.box.begin + Index3{0, y, z});
@@ -132,22 +131,22 @@ class PiecesOf {
   void FindRange(VolumeSummary& summary) {
     const ValueMapping& mapping = summary.description.mapping;
     StoredRange<T> whole;
-    for (const Part<T>& part : parts_) whole.Include(part.range);
+    parts_.ForEach([&](const Part<T>& part) { whole.Include(part.range); });
     summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
     if constexpr (std::is_integral_v<T>) {
       for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
         std::uint64_t& bin = summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))];
-        for (const Part<T>& part : parts_) bin += part.counts[stored];
+        parts_.ForEach([&](const Part<T>& part) { bin += part.counts[stored]; });
       }
     }
   }
 
   // Bins need the range first, so floats are met a second time.
   static void AddToHistogram(const VoxelBlock& piece, VolumeSummary& summary) {
-    tbb::enumerable_thread_specific<FloatPart> parts;
+    PerThread<FloatPart> parts;
     const Index3 begin = piece.box.begin, size = piece.box.size();
-    tbb::parallel_for(0, size.z, [&](std::int32_t z) {
-      FloatPart& part = parts.local();
+    ParallelFor(0, size.z, [&](std::int32_t z) {
+      FloatPart& part = parts.Mine();
       const T* const slice = piece.samples<T>() + piece.Offset({begin.x, begin.y, begin.z + z});
       for (std::int64_t i = 0; i < std::int64_t{size.x} * size.y; ++i) {
         if (IsFinite(slice[i])) {
@@ -157,14 +156,14 @@ class PiecesOf {
         }
       }
     });
-    for (const FloatPart& part : parts) {
+    parts.ForEach([&](const FloatPart& part) {
       for (std::size_t bin = 0; bin < part.histogram.size(); ++bin) summary.histogram[bin] += part.histogram[bin];
       summary.non_finite += part.non_finite;
-    }
+    });
   }
 
  private:
-  tbb::enumerable_thread_specific<Part<T>> parts_;
+  PerThread<Part<T>> parts_;
 };
 
 template <class T>

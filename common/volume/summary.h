@@ -1,8 +1,8 @@
 // VolumeSummary: what the planner, the automatic transfer function and `info` know about a volume without its voxels.
 //
-// The volume is divided into bricks (kBrick; the last ones cut off by the volume's border). Each brick keeps the range of data values of
-// its voxels, so bricks tell whether a box can hold anything visible under a transfer function. Of a volume that nobody has read there are
-// no ranges: a terabyte would have a gigabyte of them.
+// The volume is divided into bricks (kBrick; the last ones cut off by the volume's border). Each brick keeps the range
+// of data values of its voxels, so bricks tell whether a box can hold anything visible under a transfer function. A
+// volume that nobody has read has no ranges: a terabyte would have a gigabyte of them.
 #pragma once
 
 #include <algorithm>
@@ -42,20 +42,20 @@ inline int HistogramBin(const ValueRange& range, double value) {
 
 struct VolumeSummary {
   VolumeDescription description;
-  ValueRange range;                                       // of finite data values; {0, 0} if there is none
-  std::array<std::uint64_t, kHistogramBins> histogram{};  // of finite data values, by HistogramBin(range, value)
+  ValueRange range;                                       // the range of finite data values; {0, 0} if there is none
+  std::array<std::uint64_t, kHistogramBins> histogram{};  // numbers of finite data values, by HistogramBin(range, value)
   Index3 brick_counts;                                    // bricks along each axis
-  BrickRangeList bricks;                                  // of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
-  std::int64_t non_finite = 0;                            // voxels that are NaN or infinite: never visible
-  // Of its layers; null: there is no such layer. Values of labels are their numbers.
+  BrickRangeList bricks;        // ranges of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
+  std::int64_t non_finite = 0;  // voxels that are NaN or infinite: never visible
+  // The summaries of its layers; null: there is no such layer. Values of labels are their numbers.
   std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
   // Nobody holds the voxels, but they can be read there. None: they are held.
   std::optional<StoredAt> stored = {};
-  // Of a stored level, what an index knows of its bricks, in place of `bricks`. It says which voxels need not be read, and nothing else:
-  // no picture may depend on whether there is an index. Null: there is none.
+  // What an index knows of the bricks of a stored level, in place of `bricks`. It says which voxels need not be read,
+  // and nothing else: no picture may depend on whether there is an index. Null: there is none.
   std::shared_ptr<const BrickRangeList> indexed = nullptr;
-  std::vector<std::uint32_t> cells;  // of an unstructured grid, by brick: cells with their centres there; empty: it is no grid
+  std::vector<std::uint32_t> cells;  // for an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
   LayerTypes layers() const {
     LayerTypes types;
@@ -75,7 +75,7 @@ ValueRange AnyValue(const VolumeDescription& description);
 // What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and no bricks.
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
 
-// Of data values, from one of stored samples: kNoFiniteValue stays what it is.
+// The range of data values that belongs to a range of stored samples: kNoFiniteValue stays what it is.
 ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples);
 
 // The ranges of stored samples of the bricks of a piece of a volume, into the places of these bricks in `bricks`, which has all

@@ -9,7 +9,7 @@
 #include <memory>
 #include <string_view>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 #include "common/volume/orientation.h"
 
@@ -32,8 +32,9 @@ struct VolumeGeometry {
   Orientation orientation = {};
 
   Box bounds() const { return {{0, 0, 0}, size}; }
-  Vec3 centre() const { return 0.5 * (ToVec3(size) - Vec3{1, 1, 1}); }                                 // data space
-  Vec3 ToWorld(const Vec3& p) const { return orientation.origin + orientation.ToWorld(spacing * p); }  // of a point of data space
+  Vec3 centre() const { return 0.5 * (ToVec3(size) - Vec3{1, 1, 1}); }  // data space
+  // A point of data space, in the world.
+  Vec3 ToWorld(const Vec3& p) const { return orientation.origin + orientation.ToWorld(spacing * p); }
   friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;
 };
 
@@ -98,7 +99,8 @@ struct Mesh;  // common/mesh/mesh.h
 struct Volume {
   VolumeDescription description;
   VoxelBlock block;
-  std::shared_ptr<const Mesh> cells = nullptr;  // of an unstructured grid, in data space; the voxels are its values on a lattice
+  // The cells of an unstructured grid, in data space; the voxels are its values on a lattice.
+  std::shared_ptr<const Mesh> cells = nullptr;
 };
 
 }  // namespace slabstream

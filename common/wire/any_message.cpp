@@ -8,11 +8,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "common/wire/client_fields.h"
-#include "common/wire/control_fields.h"
-#include "common/wire/image_fields.h"
-#include "common/wire/volume_fields.h"
-#include "common/wire/voxel_fields.h"
+#include "common/base/check.h"
+#include "common/wire/codecs.h"
 #include "slabstream/v1/envelope.pb.h"
 
 namespace slabstream {
@@ -25,17 +22,33 @@ using v1::Envelope;
 template <class Message>
 using Proto = decltype(ProtoOf(std::declval<const Message&>()));
 
+const FieldDescriptor* FieldFor(const google::protobuf::Descriptor* message) {
+  const auto* const fields = Envelope::descriptor()->oneof_decl(0);
+  int i = 0;
+  while (fields->field(i)->message_type() != message) CHECK_LT(++i, fields->field_count());
+  return fields->field(i);
+}
 // The field of the envelope that a message travels in.
 template <class Message>
 const FieldDescriptor* FieldOf() {
-  static const FieldDescriptor* const field = [] {
-    const auto* const fields = Envelope::descriptor()->oneof_decl(0);
-    int i = 0;
-    while (fields->field(i)->message_type() != Proto<Message>::descriptor()) CHECK_LT(++i, fields->field_count());
-    return fields->field(i);
-  }();
+  static const FieldDescriptor* const field = FieldFor(Proto<Message>::descriptor());
   return field;
 }
+
+// Null: none that this version knows.
+const FieldDescriptor* MessageIn(const Envelope& envelope) {
+  return Envelope::GetReflection()->GetOneofFieldDescriptor(envelope, Envelope::descriptor()->oneof_decl(0));
+}
+
+template <class Messages>
+bool IsOneOf(const FieldDescriptor* field) {
+  return [&]<class... Message>(std::type_identity<std::variant<Message...>>) {
+    return ((field == FieldOf<Message>()) || ...);
+  }(std::type_identity<Messages>());
+}
+
+// What is answered by OrderRefused, beside questions.
+using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder, AddVolume, VolumePart>;
 
 // Protobuf writes a line to stderr for each string that is not UTF-8; Decode reports it like every other fault.
 void SilenceProtobuf() {
@@ -82,13 +95,11 @@ std::size_t PayloadBytesOf(const Message&) {
 }
 
 // False: another message travels in the envelope.
-template <class Message, class Messages>
-bool ReadIf(const Envelope& envelope, const FieldDescriptor* field, Result<Messages>& result) {
+template <class Message>
+bool ReadIf(const Envelope& envelope, const FieldDescriptor* field, auto& message, Checker& check) {
   if (field != FieldOf<Message>()) return false;
-  Checker check(field->message_type()->name());
-  Message message{};
-  Read(static_cast<const Proto<Message>&>(Envelope::GetReflection()->GetMessage(envelope, field)), message, check);
-  result = check.ok() ? Result<Messages>(std::move(message)) : Result<Messages>(check.status());
+  Read(static_cast<const Proto<Message>&>(Envelope::GetReflection()->GetMessage(envelope, field)), message.template emplace<Message>(),
+       check);
   return true;
 }
 
@@ -116,13 +127,16 @@ template <class Messages>
 Result<Messages> Decode(std::span<const std::byte> header) {
   Envelope envelope;
   if (Status status = Parse(header, envelope); !status.ok()) return status;
-  const auto* const field = Envelope::GetReflection()->GetOneofFieldDescriptor(envelope, Envelope::descriptor()->oneof_decl(0));
+  const FieldDescriptor* const field = MessageIn(envelope);
   if (field == nullptr) return Status::InvalidArgument("Envelope.message: none that this version knows");
-  Result<Messages> result = Status::InvalidArgument(field->message_type()->name() + " does not belong here");
-  [&]<class... Message>(std::type_identity<std::variant<Message...>>) {
-    (void)(ReadIf<Message>(envelope, field, result) || ...);
+  Messages message;
+  Checker check(field->message_type()->name());
+  const bool belongs_here = [&]<class... Message>(std::type_identity<std::variant<Message...>>) {
+    return (ReadIf<Message>(envelope, field, message, check) || ...);
   }(std::type_identity<Messages>());
-  return result;
+  if (!belongs_here) return Status::InvalidArgument(field->message_type()->name() + " does not belong here");
+  if (!check.ok()) return check.status();
+  return message;
 }
 
 template <class Messages>
@@ -147,23 +161,13 @@ template Result<CoordinatorToClient> Decode(std::span<const std::byte>, std::siz
 std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, const Status& why) {
   Envelope envelope;
   if (!Parse(header, envelope).ok()) return std::nullopt;
-  switch (envelope.message_case()) {
-    case Envelope::kSubmitFrame: return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
-    case Envelope::kSummaryQuery: return OrderRefused{.nonce = envelope.summary_query().nonce(), .status = why};
-    case Envelope::kSampleQuery: return OrderRefused{.nonce = envelope.sample_query().nonce(), .status = why};
-    case Envelope::kStatisticsQuery: return OrderRefused{.nonce = envelope.statistics_query().nonce(), .status = why};
-    case Envelope::kJointHistogramQuery: return OrderRefused{.nonce = envelope.joint_histogram_query().nonce(), .status = why};
-    case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
-    case Envelope::kViewQuery: return OrderRefused{.nonce = envelope.view_query().nonce(), .status = why};
-    case Envelope::kPrefetchQuery: return OrderRefused{.nonce = envelope.prefetch_query().nonce(), .status = why};
-    case Envelope::kStatusQuery: return OrderRefused{.nonce = envelope.status_query().nonce(), .status = why};
-    case Envelope::kShutDown: return OrderRefused{.nonce = envelope.shut_down().nonce(), .status = why};
-    case Envelope::kKeysOrder: return OrderRefused{.nonce = envelope.keys_order().nonce(), .status = why};
-    case Envelope::kDataOrder: return OrderRefused{.nonce = envelope.data_order().nonce(), .status = why};
-    case Envelope::kAddVolume: return OrderRefused{.nonce = envelope.add_volume().nonce(), .status = why};
-    case Envelope::kVolumePart: return OrderRefused{.nonce = envelope.volume_part().nonce(), .status = why};
-    default: return std::nullopt;
-  }
+  const FieldDescriptor* const field = MessageIn(envelope);
+  if (field == nullptr) return std::nullopt;
+  if (field == FieldOf<SubmitFrame>()) return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
+  if (!IsOneOf<Question>(field) && !IsOneOf<Order>(field)) return std::nullopt;
+  const auto& message = Envelope::GetReflection()->GetMessage(envelope, field);
+  const FieldDescriptor* const nonce = field->message_type()->FindFieldByName("nonce");
+  return OrderRefused{.nonce = message.GetReflection()->GetUInt64(message, nonce), .status = why};
 }
 
 std::string_view NameOf(MessageView message) {

@@ -55,9 +55,9 @@ std::string_view NameOf(Plane plane);  // "control": for logs
 
 std::vector<std::byte> Encode(MessageView message);
 
-// Of one of `Messages`: AnyMessage, or one of the variants in it. InvalidArgument naming the message, the field, the value and the
-// limit: another message, wrong version, unknown enum value, NaN, a size out of bounds, undecodable bytes. The result keeps everything that
-// the structs' comments promise; nobody checks again.
+// Decodes one of `Messages`: AnyMessage, or one of the variants in it. InvalidArgument naming the message, the field,
+// the value and the limit: another message, wrong version, unknown enum value, NaN, a size out of bounds, undecodable
+// bytes. The result keeps everything that the structs' comments promise; nobody checks again.
 template <class Messages = AnyMessage>
 Result<Messages> Decode(std::span<const std::byte> header);
 

@@ -39,6 +39,20 @@ class Checker {
   };
   Scope In(std::string_view field, std::optional<std::size_t> index = std::nullopt);
 
+  // While the object lives, fields that are left out have their standard values (proto/slabstream/v1/about.proto).
+  class [[nodiscard]] Standards {
+   public:
+    explicit Standards(bool& fills) : fills_(fills) { fills_ = true; }
+    ~Standards() { fills_ = false; }
+    Standards(const Standards&) = delete;
+    Standards& operator=(const Standards&) = delete;
+
+   private:
+    bool& fills_;
+  };
+  Standards Fill() { return Standards(fills_); }
+  bool fills() const { return fills_; }
+
   // InvalidArgument "path.field: what"; an empty field means the message itself. Only the first failure counts.
   void Fail(std::string_view field, std::string_view what);
 
@@ -93,6 +107,7 @@ class Checker {
 
   std::string path_;
   Status status_;
+  bool fills_ = false;
 };
 
 }  // namespace slabstream

@@ -19,7 +19,6 @@
 //   JointHistogramQuery ----------------->  JointHistogramReply
 //   PickQuery --------------------------->  PickReply
 //   ViewQuery --------------------------->  ViewReply
-//   PrefetchQuery ----------------------->  PrefetchReply
 //   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
 //   OrderRefused.
 #pragma once
@@ -34,18 +33,20 @@
 #include "common/base/web_traffic.h"
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
-#include "common/stats/prediction.h"
+#include "common/stats/probe_results.h"
+#include "common/stats/report.h"
+#include "common/view/ball.h"
 #include "common/view/picture_geometry.h"
-#include "common/wire/control_messages.h"
+#include "common/volume/layers.h"
+#include "common/volume/summary.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
+#include "common/wire/picture_messages.h"
 #include "common/wire/volume_messages.h"
-#include "coordinator/probe/box_statistics.h"
-#include "coordinator/probe/joint_histogram.h"
-#include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxOpenRequests = 256;       // of one client
+inline constexpr std::size_t kMaxOpenRequests = 256;       // open requests of one client
 inline constexpr std::int64_t kMaxRequestBytes = 1 << 20;  // limit of the coordinator's client socket; any header that a client sends fits
 
 struct SubmitFrame {
@@ -73,7 +74,7 @@ struct FrameProgress {
 // A level that a picture was drawn from.
 struct LevelUse {
   std::uint32_t level = 0;   // [0, kMaxLevels); 0 is the finest
-  std::uint32_t boxes = 0;   // of the plan; those that turn out to be hidden or outside the picture are not read
+  std::uint32_t boxes = 0;   // boxes of the plan; those that turn out to be hidden or outside the picture are not read
   std::uint64_t voxels = 0;  // in these boxes
   friend bool operator==(const LevelUse&, const LevelUse&) = default;
 };
@@ -87,17 +88,16 @@ struct FrameStatistics {
   std::int64_t begin_ns = 0, end_ns = 0;                                      // plan to last byte at the coordinator, MonotonicNow() clock
   std::vector<RankReport> reports;                                            // at most kMaxReports
   std::uint32_t display = 0;                                                  // worker
-  PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                                   // if the policy left a choice
-  std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
+  PixelBounds grid;                    // pixels of the frame that was rendered and combined (FrameBounds)
+  std::vector<LevelUse> levels;        // finest first; at most kMaxLevels
   std::string lowered;                 // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
-  std::optional<ViewParameters> view;  // that the picture was made by, complete (ChooseView); final pictures have it
+  std::optional<ViewParameters> view;  // the view that the picture was made by, complete (ChooseView); final pictures have it
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
 struct FrameReply {  // payload: the runs of the shares that are not direct, one after the other
   RequestId request = 0;
-  ImageSize size;                                  // of the whole picture
+  ImageSize size;                                  // the size of the whole picture
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final; 0 done: a preview from a coarser level
   std::vector<PictureShare> shares;                // from 1 to kMaxShares; those that are direct may have come before this
   FrameStatistics statistics;                      // final only
@@ -128,7 +128,7 @@ struct ClientPing {
 struct ClientPong {
   Epoch epoch = 0;
   std::uint64_t nonce = 0;                     // echoed
-  std::vector<RequestId> known;                // of those asked about: queued, running, or with a reply kept
+  std::vector<RequestId> known;                // requests among those asked about that are queued, running, or have a reply kept
   std::optional<PictureSenders> senders = {};  // if they are others than the ping says
   friend bool operator==(const ClientPong&, const ClientPong&) = default;
 };
@@ -201,7 +201,7 @@ struct StatusReply {
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   RefusedRequests refused;
   std::vector<RendererStatus> renderers = {};
-  std::vector<WebTraffic> web = {};  // of the coordinator and the present workers; at most kMaxWebServers
+  std::vector<WebTraffic> web = {};  // what the coordinator and the present workers read; at most kMaxWebServers
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 
@@ -240,7 +240,7 @@ struct OrderRefused {
 
 enum class DataAction : std::uint8_t { kList = 1, kAdd = 2, kRemove = 3, kReload = 4 };
 
-inline constexpr std::size_t kMaxDataItems = 128;       // of one order
+inline constexpr std::size_t kMaxDataItems = 128;       // items of one order
 inline constexpr std::size_t kMaxDataItemBytes = 5120;  // a name, a path and what may stand between and behind them
 
 struct DataOrder {
@@ -260,45 +260,45 @@ struct DataReply {
 
 // ---- questions about what a dataset holds
 
-inline constexpr std::size_t kMaxOpenQuestions = 64;  // of one client
+inline constexpr std::size_t kMaxOpenQuestions = 64;  // open questions of one client
 inline constexpr std::size_t kMaxSamplePoints = 4096;
 inline constexpr std::size_t kMaxPercentiles = 64;
 
 struct SummaryQuery {
   std::uint64_t nonce = 0;
   std::string dataset;      // 1 ... kMaxNameBytes
-  TransferChoice transfer;  // that is resolved for the dataset
+  TransferChoice transfer;  // the function that is resolved for the dataset
   friend bool operator==(const SummaryQuery&, const SummaryQuery&) = default;
 };
 
 struct Percentile {
   double percent = 0;  // [0, 100]
-  double value = 0;    // that so many of the finite voxels do not exceed
+  double value = 0;    // the value that so many of the finite voxels do not exceed
   friend bool operator==(const Percentile&, const Percentile&) = default;
 };
 
 struct SummaryReply {
   std::uint64_t nonce = 0;
   VolumeDescription description;
-  ValueRange range;                                                                   // as VolumeSummary
-  std::vector<std::uint64_t> histogram = std::vector<std::uint64_t>(kHistogramBins);  // likewise
+  ValueRange range;                                                                   // VolumeSummary::range
+  std::vector<std::uint64_t> histogram = std::vector<std::uint64_t>(kHistogramBins);  // VolumeSummary::histogram
   std::uint64_t non_finite = 0;                                                       // voxels
   std::vector<Percentile> percentiles;                                                // at most kMaxPercentiles
-  TransferFunction transfer;                                                          // of the query, for this dataset
-  std::vector<Label> labels;                                                          // as LabelTable; at most kMaxLabels
+  TransferFunction transfer;                                                          // the query's function, for this dataset
+  std::vector<Label> labels;                                                          // LabelTable's labels; at most kMaxLabels
   friend bool operator==(const SummaryReply&, const SummaryReply&) = default;
 };
 
 struct SampleQuery {
   std::uint64_t nonce = 0;
   std::string dataset;       // 1 ... kMaxNameBytes
-  std::vector<Vec3> points;  // of the world; 1 ... kMaxSamplePoints
+  std::vector<Vec3> points;  // points of the world; 1 ... kMaxSamplePoints
   friend bool operator==(const SampleQuery&, const SampleQuery&) = default;
 };
 
 struct SampleReply {
   std::uint64_t nonce = 0;
-  std::vector<VolumeSample> samples;  // of each point
+  std::vector<VolumeSample> samples;  // a sample for each point
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
@@ -314,8 +314,9 @@ struct StatisticsQuery {
 struct StatisticsReply {
   std::uint64_t nonce = 0;
   BoxStatistics statistics;
-  VolumeDescription description = {};        // of the voxels that were counted
-  std::vector<LabelStatistics> labels = {};  // of each label of the dataset, if the query says so; values rise; at most kMaxLabels
+  VolumeDescription description = {};  // describes the voxels that were counted
+  // One for each label of the dataset, if the query says so; values rise; at most kMaxLabels.
+  std::vector<LabelStatistics> labels = {};
   friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
 };
 
@@ -328,7 +329,7 @@ struct JointHistogramQuery {
 
 struct JointHistogramReply {
   std::uint64_t nonce = 0;
-  ValueRange range;  // as VolumeSummary
+  ValueRange range;  // VolumeSummary::range
   JointHistogram histogram;
   friend bool operator==(const JointHistogramReply&, const JointHistogramReply&) = default;
 };
@@ -344,7 +345,7 @@ struct PickQuery {
 struct PickReply {
   std::uint64_t nonce = 0;
   std::optional<VolumeSample> sample;  // none: the pixel shows no point
-  double depth = 0;                    // of it, as depths of the picture's pixels
+  double depth = 0;                    // its depth, counted as the depths of the picture's pixels
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
 
@@ -363,36 +364,24 @@ struct ViewReply {
   friend bool operator==(const ViewReply&, const ViewReply&) = default;
 };
 
-// What a picture would show is fetched from its web server and kept on disk (coordinator/prefetcher.h).
-struct PrefetchQuery {
-  std::uint64_t nonce = 0;
-  FrameRequest frame;  // its policy and previews do not matter
-  friend bool operator==(const PrefetchQuery&, const PrefetchQuery&) = default;
-};
-
-struct PrefetchReply {
-  std::uint64_t nonce = 0;
-  bool fetches = false;  // no: the dataset lies behind no web server, or nothing is kept on disk
-  friend bool operator==(const PrefetchReply&, const PrefetchReply&) = default;
-};
-
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
 using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery,
-                                      PrefetchQuery, AddVolume, VolumePart, DropVolume>;
+                                      AddVolume, VolumePart, DropVolume>;
 using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
 using CoordinatorToClient =
     std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply, DataReply, OrderRefused,
-                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply, VolumeCredit>;
+                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, VolumeCredit>;
 
-using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery, PrefetchQuery>;
-using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply>;
-inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const JointHistogramQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
-inline const std::string& DatasetOf(const ViewQuery& query) { return query.frame.dataset; }
-inline const std::string& DatasetOf(const PrefetchQuery& query) { return query.frame.dataset; }
+using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply>;
+template <class Query>
+const std::string& DatasetOf(const Query& query) {
+  if constexpr (requires { query.dataset; }) {
+    return query.dataset;
+  } else {
+    return query.frame.dataset;
+  }
+}
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);
 }

@@ -27,14 +27,13 @@
 #include "common/image/run_header.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 #include "common/wire/picture_messages.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMaxEndpointBytes = 512;
-inline constexpr std::size_t kMaxTextBytes = 4096;
-inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
 inline constexpr std::int32_t kMaxOcclusionTiles = OcclusionTiles(kMaxGridSide);
 
 // The slot that a worker owns, among how many.
@@ -54,7 +53,7 @@ struct Register {
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
   std::string images_key = {};     // public key of its image plane; empty: that plane is not encrypted
-  SlotPlace place = {};            // that it had last: it holds the voxels of that slot's boxes
+  SlotPlace place = {};            // the slot that it had last: it holds the voxels of that slot's boxes
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -76,7 +75,7 @@ struct Heartbeat {
   std::uint64_t fetched_bytes = 0;   // voxels received since the process began
   std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
   bool leaving = false;              // it wants no new work, and Stop once nothing needs it any more; from then on in every heartbeat
-  std::vector<WebTraffic> web = {};  // of the process since it began; at most kMaxWebServers
+  std::vector<WebTraffic> web = {};  // what the process has read since it began; at most kMaxWebServers
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 
@@ -84,7 +83,7 @@ struct Ping {
   Epoch epoch = 0;
   FrameId finished_before = 0;      // all frames with a smaller id are over: forget them
   std::vector<FrameId> cancelled;   // also over, though their id is not smaller; at most kMaxCancelled
-  SlotPlace place = {};             // of the receiver
+  SlotPlace place = {};             // the receiver's slot
   std::vector<WorkerId> gone = {};  // workers that left or were lost lately; at most kMaxPeers
   friend bool operator==(const Ping&, const Ping&) = default;
 };
@@ -93,8 +92,8 @@ inline constexpr std::size_t kMaxCancelled = 1024;
 struct Peer {
   WorkerId worker = 0;
   std::string images_endpoint;
-  std::uint64_t memory_scope = 0;  // as it registered
-  std::string images_key = {};     // as it registered
+  std::uint64_t memory_scope = 0;  // Register::memory_scope
+  std::string images_key = {};     // Register::images_key
   friend bool operator==(const Peer&, const Peer&) = default;
 };
 
@@ -103,15 +102,16 @@ struct GroupAssignment {
   GroupKey key;
   FrameId finished_before = 0;
   std::uint32_t group_count = 1;  // [1, kMaxGroups]
-  std::uint32_t first_group = 0;  // of this attempt: earlier groups are already accumulated by `display`
+  std::uint32_t first_group = 0;  // the first group of this attempt: earlier groups are already accumulated by `display`
   bool previews = false;
-  bool straight8 = false;  // as in FrameRequest
+  bool straight8 = false;  // FrameRequest::straight8
   WorkerId display = 0;
   FrameSetup setup;
-  GroupPlan group;                               // with several roots: the only one of its frame
-  std::vector<Peer> peers;                       // every worker of the group, and the display worker
-  OcclusionMask hidden;                          // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
-  std::uint32_t groups_done = 0;                 // of the frame, at most key.group: accumulated, so images lent for them have been read
+  GroupPlan group;          // with several roots: the only one of its frame
+  std::vector<Peer> peers;  // every worker of the group, and the display worker
+  OcclusionMask hidden;     // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
+  // Groups of the frame, at most key.group, that are accumulated, so images lent for them have been read.
+  std::uint32_t groups_done = 0;
   ClientId client = 0;                           // whom the frame is for: a worker shares its time among clients
   std::optional<PicturesAddress> pictures = {};  // where that client takes pictures; none: through the coordinator
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
@@ -121,28 +121,9 @@ struct GroupDone {
   Epoch epoch = 0;
   WorkerId worker = 0;
   GroupKey key;
-  std::vector<RankReport> reports;  // of every rank of this group
+  std::vector<RankReport> reports;  // the reports of every rank of this group
   OcclusionMask hidden;             // some of what the groups 0 ... key.group hide; at most kMaxOcclusionTiles along an axis
   friend bool operator==(const GroupDone&, const GroupDone&) = default;
-};
-
-// How a payload is packed. kZstd: bytes of each 32-bit word grouped by significance (all first bytes, then all second, ...), then zstd.
-enum class Codec : std::uint8_t { kRaw = 1, kZstd = 2 };
-
-struct EncodedRuns {
-  RunImageHeader image;
-  Codec codec = Codec::kRaw;
-  std::uint64_t encoded_bytes = 0;  // length of the payload frame
-  std::uint64_t digest = 0;         // XXH3-64 of the payload frame
-  friend bool operator==(const EncodedRuns&, const EncodedRuns&) = default;
-};
-
-// A share of a picture, or the whole of it. All shares add up to the picture: where two of them have a pixel, each has a part of its
-// colour.
-struct PictureShare {
-  EncodedRuns runs;
-  bool direct = false;  // the payload went straight to the client (SentPicture)
-  friend bool operator==(const PictureShare&, const PictureShare&) = default;
 };
 
 // Final pixels (supersampling resolved), premultiplied; payload: the runs, unless they went straight to the client.
@@ -183,8 +164,6 @@ struct Stop {
   Epoch epoch = 0;
   friend bool operator==(const Stop&, const Stop&) = default;
 };
-
-inline constexpr std::size_t kMaxReports = 65536;
 
 using WorkerToCoordinator = std::variant<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave>;
 using CoordinatorToWorker = std::variant<Welcome, Ping, GroupAssignment, Retire, Stop>;

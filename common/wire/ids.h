@@ -1,9 +1,10 @@
-// Identities that appear in many messages.
+// Identities and limits that appear in many messages.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
-#include "common/planning/frame_plan.h"
+#include "common/planning/worker_id.h"
 
 namespace slabstream {
 
@@ -12,6 +13,10 @@ using Incarnation = std::uint64_t;  // random; one registration of a worker proc
 using RequestId = std::uint64_t;    // chosen by the client, unique within its connection
 using FrameId = std::uint64_t;      // ascending within an epoch
 using ClientId = std::uint64_t;     // whom a frame is for, within an epoch
+
+inline constexpr std::size_t kMaxTextBytes = 4096;  // of an error
+inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
+inline constexpr std::size_t kMaxReports = 65536;   // of a message
 
 // One group of one attempt at a frame. A re-plan raises `attempt`; messages of an older attempt are dropped.
 struct GroupKey {

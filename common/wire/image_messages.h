@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "common/base/rare.h"
-#include "common/base/shared_arena.h"
+#include "common/combining/schedule.h"
 #include "common/image/image_view.h"
-#include "common/wire/control_messages.h"
+#include "common/memory/shared_arena.h"
+#include "common/stats/report.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 
 namespace slabstream {
@@ -18,7 +20,7 @@ struct SharedImage {
   ArenaName arena;
   PixelBounds bounds;             // within the frame, not empty
   std::uint32_t stride = 0;       // pixels from row to row of a plane, [bounds.width(), kMaxFrameSide]
-  std::uint64_t first_pixel = 0;  // of a plane: pixel (bounds.x_begin, bounds.y_begin), at most kMaxFramePixels
+  std::uint64_t first_pixel = 0;  // the place of pixel (bounds.x_begin, bounds.y_begin) in a plane, at most kMaxFramePixels
   std::vector<BlockName> planes;  // rgba; kDepth: and depth, voxel
   std::size_t rows() const { return std::size_t(bounds.height()); }
   friend bool operator==(const SharedImage&, const SharedImage&) = default;
@@ -27,7 +29,7 @@ struct SharedImage {
 // How the payload of an image's runs is packed.
 struct PackedRuns {
   Codec codec = Codec::kZstd;  // not kRaw
-  std::uint64_t bytes = 1;     // of the payload, [1, PayloadBytes(image))
+  std::uint64_t bytes = 1;     // bytes of the payload, [1, PayloadBytes(image))
   std::uint64_t digest = 0;    // XXH3-64 of the payload
   friend bool operator==(const PackedRuns&, const PackedRuns&) = default;
 };
@@ -43,12 +45,12 @@ struct PartialImage {
   GroupKey key;
   std::uint32_t step = 0;  // index into schedule.steps
   RankInterval interval;   // ranks whose images these pixels hold
-  PixelRange pixels;       // of the frame, as in the step
-  RunImageHeader image;    // of a shared image, only the format
+  PixelRange pixels;       // pixels of the frame, as in the step
+  RunImageHeader image;    // for a shared image, only its format counts
   Rare<SharedImage> shared;
   Rare<PackedRuns> packed;          // not of a shared image
   std::uint64_t acknowledge = 0;    // not 0: the sender waits for ImageReceived with this number
-  std::vector<RankReport> reports;  // of the ranks in `interval` that have not been passed on yet
+  std::vector<RankReport> reports;  // reports of the ranks in `interval` that have not been passed on yet
   friend bool operator==(const PartialImage&, const PartialImage&) = default;
 };
 

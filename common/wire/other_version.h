@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-// Of an envelope that a program of another version wrote: that version. nullopt: it is of ours, or no envelope.
+// The version of the program that wrote an envelope, if it is another one. nullopt: it is ours, or this is no envelope.
 std::optional<std::uint32_t> OtherVersion(std::span<const std::byte> header);
 
 // An envelope of our version without a message: what the coordinator answers to another version.

@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
 #include "common/wire/voxel_messages.h"

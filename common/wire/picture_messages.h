@@ -35,7 +35,7 @@ struct PicturesAddress {
 // Payload: the runs of the FrameReply with this digest.
 struct SentPicture {
   std::uint64_t digest = 0;  // XXH3-64 of the payload
-  std::uint64_t bytes = 0;   // of the payload
+  std::uint64_t bytes = 0;   // bytes of the payload
   friend bool operator==(const SentPicture&, const SentPicture&) = default;
 };
 

@@ -4,7 +4,8 @@
 
 #include "common/base/check.h"
 #include "common/base/printable.h"
-#include "common/wire/request_fields.h"
+#include "common/wire/codecs.h"
+#include "slabstream/v1/frame.pb.h"
 
 namespace slabstream {
 

@@ -11,7 +11,7 @@
 #include "common/base/printable.h"
 #include "common/base/range_status.h"
 #include "common/renderers/renderer_choice.h"
-#include "common/wire/field_walk.h"
+#include "common/wire/request_walk.h"
 
 namespace slabstream {
 namespace {
@@ -28,36 +28,25 @@ class SchemaCheck {
   }
 
  private:
-  struct Limits {
-    double least = 0, most = 0;  // both 0: none
-    bool above_least = false;
-    std::string unit = {};
-  };
-
   template <class Struct>
-  void Members(const Struct& value, const Limits& outer) {
-    Walk(value, [&](const Field& field, const auto& member, std::size_t most) {
-      const v1::About& about = AboutOf(field);
-      const bool limited = about.least() != 0 || about.most() != 0;
+  void Members(const Struct& value, const FieldAbout& outer) {
+    Walk(value, [&](const FieldAbout& field, const auto& member, std::size_t most) {
       const std::size_t length = path_.size();
-      path_ += (path_.empty() ? "" : ".") + field.name();
-      Member(field, member, most, limited ? Limits{about.least(), about.most(), about.above_least(), about.unit()} : outer);
+      path_ += (path_.empty() ? "" : ".") + field.field;
+      Member(field, member, most, field.least != 0 || field.most != 0 ? field : outer);
       path_.resize(length);
     });
   }
 
   template <class T>
-  void Member(const Field& field, const T& value, std::size_t most, const Limits& limits) {
+  void Member(const FieldAbout& field, const T& value, std::size_t most, const FieldAbout& limits) {
     if constexpr (std::is_same_v<T, std::string>) {
-      const v1::About& about = AboutOf(field);
-      Text(value, about.most() > 0 ? about.least() : 1, about.most() > 0 ? about.most() : kMaxNameBytes);
+      Text(value, field.most > 0 ? field.least : 1, field.most > 0 ? field.most : kMaxNameBytes);
     } else if constexpr (std::is_arithmetic_v<T>) {
       if (limits.least != 0 || limits.most != 0) Number(double(value), limits);
     } else if constexpr (requires { value.number(); }) {
-      const auto* const chosen = field.enum_type()->FindValueByNumber(value.number());
-      if (chosen == nullptr || value.number() == 0) {
-        Keep(Status::InvalidArgument(
-            fmt::format("{} is {}, but must be one of: {}", path_, value.number(), fmt::join(WordsOf(*field.enum_type()), ", "))));
+      if (value.number() < 1 || std::size_t(value.number()) > field.words.size()) {
+        Keep(Status::InvalidArgument(fmt::format("{} is {}, but must be one of: {}", path_, value.number(), fmt::join(field.words, ", "))));
       }
     } else if constexpr (requires { value.has_value(); }) {
       if (value.has_value()) Member(field, *value, most, limits);
@@ -77,7 +66,7 @@ class SchemaCheck {
   }
 
   template <class T>
-  void Items(const std::vector<T>& items, const Limits& limits) {
+  void Items(const std::vector<T>& items, const FieldAbout& limits) {
     const std::size_t length = path_.size();
     for (std::size_t i = 0; i < items.size() && status_.ok(); ++i) {
       path_ += fmt::format("[{}]", i);
@@ -86,11 +75,10 @@ class SchemaCheck {
     }
   }
 
-  void Number(double value, const Limits& limits) {
-    const auto& [least, most, above_least, unit] = limits;
-    if ((above_least ? value > least : value >= least) && value <= most) return;
-    Keep(Status::InvalidArgument(fmt::format("{} is {}, but must lie in {}{}, {}]{}{}", path_, value, above_least ? '(' : '[', least, most,
-                                             unit.empty() ? "" : " ", unit)));
+  void Number(double value, const FieldAbout& limits) {
+    if ((limits.above_least ? value > limits.least : value >= limits.least) && value <= limits.most) return;
+    Keep(Status::InvalidArgument(fmt::format("{} is {}, but must lie in {}{}, {}]{}{}", path_, value, limits.above_least ? '(' : '[',
+                                             limits.least, limits.most, limits.unit.empty() ? "" : " ", limits.unit)));
   }
 
   void Text(const std::string& text, double least, double most) {

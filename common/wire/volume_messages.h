@@ -47,7 +47,7 @@ struct AddVolume {
   std::optional<SentFile> file = {};  // instead of description, layers and labels
   friend bool operator==(const AddVolume&, const AddVolume&) = default;
 
-  // Of the file, or of the samples of the volume and of its layers.
+  // Bytes of the file, or of the samples of the volume and of its layers.
   std::uint64_t bytes() const {
     if (file) return file->bytes;
     return std::uint64_t(description.geometry.bounds().voxel_count()) * SampleTypes(description.type, layers).bytes_per_voxel();
@@ -55,7 +55,7 @@ struct AddVolume {
 };
 
 struct VolumeCredit {
-  std::uint64_t nonce = 0;                  // of AddVolume
+  std::uint64_t nonce = 0;                  // AddVolume::nonce
   std::uint64_t received = 0, allowed = 0;  // bytes from the beginning; received <= allowed
   friend bool operator==(const VolumeCredit&, const VolumeCredit&) = default;
 };

@@ -15,8 +15,9 @@
 
 #include "common/base/check.h"
 #include "common/base/status.h"
+#include "common/frame/dataset_id.h"
 #include "common/volume/layers.h"
-#include "common/wire/control_messages.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 
 namespace slabstream {
@@ -29,7 +30,7 @@ constexpr bool IsCellChunk(std::uint32_t chunk) { return chunk >= kFirstCellChun
 // Cells of a box that take so many bytes, in [1, kMaxCellBytes].
 constexpr std::uint32_t CellChunkCount(std::uint64_t cell_bytes) { return std::uint32_t((cell_bytes + kChunkBytes - 1) / kChunkBytes); }
 constexpr std::uint64_t BeginOfCellChunk(std::uint32_t chunk) { return std::uint64_t{chunk - kFirstCellChunk} * kChunkBytes; }
-// Of a chunk below kFirstCellChunk + CellChunkCount.
+// Bytes of a chunk below kFirstCellChunk + CellChunkCount.
 constexpr std::uint32_t BytesOfCellChunk(std::uint64_t cell_bytes, std::uint32_t chunk) {
   return std::uint32_t(std::min<std::uint64_t>(kChunkBytes, cell_bytes - BeginOfCellChunk(chunk)));
 }
@@ -41,7 +42,7 @@ struct ChunkPart {
   std::uint32_t bytes = 0;
 };
 
-// Of the samples.
+// Chunks of the samples.
 inline std::uint32_t ChunkCount(const Box& box, const SampleTypes& types) {
   std::uint64_t count = 0;
   for (const Layer layer : kLayers) {
@@ -51,9 +52,9 @@ inline std::uint32_t ChunkCount(const Box& box, const SampleTypes& types) {
   }
   return std::uint32_t(count);
 }
-// Of a chunk below ChunkCount.
+// The part of the samples that is in a chunk below ChunkCount.
 inline ChunkPart PartOfChunk(const Box& box, const SampleTypes& types, std::uint32_t chunk) {
-  std::uint64_t before = std::uint64_t{chunk} * kChunkBytes;  // of this layer and those that follow
+  std::uint64_t before = std::uint64_t{chunk} * kChunkBytes;  // bytes before the chunk in this layer and those that follow
   for (const Layer layer : kLayers) {
     const auto type = types.Of(layer);
     if (!type) continue;
@@ -86,7 +87,7 @@ struct Chunk {  // payload: the packed samples or cells
   std::uint32_t raw_bytes = 0;      // after unpacking, [1, kChunkBytes]
   std::uint32_t encoded_bytes = 0;  // length of the payload frame
   std::uint64_t digest = 0;         // XXH3-64 of the unpacked bytes
-  std::uint64_t cell_bytes = 0;     // of a chunk of cells: of all cells of the box, [1, kMaxCellBytes]; else 0
+  std::uint64_t cell_bytes = 0;     // for a chunk of cells: bytes of all cells of the box, [1, kMaxCellBytes]; else 0
   std::uint64_t stored_bytes = 0;   // VolumeSource::TakeStoredBytes of whoever has read the dataset
   friend bool operator==(const Chunk&, const Chunk&) = default;
 };

@@ -8,28 +8,13 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/stats/probe_results.h"
 #include "common/view/clip.h"
 #include "common/volume/bricks.h"
 #include "common/volume/layers.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
-
-struct BoxStatistics {
-  std::uint64_t voxels = 0;      // finite ones whose centres lie in the box or on its sides
-  std::uint64_t non_finite = 0;  // the others there
-  // Of the data values of `voxels`; 0 if there are none.
-  double mean = 0;
-  double deviation = 0;  // standard deviation: the root of the mean squared difference from the mean
-  double least = 0, largest = 0;
-  friend bool operator==(const BoxStatistics&, const BoxStatistics&) = default;
-};
-
-struct LabelStatistics {
-  Label label;
-  BoxStatistics statistics;
-  friend bool operator==(const LabelStatistics&, const LabelStatistics&) = default;
-};
 
 // Whole numbers that stored samples round, of all voxels of a volume, x fastest.
 struct WholeNumbers {
@@ -39,7 +24,7 @@ struct WholeNumbers {
 };
 
 struct MeasuredVolume {
-  VoxelBricks voxels;  // of the whole volume
+  VoxelBricks voxels;  // all voxels of the volume
   const VolumeDescription& description;
   std::optional<WholeNumbers> exact = {};  // in place of `voxels`
 };

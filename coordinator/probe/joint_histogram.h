@@ -1,5 +1,4 @@
-// JointHistogram: how often which value occurs together with which slope (the gradient's magnitude), for the editor of two-dimensional
-// transfer functions (Kindlmann and Durkin 1998).
+// Counts how often which value occurs together with which slope: a JointHistogram.
 #pragma once
 
 #include <cstdint>
@@ -7,20 +6,12 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/stats/probe_results.h"
 #include "common/volume/bricks.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
-
-inline constexpr int kJointValues = 128, kJointSlopes = 64;
-
-struct JointHistogram {
-  double steepest = 0;  // the greatest slope counted: data values per unit of the world
-  // [value][slope]: voxels in equal bins of values over the range of the volume, and of square roots of slopes up to the steepest.
-  std::vector<std::uint64_t> counts = std::vector<std::uint64_t>(std::size_t{kJointValues} * kJointSlopes);
-  friend bool operator==(const JointHistogram&, const JointHistogram&) = default;
-};
 
 // Returns all voxels of a box that lies in the volume. The first error ends the count.
 using ReadJointBox = std::function<Result<VoxelBlock>(const Box& box)>;

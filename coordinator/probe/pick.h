@@ -1,11 +1,11 @@
-// Pick: the point of the world that a pixel of a picture shows. It lies on the pixel's ray through the drawn part of the volume. By the
-// renderer's PickRule it is
-//   where renderers gather opacity (kHalfOpacity)     the first point up to which the ray has met opacity of one half or more: the
-//   opacities
-//                                                     of the transfer function at trilinear samples, isosurfaces, and labels as the frame
-//                                                     shows them. None if the whole ray meets less
-//   of opaque voxels (kSurface)                       where the ray enters the first opaque voxel, as its pictures have it
-//   of the largest or the least value                 the nearest sample with that value
+// Pick: the point of the world that a pixel of a picture shows. It lies on the pixel's ray through the drawn part of the
+// volume. The renderer's PickRule says which point:
+//   kHalfOpacity (renderers that gather opacity)      the first point up to which the ray has met an opacity of one half
+//                                                     or more, from the transfer function at trilinear samples, from
+//                                                     isosurfaces, and from labels as the frame shows them. None if the
+//                                                     whole ray meets less
+//   kSurface (renderers of opaque voxels)             where the ray enters the first opaque voxel of its pictures
+//   the largest or the least value                    the nearest sample with that value
 // Overlays do not count. Opacity is gathered in quarters of the least spacing, and the last step is divided further, so the point does not
 // depend on the renderer's own samples. Light does not matter. The footprints of splatting are wider than these samples, so where its
 // matter ends it may show some where nothing is picked.

@@ -5,11 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "common/stats/probe_results.h"
 #include "common/volume/bricks.h"
 #include "common/volume/exact_value.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
-#include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
 
@@ -18,7 +18,7 @@ class ProbedVoxels {
  public:
   ProbedVoxels(const VoxelBricks& voxels)  // NOLINT(google-explicit-constructor): voxels in memory are probed, too
       : size_(voxels.box().end), held_(voxels) {}
-  using Find = std::function<double(const Index3& voxel)>;  // of a voxel inside the volume
+  using Find = std::function<double(const Index3& voxel)>;  // the stored sample of a voxel inside the volume
   ProbedVoxels(const Index3& size, Find find) : size_(size), find_(std::move(find)) {}
 
   const Index3& size() const { return size_; }
@@ -37,7 +37,7 @@ struct ProbeVolume {
   // The data value of a voxel inside the volume, where its stored sample may be rounded. Null: it never is.
   std::function<ExactValue(const Index3& voxel)> exact = nullptr;
 
-  // Of a voxel inside the volume. Stored samples of a layer are numbers of labels and data values.
+  // The stored sample of a voxel inside the volume. Samples of layers are numbers of labels and data values.
   double StoredAt(const Index3& voxel) const;
   std::uint32_t LabelNumberAt(const Index3& voxel) const;  // 0: none, or no labels
 

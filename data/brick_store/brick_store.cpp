@@ -15,7 +15,6 @@
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
 #include "data/open/unchanged_source.h"
-#include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 
@@ -25,20 +24,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // The description of the stream, and the voxels of the store, which is in use meanwhile.
-class StoredSource : public VolumeSource {
+class StoredSource : public DescribedSource {
  public:
   StoredSource(SourceInfo info, std::shared_ptr<VolumeSource> bricks, StoreFolder::Lock in_use)
-      : info_(std::move(info)), bricks_(std::move(bricks)), in_use_(std::move(in_use)) {}
-
-  const SourceInfo& info() const override { return info_; }
-  Counts counts() const override { return bricks_->counts(); }
-  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
-    bricks_->Read(level, box, out, std::move(stop), std::move(done));
-  }
+      : DescribedSource(std::move(bricks), std::move(info)), in_use_(std::move(in_use)) {}
 
  private:
-  const SourceInfo info_;
-  const std::shared_ptr<VolumeSource> bricks_;
   const StoreFolder::Lock in_use_;
 };
 
@@ -62,6 +53,7 @@ Result<StoredStream> OpenStore(const std::string& path, SourceInfo stream, const
   if (!bricks.ok()) return bricks.status();
   const VolumeDescription whole = stream.levels.front().description;
   stream.levels = (*bricks)->info().levels;
+  stream.slices.reset();
   stream.version = (*bricks)->info().version;  // of what workers find there
   const VolumeDescription& stored = stream.levels.front().description;
   if (stored.type != whole.type || stored.geometry.size != whole.geometry.size) {
@@ -78,7 +70,7 @@ Result<StoredStream> OpenStore(const std::string& path, SourceInfo stream, const
 // Writes the store; whoever calls holds it alone.
 class StoreWriter {
  public:
-  StoreWriter(const StoreFolder& stores, std::string name, std::string file, SliceStream& stream, const BrickStoreOptions& options)
+  StoreWriter(const StoreFolder& stores, std::string name, std::string file, VolumeSource& stream, const BrickStoreOptions& options)
       : stores_(stores), name_(std::move(name)), file_(std::move(file)), stream_(stream), options_(options) {}
 
   Status Write(const StoreFolder::Lock& alone) {
@@ -110,7 +102,7 @@ class StoreWriter {
   // Slabs as thick as memory allows. The levels are the same, however thick.
   Result<OmeZarrOptions> Layout() const {
     constexpr std::array<std::int32_t, 4> kChunkSides = {64, 32, 16, 8};
-    OmeZarrOptions layout{.slices = SliceOrder{stream_.along(), stream_.from_end()},
+    OmeZarrOptions layout{.slices = stream_.info().slices,
                           .coarsest_side = kChunkSides.front(),
                           .codec_level = 1,  // twice as fast as the usual one, and little larger
                           .memory = options_.memory,
@@ -154,18 +146,11 @@ class StoreWriter {
 
   const StoreFolder& stores_;
   const std::string name_, file_;
-  SliceStream& stream_;
+  VolumeSource& stream_;
   const BrickStoreOptions& options_;
 };
 
 }  // namespace
-
-Result<std::optional<SourceInfo>> DescribeStream(const std::string& path, const ReadOptions& options) {
-  if (!SliceStream::Recognises(path, options)) return std::optional<SourceInfo>();
-  const auto stream = SliceStream::Open(path, options, nullptr);
-  if (!stream.ok()) return stream.status();
-  return std::optional((*stream)->info());
-}
 
 Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& stores, const SourceContext& context,
                                 const BrickStoreOptions& options, ReadProgress* progress) {
@@ -173,9 +158,10 @@ Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& st
   if (!text.ok()) return text.status();
   text->options.progress = progress;
   text->options.describe = true;
-  const Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(text->path, text->options, context);
+  const Result<std::shared_ptr<VolumeSource>> stream = OpenSource(text->path, text->options, context);
   if (!stream.ok()) return stream.status();
   const SourceInfo& info = (*stream)->info();
+  if (!info.slices) return Status::InvalidArgument(text->path + ": is no compressed stream");
   const Result<std::string> name = NameOf(*text, source, info);
   if (!name.ok()) return name.status();
   StoreWriter writer(stores, *name, text->path, **stream, options);

@@ -10,13 +10,13 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <stop_token>
 #include <string>
 
 #include "common/base/status.h"
 #include "data/brick_store/store_folder.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
 
@@ -25,7 +25,7 @@ struct StoredStream {
   // so memory, which decides whether smaller ones are stored, never decides what there is to see. The store is in use as long as this is
   // there.
   std::shared_ptr<VolumeSource> source;
-  std::string path;  // of the OME-Zarr
+  std::string path;  // the path of the OME-Zarr
 };
 
 struct BrickStoreOptions {
@@ -33,13 +33,10 @@ struct BrickStoreOptions {
   std::stop_token stop = {};
 };
 
-// What the header says if `path` is a compressed stream. Null: it is not.
-Result<std::optional<SourceInfo>> DescribeStream(const std::string& path, const ReadOptions& options);
-
 // `source`: the text of a source (ParseSourceText) that is such a stream. `progress`, if any, counts what is read of the stream.
 // Unavailable: the store cannot be written, as where there is no room; in one line that names the place, the bytes that are needed and
-// those that are available; or the file changes meanwhile. ResourceExhausted: `memory` is too small. Cancelled. Errors of SliceStream.
-// Of a failure nothing stays; of what was stopped, all that was written.
+// those that are available; or the file changes meanwhile. ResourceExhausted: `memory` is too small. Cancelled. Errors of OpenSource;
+// InvalidArgument: it is no stream. Of a failure nothing stays; of what was stopped, all that was written.
 Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& stores, const SourceContext& context,
                                 const BrickStoreOptions& options, ReadProgress* progress = nullptr);
 

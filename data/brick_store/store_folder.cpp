@@ -9,8 +9,8 @@
 #include <system_error>
 #include <vector>
 
-#include "common/base/cache_folder.h"
-#include "common/base/files.h"
+#include "common/files/cache_folder.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 namespace {

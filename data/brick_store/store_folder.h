@@ -4,16 +4,16 @@
 //               and how many bytes, so that a store of which somebody has removed a part is not used
 //   NAME.lock   whoever uses the store holds it shared, whoever writes or removes it holds it alone; its time is that of the last use
 //
-// Locks are those of common/base/file_lock.h. The folder and all in it are for this user alone (cache_folder.h). Any thread.
+// Locks are those of common/files/file_lock.h. The folder and all in it are for this user alone (cache_folder.h). Any thread.
 #pragma once
 
 #include <cstdint>
 #include <stop_token>
 #include <string>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/file_lock.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/file_lock.h"
 
 namespace slabstream {
 
@@ -29,7 +29,7 @@ class StoreFolder {
   const std::string& path() const { return path_; }
   std::string PathOf(const std::string& name) const { return path_ + "/" + name; }
 
-  // Of a store, until it is destroyed.
+  // A lock of a store, held until it is destroyed.
   using Lock = FileDescriptor;
   // Waits until nobody writes the store, and notes that it is used. Errors of MakeOwnFolder and LockFile.
   Result<Lock> LockShared(const std::string& name, const std::stop_token& stop = {}) const;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 

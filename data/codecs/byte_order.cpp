@@ -2,7 +2,7 @@
 #include <bit>
 #include <cstring>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 

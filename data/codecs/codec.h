@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 

@@ -44,9 +44,9 @@ SharedCodec ShuffleCodec(std::size_t element_bytes);
 SharedCodec BitshuffleCodec(std::size_t element_bytes, std::size_t block_elements);
 // Blocks that are packed one by one in the frame of the LZ4 filter of HDF5, and of its bitshuffle filter, which shuffles before it packs.
 struct BlockFormat {
-  SharedCodec packing;  // of a block
+  SharedCodec packing;  // packs one block
   bool bitshuffle = false;
-  std::size_t element_bytes = 1;  // of what is shuffled
+  std::size_t element_bytes = 1;  // bytes of an element of what is shuffled
 };
 SharedCodec BlocksCodec(const BlockFormat& format);
 

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/decoded_bytes.h"
 
 namespace slabstream {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 

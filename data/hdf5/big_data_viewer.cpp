@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
+#include "common/text/parse_number.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
 #include "data/sources/view_setups.h"

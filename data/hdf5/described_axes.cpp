@@ -39,7 +39,7 @@ Result<bool> TakeAxistags(Hdf5File& file, const std::string& path, ImageDescript
   const std::optional<std::string> text = file.Text(path, "axistags");
   if (!text) return false;
   const std::string named = file.Named(path) + ": axistags";
-  const Result<metadata::Json> json = metadata::ParseJson(named, *text);
+  const Result<Json> json = metadata::ParseJson(named, *text);
   if (!json.ok()) return json.status();
   const metadata::Field axes = metadata::Field(named, *json)["axes"];
   if (axes.size() != image.axes.size()) return axes.Wrong(fmt::format("a list of {} axes, as the dataset has", image.axes.size()));

@@ -7,7 +7,7 @@
 #include "common/base/status.h"
 #include "data/hdf5/hdf5_file.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 
 namespace slabstream {
 

@@ -11,7 +11,7 @@
 #include <new>
 #include <type_traits>
 
-#include "common/base/file_descriptor.h"
+#include "common/files/file_descriptor.h"
 
 namespace slabstream {
 namespace {

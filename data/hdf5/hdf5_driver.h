@@ -17,7 +17,7 @@
 namespace slabstream {
 
 struct Hdf5Place {
-  std::uint64_t begin = 0, bytes = 0;  // of the file
+  std::uint64_t begin = 0, bytes = 0;  // a piece of the file
 };
 
 // Lets `access`, a file access property list, open the file behind `descriptor`, of which the library takes a duplicate.

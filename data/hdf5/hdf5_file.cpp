@@ -12,9 +12,9 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/natural_order.h"
 #include "common/base/printable.h"
+#include "common/files/file_descriptor.h"
+#include "common/text/natural_order.h"
 #include "data/hdf5/hdf5_driver.h"
 #include "data/hdf5/hdf5_library.h"
 

@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/sources/chunked_array.h"
 
 namespace slabstream {
@@ -51,8 +51,8 @@ class Hdf5File : public std::enable_shared_from_this<Hdf5File> {
 
   // Paths of datasets. Follows no links but hard ones, and looks at kMostNames objects at most.
   struct Found {
-    std::vector<std::string> paths;   // of those of at least `axes` axes, sorted
-    std::vector<std::string> closed;  // of objects that cannot be opened
+    std::vector<std::string> paths;   // paths of datasets with at least `axes` axes, sorted
+    std::vector<std::string> closed;  // paths of objects that cannot be opened
   };
   Found Datasets(int axes);
 
@@ -100,7 +100,7 @@ class Hdf5Dataset {
   const std::vector<std::uint64_t>& size() const { return size_; }
   SampleType type() const { return type_; }
   bool big_endian() const { return big_endian_; }
-  bool enumeration() const { return enumeration_; }  // of more than truth values, which are uint8
+  bool enumeration() const { return enumeration_; }  // an enumeration of more than truth values, which are uint8
   Layout layout() const { return layout_; }
   const std::vector<std::byte>& fill() const { return fill_; }  // one element, in this machine's byte order
 

@@ -1,6 +1,5 @@
 #include "data/hdf5/hdf5_format.h"
 
-#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
@@ -13,8 +12,6 @@ namespace {
 bool IsHdf5(const std::string& path, const ReadOptions&) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;
-  constexpr std::array<std::string_view, 7> kEndings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"};
-  if (std::ranges::any_of(kEndings, [&](std::string_view ending) { return path.ends_with(ending); })) return true;
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   std::array<char, kSignature.size()> first{};
   return std::ifstream(path, std::ios::binary).read(first.data(), first.size()) &&
@@ -29,6 +26,12 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 
 }  // namespace
 
-SourceFormat Hdf5() { return {.name = "HDF5", .recognises = IsHdf5, .options = {"time", "channel", "dataset"}, .open = Open}; }
+VolumeFormat Hdf5() {
+  return {.name = "HDF5",
+          .endings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"},
+          .recognises = IsHdf5,
+          .options = {"time", "channel", "dataset"},
+          .open = Open};
+}
 
 }  // namespace slabstream

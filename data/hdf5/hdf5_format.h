@@ -6,13 +6,13 @@
 
 #include "common/base/status.h"
 #include "data/sources/chunked_source.h"
-#include "data/sources/source_format.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 
-SourceFormat Hdf5();
+VolumeFormat Hdf5();
 
-// What the format opens a source of. Errors of SourceFormat::open.
+// What the format opens a source of. Errors of VolumeFormat::open.
 Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context);
 
 }  // namespace slabstream

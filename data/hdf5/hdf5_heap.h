@@ -22,7 +22,8 @@ struct Hdf5HeapPlace {
   std::uint32_t number = 0;
 };
 
-// Of each value of an attribute that holds `count` texts or lists of any length. nullopt: they cannot be told.
+// Where each value of an attribute lies that holds `count` texts or lists of any length. nullopt: the places cannot be
+// told.
 std::optional<std::vector<Hdf5HeapPlace>> Hdf5HeapPlaces(hid_t attribute, std::size_t count);
 
 // The bytes of a value, of which each element has so many; no more than `most`. nullopt: the file has fewer there, or the heap is damaged.

@@ -141,12 +141,9 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   pyramid.info = {.format = image->format,
                   .file_type = stored_type,
                   .labels = image->labels,
-                  .channel = choice->channel,
-                  .times = choice->times,
-                  .time = choice->time,
                   .notes = std::move(image->notes),
                   .files = {file->path()}};
-  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
+  choice->Describe(pyramid.info);
   pyramid.info.notes.insert(pyramid.info.notes.begin(), NoteOfAxes(*image, *kinds));
   return pyramid;
 }

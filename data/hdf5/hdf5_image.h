@@ -17,14 +17,14 @@ namespace slabstream {
 
 struct ImageAxis {
   std::string name = {};                // as AxisNamed knows them ("z"), or any other; "": it has none
-  double step = 1, start = 0;           // of x, y and z: voxel i lies at start + i * step along `direction`, of `unit`
+  double step = 1, start = 0;           // for x, y and z: voxel i lies at start + i * step along `direction`, in `unit`
   std::optional<Vec3> direction = {};   // in the world; none: that of the world's axis of this name
   std::optional<LengthUnit> unit = {};  // if the file states one that is known
 };
 
 struct ImageDescription {
   std::string format = "HDF5";
-  std::vector<ImageAxis> axes = {};  // of the dataset, the slowest first
+  std::vector<ImageAxis> axes = {};  // the dataset's axes, the slowest first
   std::string axes_from = {};        // what names them, for a note: "axistags"; "": nothing does, so their order decides
   World world = World::kVoxels;      // kVoxels: only lengths are known
   Vec3 origin = {};

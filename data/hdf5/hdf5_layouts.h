@@ -7,13 +7,14 @@
 #include "common/base/status.h"
 #include "data/hdf5/hdf5_file.h"
 #include "data/sources/chunked_source.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
 struct Hdf5Layout {
   bool (*recognises)(Hdf5File& file) = nullptr;
-  // Errors of SourceFormat::open.
+  // Errors of VolumeFormat::open.
   Result<Pyramid> (*read)(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) = nullptr;
 };
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/log.h"
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
 #include "data/volume_io/chosen_channel.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 

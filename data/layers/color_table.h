@@ -26,7 +26,8 @@ struct ColorTable {
     friend bool operator==(const Entry&, const Entry&) = default;
   };
   std::map<std::uint32_t, Entry> entries;  // by the value of a label; that of 0, no label, does not matter
-  std::vector<LabelColor> sequence = {};   // of labels without an entry: of the values 1, 2, 3 and so on, over and over again
+  // Colours for labels without an entry: for the values 1, 2, 3 and so on, over and over again.
+  std::vector<LabelColor> sequence = {};
   friend bool operator==(const ColorTable&, const ColorTable&) = default;
 };
 

@@ -3,16 +3,14 @@
 // those of the values 1, 2, 3 and so on.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <optional>
 
-#include "common/base/parse_number.h"
+#include "common/json/json.h"
+#include "common/text/parse_number.h"
 #include "data/layers/color_table.h"
 
 namespace slabstream::indexed_colors {
 namespace {
-
-using Json = nlohmann::json;
 
 bool Recognises(std::string_view file) {
   const std::size_t first = file.find_first_not_of(" \t\r\n");
@@ -37,7 +35,7 @@ Result<std::vector<LabelColor>> ReadColors(const Json& preset) {
 // "12" and "12.0" are label 12.
 std::optional<std::uint32_t> LabelOf(const Json& text) {
   if (!text.is_string()) return std::nullopt;
-  const auto value = ParseNumber<double>(text.get_ref<const std::string&>());
+  const auto value = ParseNumber<double>(text.text());
   if (!value || !(*value >= 0 && *value <= kMaxLabelValue) || *value != double(std::uint32_t(*value))) return std::nullopt;
   return std::uint32_t(*value);
 }
@@ -61,21 +59,17 @@ Result<ColorTable> ReadPreset(const Json& preset) {
     if (!value)
       return Status::InvalidArgument(fmt::format("Annotations[{}] is not a whole number in [0, {}] as a text", i, kMaxLabelValue));
     if (!pairs[i + 1].is_string()) return Status::InvalidArgument(fmt::format("Annotations[{}] is not a text", i + 1));
-    const bool added = table.entries.emplace(*value, ColorTable::Entry{(*colors)[i / 2 % colors->size()], pairs[i + 1]}).second;
+    const bool added = table.entries.emplace(*value, ColorTable::Entry{(*colors)[i / 2 % colors->size()], pairs[i + 1].text()}).second;
     if (!added) return Status::InvalidArgument(fmt::format("Annotations[{}]: label {} is given before", i, *value));
   }
   return table;
 }
 
 Result<ColorTable> Read(std::string_view file) {
-  Json document;
-  try {
-    document = Json::parse(file);
-  } catch (const Json::exception& error) {
-    return Status::InvalidArgument("not JSON: " + std::string(error.what()));
-  }
-  if (document.is_array() && document.empty()) return Status::InvalidArgument("the array is empty");
-  return ReadPreset(document.is_array() ? document.front() : document);
+  const Result<Json> document = Json::Parse(file);
+  if (!document.ok()) return document.status();
+  if (document->is_array() && document->empty()) return Status::InvalidArgument("the array is empty");
+  return ReadPreset(document->is_array() ? document->front() : *document);
 }
 
 }  // namespace

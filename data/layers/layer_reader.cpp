@@ -14,14 +14,14 @@
 #include <unordered_map>
 #include <utility>
 
-#include "common/base/files.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
-#include "common/base/utf8.h"
+#include "common/files/files.h"
+#include "common/text/parse_number.h"
+#include "common/text/utf8.h"
 #include "common/volume/memory_budget.h"
 #include "data/layers/color_table.h"
 #include "data/layers/layer_sampling.h"
-#include "data/open/any_volume.h"
+#include "data/open/read_volume.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/read_options.h"
 
@@ -221,7 +221,7 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
   source->options.labels = true;
   Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
-  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
+  const Result<LoadedVolume> read = ReadVolume(source->path, source->options, true);
   if (!read.ok()) return read.status();
   if (*colors == ColorTable{}) colors = TableOf(read->info.looks);
   Result<Layers> made = LabelLayer(*read, *colors, grid, source->path);
@@ -234,9 +234,9 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
 Status AddOverlay(const std::string& file, const VolumeGeometry& grid, Layers& layers) {
   const Result<SourceText> source = ParseSourceText(file);
   if (!source.ok()) return source.status();
-  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
+  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
-  if (Status status = CheckSameWorld(read->info.description.geometry, grid); !status.ok()) {
+  if (Status status = CheckSameWorld(read->info.finest().geometry, grid); !status.ok()) {
     return Status(status.code(), source->path + ": " + status.message());
   }
   const VolumeDescription description{.geometry = grid, .type = ScalarType::kFloat32, .mapping = {}};
@@ -269,7 +269,7 @@ Result<std::vector<std::string>> CheckLayerHeaders(const LayerFiles& files) {
   const auto check = [&](const std::string& text, std::string_view what) {
     const Result<SourceText> source = ParseSourceText(text);
     if (!source.ok()) return Prefixed(what, source.status());
-    const Result<std::vector<std::string>> read = CheckAnyVolumeHeaders(source->path, source->options);
+    const Result<std::vector<std::string>> read = CheckVolumeHeaders(source->path, source->options);
     if (!read.ok()) return Prefixed(what, read.status());
     all.insert(all.end(), read->begin(), read->end());
     return Status::Ok();

@@ -1,11 +1,11 @@
 #include "data/layers/layer_sampling.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -43,7 +43,7 @@ template <class Set>
 void ForEachVoxel(const VolumeGeometry& grid, const VolumeGeometry& layer, Set&& set) {
   const LayerFromGrid layer_from_grid(grid, layer);
   const Index3 size = grid.size;
-  tbb::parallel_for(0, size.z, [&](std::int32_t z) {
+  ParallelFor(0, size.z, [&](std::int32_t z) {
     std::size_t offset = std::size_t(z) * std::size_t(size.x) * std::size_t(size.y);
     for (Index3 v = {0, 0, z}; v.y < size.y; ++v.y) {
       for (v.x = 0; v.x < size.x; ++v.x) set(offset++, layer_from_grid.At(v));

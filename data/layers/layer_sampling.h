@@ -12,8 +12,8 @@
 
 namespace slabstream {
 
-// The numbers, uint16, of the voxels nearest to those of `grid`, as `type`, kUint8 or kUint16, which holds them; 0 outside. Of two voxels
-// equally near, the one with the higher index.
+// The numbers, uint16, of the voxels nearest to those of `grid`, as `type`, kUint8 or kUint16, which holds them; 0
+// outside. If two voxels are equally near, the one with the higher index counts.
 VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, const VoxelBlock& numbers, ScalarType type);
 
 // Data values as float32, by trilinear interpolation; between the outermost voxels' centres and the layer's border the outermost value. NaN

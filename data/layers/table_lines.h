@@ -17,16 +17,16 @@ class TableLines {
 
   // False at the end.
   bool Next();
-  int number() const { return number_; }  // of the line, from 1
+  int number() const { return number_; }  // the line's number, from 1
   const std::vector<std::string_view>& words() const { return words_; }
   // The line's text from word `first` on, without quotation marks around it.
   std::string From(std::size_t first) const;
 
   // InvalidArgument, naming the line.
   Status Wrong(const std::string& why) const;
-  // Of a label: a whole number in [0, kMaxLabelValue].
+  // The value of a label: a whole number in [0, kMaxLabelValue].
   Result<std::uint32_t> Value(std::size_t word) const;
-  // Of words `first` to `first` + 2, each in [0, greatest].
+  // The colour that words `first` to `first` + 2 state, each in [0, greatest].
   Result<LabelColor> Color(std::size_t first, float greatest) const;
   // Adds the line's label: its value is the first word, its colour the three from `color_word` on, each in [0, greatest]. InvalidArgument:
   // of Value or Color, or there is one of this value already, or there are too many.

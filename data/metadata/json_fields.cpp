@@ -12,8 +12,6 @@
 namespace slabstream::metadata {
 namespace {
 
-constexpr int kMostDepth = 64;
-
 // Python's json writes numbers that JSON does not have: NaN, Infinity, -Infinity. Here they become texts of the same name.
 std::string WithNumbersAsTexts(std::string_view text) {
   static constexpr std::string_view kNumbers[] = {"NaN", "-Infinity", "Infinity"};
@@ -34,15 +32,9 @@ std::string WithNumbersAsTexts(std::string_view text) {
 }  // namespace
 
 Result<Json> ParseJson(const std::string& object, std::string_view text) {
-  bool too_deep = false;
-  const auto keep = [&](int depth, Json::parse_event_t, const Json&) {
-    too_deep = too_deep || depth > kMostDepth;
-    return !too_deep;
-  };
-  Json json = Json::parse(text, keep, false);
-  if (json.is_discarded() && !too_deep) json = Json::parse(WithNumbersAsTexts(text), keep, false);
-  if (too_deep) return Status::DataLoss(fmt::format("{}: values nest more than {} deep", object, kMostDepth));
-  if (json.is_discarded()) return Status::DataLoss(object + ": damaged: not JSON");
+  Result<Json> json = Json::Parse(text);
+  if (!json.ok()) json = Json::Parse(WithNumbersAsTexts(text));
+  if (!json.ok()) return Status::DataLoss(fmt::format("{}: damaged: {}", object, json.status().message()));
   return json;
 }
 
@@ -62,12 +54,7 @@ std::string Join(std::string_view path, std::string_view name) {
 
 Field Field::operator[](std::string_view name) const {
   std::string place = place_.empty() ? std::string(name) : fmt::format("{}.{}", place_, name);
-  const Json* member = nullptr;
-  if (is_object()) {
-    const auto found = value_->find(name);
-    if (found != value_->end()) member = &*found;
-  }
-  return {object_, std::move(place), member};
+  return {object_, std::move(place), given() ? value_->find(name) : nullptr};
 }
 
 Field Field::operator[](std::size_t number) const {
@@ -76,7 +63,7 @@ Field Field::operator[](std::size_t number) const {
 
 Result<std::string> Field::Text() const {
   if (!is_text()) return Wrong("a text");
-  return value_->get_ref<const std::string&>();
+  return value_->text();
 }
 
 Result<double> Field::Number() const {
@@ -106,7 +93,7 @@ Result<std::vector<std::uint64_t>> Field::Counts(std::size_t axes) const {
 
 Status Field::Wrong(std::string_view must_be) const {
   constexpr std::size_t kMostShown = 80;
-  std::string shown = value_ == nullptr ? "missing" : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string shown = value_ == nullptr ? "missing" : value_->dump();
   if (shown.size() > kMostShown) shown = shown.substr(0, kMostShown) + "...";
   const std::string place = place_.empty() ? "the whole" : place_;
   return Printable(Status::InvalidArgument(fmt::format("{}: {} is {}, must be {}", object_, place, shown, must_be)));

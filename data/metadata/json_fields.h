@@ -4,18 +4,16 @@
 
 #include <cstdint>
 #include <future>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/json/json.h"
 #include "data/stores/store.h"
 
 namespace slabstream::metadata {
-
-using Json = nlohmann::json;
 
 inline constexpr std::uint64_t kMostElements = std::uint64_t{1} << 53;  // along an axis: whole numbers that every writer of JSON keeps
 
@@ -50,7 +48,7 @@ class Field {
   bool is_array() const { return given() && value_->is_array(); }
   bool is_text() const { return given() && value_->is_string(); }
   std::size_t size() const { return given() ? value_->size() : 0; }
-  const Json& value() const { return *value_; }          // of one that is stated
+  const Json& value() const { return *value_; }          // the value; the field must be stated
   const std::string& object() const { return object_; }  // "/data/scan.zarr/zarr.json"
 
   Field operator[](std::string_view name) const;  // not stated if this is no object

@@ -1,23 +1,35 @@
-// The store of a source.
+// The store of a source, and sources in stores.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 #include <string>
 
-#include "data/sources/source_format.h"
+#include "data/sources/chunked_source.h"
+#include "data/sources/read_context.h"
 #include "data/stores/store.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
-// The store that the options hold, else a folder whose links are followed if they say so, else OpenStore for sources of this context.
-inline Result<std::shared_ptr<Store>> OpenStoreFor(const SourceContext& context, const std::string& path, const ReadOptions& options) {
+// The store that the options hold, else a folder whose links are followed if they say so, else OpenStore.
+inline Result<std::shared_ptr<Store>> OpenStoreFor(const std::string& path, const ReadOptions& options) {
   if (options.store != nullptr) return options.store;
   if (std::error_code error; options.follow_links && std::filesystem::is_directory(path, error))
     return FolderStore(path, Links::kMayLeadOut);
-  const auto kept = context->only_keeps() ? WebOptions::Kept::kAreTaken : WebOptions::Kept::kAreChecked;
-  return OpenStore(path, {.kept = kept, .query = options.query, .headers = options.headers});
+  return OpenStore(path, {.query = options.query, .headers = options.headers});
+}
+
+using OpenPyramidFunction = Result<Pyramid> (*)(const std::shared_ptr<Store>& store, const ReadOptions& options,
+                                                const SourceContext& context);
+// VolumeFormat::open of a format of chunks in a store.
+template <OpenPyramidFunction kOpen>
+Result<std::shared_ptr<VolumeSource>> OpenInStore(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(path, options);
+  if (!store.ok()) return store.status();
+  Result<Pyramid> pyramid = kOpen(*store, options, context);
+  if (!pyramid.ok()) return pyramid.status();
+  return MakeChunkedSource(path, *std::move(pyramid), context);
 }
 
 }  // namespace slabstream

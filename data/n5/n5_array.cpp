@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 #include "data/sources/decode_chunk.h"

@@ -8,7 +8,7 @@
 #include "common/base/status.h"
 #include "data/metadata/json_fields.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/stores/store.h"
 
 namespace slabstream::n5 {

@@ -24,10 +24,10 @@ Result<std::vector<std::string>> AxisNames(const metadata::Field& own, const met
 
 struct Place {
   Vec3 spacing = {1, 1, 1};         // each > 0, finite
-  std::optional<Vec3> origin = {};  // of the first voxel's centre, if the attributes state it
+  std::optional<Vec3> origin = {};  // the first voxel's centre, if the attributes state it
   std::optional<LengthUnit> unit = {};
   bool of_level = false;       // it is that of this level, not of the finest one
-  std::string attribute = {};  // that says so
+  std::string attribute = {};  // the attribute that says so
 };
 
 // None: they say nothing of it. InvalidArgument: a transform that is wrong, or whose axes have different units; names the field.

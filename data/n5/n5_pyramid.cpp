@@ -1,6 +1,5 @@
-// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), channels of these (c0,
-// c1,
-// ...), or datasets. Sources:
+// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...),
+// channels of these (c0, c1, ...), or datasets. Sources:
 // https://github.com/saalfeldlab/n5-viewer#metadata, https://github.com/bigdataviewer/bigdataviewer-core (N5ImageLoader)
 #include "data/n5/n5_pyramid.h"
 
@@ -12,9 +11,9 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/natural_order.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
+#include "common/text/natural_order.h"
+#include "common/text/parse_number.h"
 #include "data/n5/n5_array.h"
 #include "data/n5/n5_place.h"
 #include "data/sources/axis_choice.h"
@@ -27,7 +26,6 @@ namespace {
 
 using metadata::Field;
 using metadata::Join;
-using metadata::Json;
 
 constexpr std::size_t kMostLevels = 64;
 
@@ -231,11 +229,7 @@ Status Container::AddLevel(Pyramid& pyramid, const Node& node, const Node& group
   if (!kinds.ok()) return kinds.status();
   const Result<AxisChoice> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
   if (!choice.ok()) return choice.status();
-  const auto time = std::ranges::find(*kinds, AxisKind::kTime);
-  pyramid.info.times = choice->times;
-  pyramid.info.time = time == kinds->end() ? 0 : int(choice->at[std::size_t(time - kinds->begin())]);
-  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
-  pyramid.info.channel = choice->channel;
+  choice->Describe(pyramid.info);
   pyramid.levels.push_back({.array = *array, .axes = choice->axes, .at = choice->at});
   return Status::Ok();
 }

@@ -1,7 +1,6 @@
-// --cache: what web servers send is kept on disk (data/stores/object_cache.h). Of all programs that read volumes.
+// --cache: what web servers send is kept on disk (data/stores/object_cache.h). All programs that read volumes have it.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,11 +11,11 @@
 namespace slabstream {
 
 // `bytes`: the budget. 0 if the option is not there.
-inline CLI::Option* AddCacheOption(CLI::App& app, std::uint64_t& bytes) {
+inline Option AddCacheOption(const Command& app, std::uint64_t& bytes) {
   return AddParsed(app, "--cache", bytes, ParseMemoryLimit,
                    "Keep on disk what web servers send of volumes, in at most so many bytes: 10G or 512M. The processes of a user share it")
-      ->type_name("SIZE")
-      ->default_str("none");
+      .TypeName("SIZE")
+      .Default("none");
 }
 
 // The same for a program that this one starts.

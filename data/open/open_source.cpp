@@ -1,59 +1,122 @@
 #include "data/open/open_source.h"
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
+#include <new>
 
-#include "common/base/url.h"
+#include "common/base/printable.h"
+#include "common/text/url.h"
+#include "common/volume/memory_budget.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/metadata/open_store_for.h"
-#include "data/n5/n5.h"
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
-#include "data/positional/positional_source.h"
-#include "data/precomputed/precomputed.h"
+#include "data/positional/file_source.h"
+#include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
-#include "data/zarr/zarr.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 
-const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {Hdf5(), N5(), Precomputed(), Zarr(), TiledTiff(), UncompressedFile()};
+// Each in the folder of its name.
+VolumeFormat N5();
+VolumeFormat Precomputed();
+VolumeFormat Zarr();
+
+namespace {
+
+// A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again. A small level, of which a survey
+// from afar reads all, is then read once more by who holds it.
+ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
+  constexpr std::uint64_t kLeast = 8U << 20, kMostUnderWay = 128U << 20;
+  const std::uint64_t all = std::max(SourceBytes(process_bytes), 2 * kLeast), under_way = std::clamp(all / 4, kLeast, kMostUnderWay);
+  return {.under_way_bytes = under_way, .cache_bytes = all - under_way, .small_bytes = std::uint64_t(kFarSurvey.exact)};
+}
+
+std::atomic<std::uint64_t> process_memory = 0;  // 0: not said
+
+Result<std::shared_ptr<VolumeSource>> OpenAs(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
+                                             const SourceContext& context) try {
+  if (format.open != nullptr) {
+    Result<std::shared_ptr<VolumeSource>> source = format.open(path, options, context);
+    if (!source.ok() || *source != nullptr) return source;
+  }
+  return OpenFile(format, path, options, context);
+} catch (const std::bad_alloc&) {
+  return Status::ResourceExhausted(path + ": does not fit the memory");
+}
+
+}  // namespace
+
+const std::vector<VolumeFormat>& VolumeFormats() {
+  static const std::vector<VolumeFormat> kFormats = [] {
+    std::vector<VolumeFormat> formats = {Hdf5(), N5(), Precomputed(), Zarr()};
+    formats.insert(formats.end(), FileFormats().begin(), FileFormats().end());
+    std::ranges::find(formats, "TIFF", &VolumeFormat::name)->open = OpenTiff;
+    return formats;
+  }();
   return kFormats;
 }
 
-const SourceFormat* FindSourceFormat(const std::string& path, const ReadOptions& options) {
-  const auto found = std::ranges::find_if(SourceFormats(), [&](const SourceFormat& format) { return format.recognises(path, options); });
-  return found == SourceFormats().end() ? nullptr : &*found;
+const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& options) {
+  return IsUrl(path) ? nullptr : FindFormat(VolumeFormats(), path, options);
 }
 
-bool IsReadInParts(const std::string& path, const ReadOptions& options) {
-  return IsUrl(path) || FindSourceFormat(path, options) != nullptr;
+Status CheckVolume(const std::string& path, const ReadOptions& options) {
+  if (IsUrl(path)) return Status::Ok();
+  std::error_code error;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind == std::filesystem::file_type::not_found) return Printable(Status::NotFound(path + ": no such file"));
+  if (kind != std::filesystem::file_type::directory && kind != std::filesystem::file_type::regular) {
+    return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
+  }
+  if (const VolumeFormat* const format = FindFormat(path, options)) return Printable(CheckOptions(*format, path, options));
+  const std::string_view why = WhyUnread(path);
+  return Printable(
+      Status::InvalidArgument(path + ": " + (why.empty() ? "not a volume, which " + ReadableText(VolumeFormats()) : std::string(why))));
 }
+
+bool LooksLikeVolume(const std::string& path) { return CheckVolume(path).ok(); }
 
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const bool remote = IsUrl(path);
-  std::error_code error;
-  if (!remote && !std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
+  if (!IsUrl(path)) {
+    if (Status status = CheckVolume(path, options); !status.ok()) return status;
+    const VolumeFormat& format = *FindFormat(path, options);
+    Result<std::shared_ptr<VolumeSource>> source = OpenUnchanged(path, [&] { return OpenAs(format, path, options, context); });
+    if (!source.ok()) return Printable(source.status());
+    return source;
+  }
   ReadOptions with_store = options;
-  RemoteFormat there{.format = remote ? nullptr : FindSourceFormat(path, options)};
-  if (remote) {
-    Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
-    if (!store.ok()) return store.status();
-    with_store.store = *std::move(store);
-    const Result<RemoteFormat> found = FindRemoteFormat(*with_store.store, SourceFormats());
-    if (!found.ok()) return found.status();
-    there = *found;
-  }
-  const SourceFormat* const format = there.format;
-  if (format == nullptr) return Status::InvalidArgument(path + ": is no volume that can be read in parts");
-  for (const ReadOption& option : ReadOptionList()) {
-    const bool taken = option.of_addresses ? remote : std::ranges::find(format->options, option.name) != format->options.end();
-    if (option.given(options) && !taken) {
-      return Status::InvalidArgument(path + ": " + std::string(format->name) + " takes no option " + std::string(option.name));
-    }
-  }
-  const auto open = [&] { return format->open(path, with_store, context); };
-  return remote ? OpenRemote(there.version, options.query, open) : OpenUnchanged(path, open);
+  Result<std::shared_ptr<Store>> store = OpenStoreFor(path, options);
+  if (!store.ok()) return store.status();
+  with_store.store = *std::move(store);
+  const Result<RemoteFormat> found = FindRemoteFormat(*with_store.store, VolumeFormats());
+  if (!found.ok()) return found.status();
+  if (Status status = CheckOptions(*found->format, path, options); !status.ok()) return status;
+  return OpenRemote(found->version, options.query, [&] { return OpenAs(*found->format, path, with_store, context); });
 }
+
+Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, const SourceContext& context) {
+  Result<SourceText> text = ParseSourceText(stored.source);
+  if (!text.ok()) return text.status();
+  text->options.describe = true;
+  Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, context);
+  if (!source.ok()) return source;
+  const SourceInfo& info = (*source)->info();
+  const bool same = info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
+                    info.levels[std::size_t(stored.level)].block == stored.block.end;
+  return same ? source : Status::Unavailable(text->path + ": another one than the coordinator's");
+}
+
+const SourceContext& ProcessReadContext() {
+  static const SourceContext kContext = [] {
+    const std::uint64_t said = process_memory;
+    return std::make_shared<ReadContext>(LimitsFor(said > 0 ? said : std::uint64_t(std::max<std::int64_t>(AvailableMemoryBytes(), 0))));
+  }();
+  return kContext;
+}
+
+void SetReadMemory(std::uint64_t process_bytes) { process_memory = process_bytes; }
 
 }  // namespace slabstream

@@ -29,30 +29,9 @@ std::vector<std::string_view> NamesIn(std::string_view query) {
   return names;
 }
 
-class RemoteSource : public VolumeSource {
- public:
-  RemoteSource(std::shared_ptr<VolumeSource> source, std::uint64_t version, std::string_view query)
-      : source_(std::move(source)), info_(source_->info()) {
-    info_.files.clear();
-    info_.version = version;
-    if (!query.empty())
-      info_.notes.push_back(fmt::format("each request has the query of the address: {}", fmt::join(NamesIn(query), ", ")));
-  }
-
-  const SourceInfo& info() const override { return info_; }
-  Counts counts() const override { return source_->counts(); }
-  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
-    source_->Read(level, box, out, std::move(stop), std::move(done));
-  }
-
- private:
-  const std::shared_ptr<VolumeSource> source_;
-  SourceInfo info_;
-};
-
 // The markers of all formats are asked for at a time.
 struct Marker {
-  const SourceFormat* format = nullptr;
+  const VolumeFormat* format = nullptr;
   std::string key;
   std::future<Result<Bytes>> answer;
 };
@@ -66,9 +45,9 @@ bool MayBeJsonObject(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-Result<RemoteFormat> FindRemoteFormat(Store& store, std::span<const SourceFormat> formats) {
+Result<RemoteFormat> FindRemoteFormat(Store& store, std::span<const VolumeFormat> formats) {
   std::vector<Marker> markers;
-  for (const SourceFormat& format : formats) {
+  for (const VolumeFormat& format : formats) {
     for (const std::string_view key : format.markers) markers.push_back({&format, std::string(key), BeginRead(store, std::string(key))});
   }
   RemoteFormat found;
@@ -99,7 +78,11 @@ Result<RemoteFormat> FindRemoteFormat(Store& store, std::span<const SourceFormat
 Result<std::shared_ptr<VolumeSource>> OpenRemote(std::uint64_t version, std::string_view query, const OpenFunction& open) {
   Result<std::shared_ptr<VolumeSource>> source = open();
   if (!source.ok()) return source;
-  return std::shared_ptr<VolumeSource>(std::make_shared<RemoteSource>(*std::move(source), version, query));
+  SourceInfo info = (*source)->info();
+  info.files.clear();
+  info.version = version;
+  if (!query.empty()) info.notes.push_back(fmt::format("each request has the query of the address: {}", fmt::join(NamesIn(query), ", ")));
+  return std::shared_ptr<VolumeSource>(std::make_shared<DescribedSource>(*std::move(source), std::move(info)));
 }
 
 }  // namespace slabstream

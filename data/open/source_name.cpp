@@ -9,8 +9,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "common/base/url.h"
 #include "common/frame/dataset_name.h"
+#include "common/text/url.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {

@@ -14,8 +14,8 @@ namespace slabstream {
 // (common/frame/dataset_name.h) accepts: runs of other characters become '_', and "volume" stands for a name of which nothing is left.
 std::string NameOfSource(const std::string& source);
 
-// The names of several, all different. Of sources with the same name, one whose name needed no change keeps it, and the others get a number
-// behind it: "head", "head-2", "head-3".
+// The names of several, all different. If sources have the same name, one whose name needed no change keeps it, and the
+// others get a number behind it: "head", "head-2", "head-3".
 std::vector<std::string> NamesOfSources(std::span<const std::string> sources);
 
 }  // namespace slabstream

@@ -9,9 +9,9 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/file_stamp.h"
-#include "common/base/guarded.h"
 #include "common/base/printable.h"
+#include "common/files/file_stamp.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {
@@ -30,24 +30,25 @@ struct Watched {
   }
 };
 
-class UnchangedSource : public VolumeSource {
+class UnchangedSource : public DescribedSource {
  public:
-  UnchangedSource(std::shared_ptr<VolumeSource> source, std::uint64_t version, Watched watched)
-      : source_(std::move(source)), info_(source_->info()), watched_(std::make_shared<const Watched>(std::move(watched))) {
-    info_.version = version;
-  }
+  UnchangedSource(std::shared_ptr<VolumeSource> source, SourceInfo info, Watched watched)
+      : DescribedSource(std::move(source), std::move(info)), watched_(std::make_shared<const Watched>(std::move(watched))) {}
 
-  const SourceInfo& info() const override { return info_; }
-  Counts counts() const override { return source_->counts(); }
-
+  using VolumeSource::Read;
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     source_->Read(level, box, out, std::move(stop),
                   [watched = watched_, done = std::move(done)](Status read) { done(watched->EndOf(std::move(read))); });
   }
 
  private:
-  const std::shared_ptr<VolumeSource> source_;
-  SourceInfo info_;
+  Result<LevelInMemory> DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted) override {
+    if (!info().whole) return VolumeSource::DoReadLevel(level, progress, wanted);
+    Result<LevelInMemory> read = source_->ReadLevel(level, progress, wanted);
+    if (Status end = watched_->EndOf(read.status()); !end.ok()) return end;
+    return read;
+  }
+
   const std::shared_ptr<const Watched> watched_;
 };
 
@@ -70,7 +71,10 @@ Result<std::shared_ptr<VolumeSource>> OpenUnchanged(const std::string& path, con
     }
     const Result<std::uint64_t> version = VersionOf(files);
     if (!version.ok()) return version.status();
-    return std::shared_ptr<VolumeSource>(std::make_shared<UnchangedSource>(*std::move(source), *version, Watched{path, *std::move(stamp)}));
+    SourceInfo info = (*source)->info();
+    info.version = *version;
+    return std::shared_ptr<VolumeSource>(
+        std::make_shared<UnchangedSource>(*std::move(source), std::move(info), Watched{path, *std::move(stamp)}));
   }
   return Printable(Status::Unavailable(path + ": changes while it is opened"));
 }

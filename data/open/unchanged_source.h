@@ -18,7 +18,8 @@ using OpenFunction = std::function<Result<std::shared_ptr<VolumeSource>>()>;
 // changed since (FileStamp): Unavailable, naming `path`. Errors of `open` and StampFiles; Unavailable: the files change while it is opened.
 Result<std::shared_ptr<VolumeSource>> OpenUnchanged(const std::string& path, const OpenFunction& open);
 
-// Of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one cannot be looked at.
+// A digest of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one
+// cannot be looked at.
 Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
 
 }  // namespace slabstream

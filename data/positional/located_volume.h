@@ -2,29 +2,26 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "common/base/status.h"
 #include "data/sources/volume_source.h"
+#include "data/volume_io/formats.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/world_placement.h"
 
 namespace slabstream {
 
-enum class Packing { kNone, kCompressed };
-
 struct LocatedVolume {
   RawHeader header;
-  Payload payload;  // of this volume alone
+  Payload payload;  // the payload of this volume alone
   AxisTurn turn;
-  int component = 0;  // which of the header's, in a voxel
+  int component = 0;  // the component of a voxel that is read
   SourceInfo info;    // one level; samples as KeptTypeOf says
 };
 
-// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise, or uncompressed in several files; axes
-// that are not at right angles; the luminance of several components.
-Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& options, Packing packing);
-
-// Whether LocateVolume takes this file, with the options that it needs.
-bool HasLocatedSamples(const std::string& path, const ReadOptions& options, Packing packing);
+// The description of a file of which the header and its place in the world are known. `beside`: what is read besides `path`. `block`: of
+// SourceLevel, by the axes of the file.
+SourceInfo InfoOfFile(const VolumeFormat& format, const std::string& path, const RawHeader& header, const WorldPlacement& placed,
+                      const std::vector<std::filesystem::path>& beside, const Index3& block, const ReadOptions& options);
 
 }  // namespace slabstream

@@ -12,29 +12,8 @@
 
 namespace slabstream {
 
-bool SliceStream::Recognises(const std::string& path, const ReadOptions& options) {
-  return HasLocatedSamples(path, options, Packing::kCompressed);
-}
-
-Result<std::shared_ptr<SliceStream>> SliceStream::Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<LocatedVolume> volume = LocateVolume(path, options, Packing::kCompressed);
-  if (!volume.ok()) return Printable(volume.status());
-  return std::shared_ptr<SliceStream>(new SliceStream(path, *std::move(volume), options.progress, context));
-}
-
 SliceStream::SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context)
-    : path_(std::move(path)),
-      volume_([&] {
-        Index3 slice = volume.header.size;
-        slice.z = 1;
-        const std::array<int, 3>& from = volume.turn.from;
-        volume.info.levels.front().block = {slice[from[0]], slice[from[1]], slice[from[2]]};
-        return std::move(volume);
-      }()),
-      context_(std::move(context)),
-      progress_(progress) {}
-
-Axis SliceStream::along() const { return kAxes[std::size_t(std::ranges::find(volume_.turn.from, 2) - volume_.turn.from.begin())]; }
+    : path_(std::move(path)), volume_(std::move(volume)), context_(std::move(context)), progress_(progress) {}
 
 VolumeSource::Counts SliceStream::counts() const {
   const std::lock_guard lock(mutex_);

@@ -1,7 +1,7 @@
 // SliceStream: a volume whose samples are one compressed stream (.nii.gz, .mgz, gzip NRRD, compressed MetaImage, MRC in .gz), or several,
-// which can only be read from the beginning. As a source it gives any box, but what lies in front of a box is read, too: from the last
-// slice that was read if that lies in front of it, else from the beginning. So read boxes of whole slices in the order of the file
-// (along(), from_end()): then the stream is read once, and nobody holds all of it.
+// which can only be read from the beginning; or samples in several files. As a source it gives any box, but what lies in front of a box is
+// read, too: from the last slice that was read if that lies in front of it, else from the beginning. So read boxes of whole slices in the
+// order of the file (SourceInfo::slices): then the stream is read once, and nobody holds all of it.
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,18 @@
 #include <mutex>
 #include <string>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 #include "data/positional/located_volume.h"
 #include "data/sources/read_context.h"
-#include "data/sources/source_format.h"
 
 namespace slabstream {
 
 class SliceStream : public VolumeSource {
  public:
-  // Whether `path` is such a volume, by its header.
-  static bool Recognises(const std::string& path, const ReadOptions& options = {});
-  // Reads the header. options.progress, if any, must stay as long as this is read; it counts each slice once. Errors of LocateVolume.
-  static Result<std::shared_ptr<SliceStream>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context);
-
-  // Along which axis of the volume the slices of the file lie, and whether they begin at its end.
-  Axis along() const;
-  bool from_end() const { return volume_.turn.flipped[std::size_t(Number(along()))]; }
+  // `progress`, if any, must stay as long as this is read; it counts each slice once.
+  SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context);
 
   // One level; its block is a slice.
   const SourceInfo& info() const override { return volume_.info; }
@@ -36,7 +29,6 @@ class SliceStream : public VolumeSource {
   Counts counts() const override;
 
  private:
-  SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context);
   Status ReadBox(const Box& box, const BoxRoom& out, const std::stop_token& stop);
   Status ReadSlices(const Box& box, const BoxRoom& out, const std::stop_token& stop);
   Status Rewind();

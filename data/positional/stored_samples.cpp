@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 namespace {

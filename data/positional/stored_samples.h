@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/file_descriptor.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
 #include "common/volume/box.h"
 #include "data/positional/turned_box.h"
 #include "data/volume_io/raw_volume.h"

@@ -14,7 +14,7 @@ namespace slabstream {
 
 struct TurnedBox {
   AxisTurn turn;
-  Index3 size;  // of the volume
+  Index3 size;  // the size of the volume
   Box box;
   BoxRoom out;  // for samples as CopySamples writes them
 

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream::precomputed {
 namespace {

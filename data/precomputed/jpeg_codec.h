@@ -7,7 +7,7 @@
 
 namespace slabstream::precomputed {
 
-// Of chunks of so many voxels. Decoded: one channel behind the other. DataLoss: no such picture.
+// A codec for chunks of so many voxels. Decoded: one channel behind the other. DataLoss: no such picture.
 SharedCodec JpegCodec(std::uint64_t voxels, int channels);
 
 }  // namespace slabstream::precomputed

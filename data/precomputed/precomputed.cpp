@@ -1,11 +1,9 @@
-#include "data/precomputed/precomputed.h"
-
+// Neuroglancer's precomputed volumes in folders as sources.
 #include <filesystem>
-#include <utility>
 
 #include "data/metadata/open_store_for.h"
 #include "data/precomputed/precomputed_pyramid.h"
-#include "data/sources/chunked_source.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace precomputed {
@@ -23,23 +21,15 @@ bool Recognises(const std::string& path, const ReadOptions&) {
   return text.find("\"scales\"") != std::string_view::npos || text.find("neuroglancer_multiscale_volume") != std::string_view::npos;
 }
 
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
-  if (!store.ok()) return store.status();
-  Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
-  if (!pyramid.ok()) return pyramid.status();
-  return MakeChunkedSource(path, *std::move(pyramid), context);
-}
-
 }  // namespace
 }  // namespace precomputed
 
-SourceFormat Precomputed() {
+VolumeFormat Precomputed() {
   return {.name = "Neuroglancer precomputed",
           .recognises = precomputed::Recognises,
           .options = {"channel", "follow-links"},
           .markers = {precomputed::kInfo},
-          .open = precomputed::Open};
+          .open = OpenInStore<precomputed::OpenPyramid>};
 }
 
 }  // namespace slabstream

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "data/codecs/codecs.h"
 #include "data/metadata/json_fields.h"
 #include "data/precomputed/jpeg_codec.h"

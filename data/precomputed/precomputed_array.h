@@ -11,7 +11,7 @@
 #include "common/base/status.h"
 #include "data/precomputed/sharding.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/stores/store.h"
 
 namespace slabstream::precomputed {
@@ -21,7 +21,7 @@ enum class Encoding : std::uint8_t { kRaw, kJpeg, kSegmentation };
 struct Scale {
   std::string key;                               // the folder of its chunks
   std::array<std::uint64_t, 3> size{}, chunk{};  // voxels along x, y and z
-  std::array<std::int64_t, 3> offset{};          // of the first voxel, which names of chunks count from
+  std::array<std::int64_t, 3> offset{};          // the place of the first voxel, which names of chunks count from
   std::array<double, 3> resolution{};            // nm
   Encoding encoding = Encoding::kRaw;
   std::array<std::uint64_t, 3> block{};   // kSegmentation

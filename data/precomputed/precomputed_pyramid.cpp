@@ -102,7 +102,7 @@ Result<Scale> ParseScale(const Field& field, SampleType type, std::uint64_t chan
 
 Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptions& options, const SourceContext& context) {
   const std::string object = store->name() + "/" + kInfo;
-  const Result<std::optional<metadata::Json>> json = metadata::ReadJson(*store, kInfo);
+  const Result<std::optional<Json>> json = metadata::ReadJson(*store, kInfo);
   if (!json.ok()) return json.status();
   if (!json->has_value()) return Status::NotFound(object + ": does not exist");
   const Field info(object, **json);

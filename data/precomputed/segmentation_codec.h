@@ -9,8 +9,8 @@
 
 namespace slabstream::precomputed {
 
-// Of chunks of `size` voxels along x, y and z, x fastest, one channel behind the other. `block`: voxels along each axis of a block.
-// `label_bytes`: 4 or 8. DataLoss: damaged.
+// A codec for chunks of `size` voxels along x, y and z, x fastest, one channel behind the other. `block`: voxels along
+// each axis of a block. `label_bytes`: 4 or 8. DataLoss: damaged.
 SharedCodec SegmentationCodec(const std::array<std::uint64_t, 3>& size, const std::array<std::uint64_t, 3>& block, std::uint64_t channels,
                               std::size_t label_bytes);
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/metadata/json_fields.h"
 #include "data/stores/store.h"
 

@@ -14,6 +14,13 @@ Status Wrong(const std::string& array, const std::string& why) { return Status::
 
 }  // namespace
 
+void AxisChoice::Describe(SourceInfo& info) const {
+  info.times = times;
+  info.time = time;
+  info.channel = channel;
+  if (channels > 1) info.channels.resize(std::size_t(channels));
+}
+
 Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const std::vector<std::string>& names,
                                                const ReadOptions& options) {
   if (names.size() < 2) return Wrong(array, fmt::format("has {} axis, must have 2 or more", names.size()));

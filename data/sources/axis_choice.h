@@ -10,6 +10,7 @@
 
 #include "common/base/status.h"
 #include "data/sources/axis_kind.h"
+#include "data/sources/volume_source.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -19,6 +20,9 @@ struct AxisChoice {
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
   int times = 1, channels = 1;             // how many there are
   int time = 0, channel = 0;
+
+  // Its times and channels.
+  void Describe(SourceInfo& info) const;
 };
 
 // The kinds of the axes of a plain array, by their names ("" where there is none) and, where these do not say it, by their order.

@@ -3,13 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <utility>
 
-#include "common/base/bytes.h"
+#include "common/base/lru_map.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 
@@ -26,21 +25,14 @@ class ChunkCache {
   std::optional<Bytes> Find(Owner owner, std::uint64_t chunk);
   void Keep(Owner owner, std::uint64_t chunk, const Bytes& elements);  // unless it is larger than the whole budget
 
-  std::uint64_t bytes() const;  // that it holds
+  std::uint64_t bytes() const;  // bytes that it holds
 
  private:
   using Key = std::pair<Owner, std::uint64_t>;
-  struct Entry {
-    Key key;
-    Bytes elements;
-  };
-
   const std::uint64_t most_bytes_;
   mutable std::mutex mutex_;  // guards what follows
   Owner last_owner_ = 0;
-  std::list<Entry> entries_;  // the last used one first
-  std::map<Key, std::list<Entry>::iterator> places_;
-  std::uint64_t bytes_ = 0;
+  LruMap<Key, Bytes> chunks_;
 };
 
 }  // namespace slabstream

@@ -14,23 +14,24 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMaxArrayAxes = 8;
-inline constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 30;  // of a decoded chunk
+inline constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 30;  // bytes of a decoded chunk
 
 struct ArrayShape {
-  std::vector<std::uint64_t> size;   // elements along each axis, each at least 1; at most kMaxArrayAxes axes
-  std::vector<std::uint64_t> chunk;  // of a chunk, each at least 1; the product times the bytes of an element is at most kMostChunkBytes
+  std::vector<std::uint64_t> size;  // elements along each axis, each at least 1; at most kMaxArrayAxes axes
+  // Elements of a chunk along each axis, each at least 1; all of them together take at most kMostChunkBytes.
+  std::vector<std::uint64_t> chunk;
   SampleType type = SampleType::kUint8;
   bool cut_at_end = false;
   std::vector<std::byte> fill = {};  // one element, in this machine's byte order: of chunks that are not there
 
-  std::uint64_t chunk_bytes() const {  // of a whole one, decoded
+  std::uint64_t chunk_bytes() const {  // bytes of a whole chunk, decoded
     std::uint64_t bytes = BytesPerSample(type);
     for (const std::uint64_t along : chunk) bytes *= along;
     return bytes;
@@ -40,7 +41,7 @@ struct ArrayShape {
 // A chunk as it was read.
 struct StoredChunk {
   Bytes elements;                  // decoded, in this machine's byte order
-  std::uint64_t stored_bytes = 0;  // that the store gave for it
+  std::uint64_t stored_bytes = 0;  // bytes that the store gave for it
 };
 
 class ChunkedArray {

@@ -14,7 +14,7 @@
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "common/volume/memory_budget.h"
 #include "data/sources/copy_samples.h"
 
@@ -199,7 +199,7 @@ class Level : public std::enable_shared_from_this<Level> {
   void NoteMissing(const Index3& chunk) try {
     constexpr std::uint64_t kMostNoted = std::uint64_t{1} << 16;
     const std::uint64_t count = std::uint64_t(counts_.x) * std::uint64_t(counts_.y) * std::uint64_t(counts_.z);
-    if (findings_->settled || context_->only_keeps() || count > kMostNoted) return;
+    if (findings_->settled || count > kMostNoted) return;
     {
       const std::lock_guard lock(mutex_);
       missing_.insert(NumberIn(counts_, chunk));
@@ -429,7 +429,6 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   SourceInfo info = std::move(pyramid.info);
   if (info.file_type.empty()) info.file_type = ToString(type);
   info.exact = {type, pyramid.rescale};
-  if (MayBeRounded(type)) info.notes.push_back(RoundingText(type));
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
   const auto findings = std::make_shared<Findings>();

@@ -3,8 +3,8 @@
 //
 // A line of the log tells if all chunks of a level were asked for, and no chunk of the source was there.
 //
-// Samples are kept as in volume_reader.h, but as their type alone says, since nobody has seen all values: int8 and int16 are shifted into
-// the unsigned type; integers of more bits and float64 become float32.
+// Samples are kept as in data/open/read_volume.h, but as their type alone says, since nobody has seen all values: int8 and int16 are
+// shifted into the unsigned type; integers of more bits and float64 become float32.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 #include "common/base/status.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -32,7 +32,7 @@ struct PyramidLevel {
 
 struct Pyramid {
   std::vector<PyramidLevel> levels;  // finest first
-  Orientation orientation = {};      // of all levels; its origin does not matter, since each level has its own
+  Orientation orientation = {};      // the orientation of all levels; its origin does not matter, since each level has its own
   ValueMapping rescale = {};         // from stored values to data values
   SourceInfo info = {};              // without its levels and exact; file_type: "" means that of the arrays
 };

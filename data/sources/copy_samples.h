@@ -20,7 +20,7 @@ struct KeptType {
 };
 KeptType KeptTypeOf(SampleType type);
 
-// Of a sample that CopySamples writes: as it is, if `exact`, or as KeptTypeOf(type) keeps it.
+// Bytes of a sample that CopySamples writes: as it is, if `exact`, or as KeptTypeOf(type) keeps it.
 std::size_t CopiedBytes(SampleType type, bool exact);
 
 // For each voxel v in [0, count): the sample of `to` at v.z * slice + v.y * row + v.x = the one at from[v.x * steps[0] + v.y * steps[1] +

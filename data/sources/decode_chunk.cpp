@@ -25,7 +25,6 @@ void DecodeOn(const SourceContext& context, CodecChain chain, Result<Bytes> answ
     if (answer.status().code() == StatusCode::kNotFound) return done(std::optional<StoredChunk>());
     return done(answer.status());
   }
-  if (context->only_keeps()) return done(std::optional<StoredChunk>());
   // The task holds the context, which holds the task.
   context->PostDecode([context, chain = std::move(chain), packed = *std::move(answer), bytes, what = std::move(what),
                        done = std::move(done)]() mutable { done(Decode(chain, std::move(packed), bytes, what)); });

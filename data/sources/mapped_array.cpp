@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 namespace {

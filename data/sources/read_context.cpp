@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "common/base/background_tasks.h"
+#include "common/threads/background_tasks.h"
 
 namespace slabstream {
 
@@ -46,7 +46,6 @@ ReadContext::~ReadContext() = default;
 
 ChunkCache& ReadContext::cache() { return state_->cache; }
 std::uint64_t ReadContext::small_bytes() const { return state_->limits.small_bytes; }
-bool ReadContext::only_keeps() const { return state_->limits.only_keeps; }
 
 void ReadContext::PostDecode(std::function<void()> task) {
   const std::lock_guard lock(state_->post_mutex);

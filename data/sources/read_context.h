@@ -19,12 +19,9 @@ class ReadContext {
 
   struct Limits {
     std::size_t decode_threads = 0;                            // 0: as many as there are cores
-    std::uint64_t under_way_bytes = std::uint64_t{128} << 20;  // of chunks that are read or decoded; one chunk may always be
-    std::uint64_t cache_bytes = std::uint64_t{64} << 20;       // of decoded chunks that may be needed again
-    std::uint64_t small_bytes = 0;  // of a level behind an address whose chunks all stay, since each is a request
-    // Chunks are read so that the disk keeps them (ObjectCache), and not decoded: sources find none. What the disk has counts as right
-    // without asking the server.
-    bool only_keeps = false;
+    std::uint64_t under_way_bytes = std::uint64_t{128} << 20;  // bytes of chunks that are read or decoded; one chunk may always be
+    std::uint64_t cache_bytes = std::uint64_t{64} << 20;       // bytes of decoded chunks that may be needed again
+    std::uint64_t small_bytes = 0;  // bytes of a level behind an address whose chunks all stay, since each is a request
   };
   explicit ReadContext(const Limits& limits);
   ~ReadContext();
@@ -40,11 +37,12 @@ class ReadContext {
 
   ChunkCache& cache();
   std::uint64_t small_bytes() const;
-  bool only_keeps() const;
 
  private:
   struct State;
   const std::shared_ptr<State> state_;
 };
+
+using SourceContext = std::shared_ptr<ReadContext>;
 
 }  // namespace slabstream

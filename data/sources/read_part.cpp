@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 

@@ -6,8 +6,8 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/volume/box.h"
 #include "data/sources/volume_source.h"
 

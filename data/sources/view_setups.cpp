@@ -7,9 +7,9 @@
 #include <span>
 #include <string_view>
 
-#include "common/base/files.h"
-#include "common/base/parse_number.h"
-#include "common/base/trimmed.h"
+#include "common/files/files.h"
+#include "common/text/parse_number.h"
+#include "common/text/trimmed.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/xml_events.h"
 

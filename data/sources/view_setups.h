@@ -22,8 +22,8 @@ struct ViewSetup {
 // Those that have a number; at most 65536. Elements that are not known are skipped. InvalidArgument: no well-formed XML.
 Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml);
 
-// Of the XML file beside `path`: of the same name, but for the ending. None: there is no such file. InvalidArgument, ResourceExhausted: it
-// cannot be taken; the message names it.
+// The XML file beside `path` that has the same name with another ending. None: there is no such file. InvalidArgument,
+// ResourceExhausted: it cannot be taken; the message names it.
 struct ViewSetupFile {
   std::string path;  // "": there is none
   std::vector<ViewSetup> setups;

@@ -1,4 +1,5 @@
-// VolumeSource: a volume at one or more levels of resolution, which is read box by box. Nobody needs to hold all of it.
+// VolumeSource: a volume at one or more levels of resolution, which is read box by box. Nobody needs to hold all of it. Every format is
+// one, also those that can only be read in one order (SourceInfo::slices) or as a whole (SourceInfo::whole).
 //
 //   Store (bytes by key)  ->  ChunkedArray (decoded chunks)  ->  VolumeSource (boxes of voxels)
 //
@@ -8,6 +9,7 @@
 // Any thread may call a source. It answers on threads of its own (ReadContext).
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -17,12 +19,14 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/status.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/exact_samples.h"
+#include "data/volume_io/read_progress.h"
 #include "data/volume_io/stated_label.h"
 
 namespace slabstream {
@@ -34,21 +38,56 @@ struct SourceLevel {
   Index3 block;
 };
 
+// The order of slices in which a stream gives its voxels.
+struct SliceOrder {
+  Axis along = Axis::kZ;
+  bool from_end = false;  // the last slice first
+};
+
+// How a file stores its voxels, before they are turned to the axes of the world.
+struct StoredAxes {
+  Index3 size;                // voxels along each axis
+  std::array<Vec3, 3> steps;  // from a voxel to the next one along it, in the world
+  bool slanted = false;       // they are not at right angles, so that the voxels are straightened
+};
+
 struct SourceInfo {
   std::vector<SourceLevel> levels;         // at least one
   std::string format;                      // "OME-Zarr 0.5"
-  std::string file_type;                   // of samples as they are stored: "int16"
-  ExactType exact = {};                    // of reads of exact samples (BoxRoom::exact)
+  std::string file_type;                   // the type of samples as they are stored: "int16"
+  ExactType exact = {};                    // the type of exact samples (BoxRoom::exact)
   bool labels = false;                     // samples are numbers of structures, not measurements
-  std::vector<StatedLabel> looks = {};     // of labels, by ascending values, as far as the source says it
+  std::vector<StatedLabel> looks = {};     // looks of labels, by ascending values, as far as the source says it
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
-  int channel = 0;                         // which of them it shows
+  int channel = 0;                         // which of them it shows; of a luminance: 0
+  int components = 1;                      // above 1: the channels are components of a voxel, such as red, green and blue
   int times = 1, time = 0;                 // how many the source holds, and which of them it shows
   std::optional<ValueRange> window = {};   // data values that its author shows
-  std::vector<std::string> notes = {};     // as of VolumeFileInfo
-  std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
-  std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
-  std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them
+  // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
+  std::vector<std::string> notes = {};
+  std::vector<std::string> files = {};    // whose time of change tells that it is another volume now (FileStamp)
+  std::uint64_t version = 0;              // the version of these files when it was opened (VersionOf); only an opened source has one
+  std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
+  std::optional<StoredAxes> stored = {};  // none: a source does not tell
+  // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).
+  std::optional<SliceOrder> slices = {};
+  bool whole = false;  // whoever reads a box first decodes all, and the source holds it (data/positional/decoded_source.h)
+
+  const VolumeDescription& finest() const { return levels.front().description; }
+  bool in_parts() const { return !slices && !whole; }
+};
+
+// A whole level in memory.
+struct LevelInMemory {
+  std::shared_ptr<const Volume> volume;
+  // As they are stored, turned as the volume's, as far as they are wanted; null: those of the volume are exact or were not wanted.
+  std::shared_ptr<const ExactSamples> exact = {};
+  std::string rounding = {};  // what float32 has rounded, for people (RoundingText); "": nothing
+};
+struct LevelWanted {
+  bool all_exact = false;  // exact samples of each type that float32 may round; else of whole numbers of which it rounds one
+  // What `info` says to be float32 becomes uint16 if that holds all samples after a shift. What is decoded as a whole always does.
+  bool narrow = false;
 };
 
 // Where the samples of a box go: x fastest.
@@ -88,6 +127,12 @@ class VolumeSource {
   Status ReadNow(int level, const Box& box, const BoxRoom& out, std::stop_token stop = {});
   Status ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop = {});
 
+  // A whole level. `progress`, if any, counts samples, unless the source does (`slices`, `whole`: ReadOptions::progress). Waits.
+  // ResourceExhausted: it does not fit the memory. Errors of Read.
+  Result<LevelInMemory> ReadLevel(int level, ReadProgress* progress = nullptr, const LevelWanted& wanted = {}) {
+    return DoReadLevel(level, progress, wanted);
+  }
+
   // Since it was opened: bytes that were read as they are stored, and chunks that were decoded.
   struct Counts {
     std::uint64_t stored_bytes = 0, chunks = 0;
@@ -96,10 +141,30 @@ class VolumeSource {
   // The part of counts().stored_bytes that no call before has returned.
   std::uint64_t TakeStoredBytes();
 
+ protected:
+  virtual Result<LevelInMemory> DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted);
+
  private:
   BoxRoom RoomFor(int level, const Box& box, std::span<std::byte> out) const;
 
   std::atomic<std::uint64_t> taken_bytes_ = 0;
+};
+
+// Another source, with another description.
+class DescribedSource : public VolumeSource {
+ public:
+  DescribedSource(std::shared_ptr<VolumeSource> source, SourceInfo info) : source_(std::move(source)), info_(std::move(info)) {}
+
+  const SourceInfo& info() const override { return info_; }
+  Counts counts() const override { return source_->counts(); }
+  using VolumeSource::Read;
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
+    source_->Read(level, box, out, std::move(stop), std::move(done));
+  }
+
+ protected:
+  const std::shared_ptr<VolumeSource> source_;
+  const SourceInfo info_;
 };
 
 }  // namespace slabstream

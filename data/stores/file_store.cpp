@@ -3,8 +3,8 @@
 #include <cerrno>
 #include <utility>
 
-#include "common/base/file_descriptor.h"
 #include "common/base/printable.h"
+#include "common/files/file_descriptor.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/read_threads.h"
 #include "data/stores/store.h"

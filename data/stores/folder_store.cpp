@@ -13,7 +13,7 @@
 #include <cerrno>
 #include <utility>
 
-#include "common/base/file_descriptor.h"
+#include "common/files/file_descriptor.h"
 #include "data/stores/object_key.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/read_threads.h"

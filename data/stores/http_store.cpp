@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
 #include "common/base/time.h"
-#include "common/base/trimmed.h"
-#include "common/base/url.h"
+#include "common/files/files.h"
+#include "common/text/trimmed.h"
+#include "common/text/url.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 #include "data/stores/object_key.h"
@@ -28,13 +28,11 @@ namespace {
 
 class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStoreImpl> {
  public:
-  HttpStoreImpl(std::string url, std::shared_ptr<const HttpAccess> access, HttpTransfers& transfers, const ObjectCache* cache,
-                WebOptions::Kept kept)
+  HttpStoreImpl(std::string url, std::shared_ptr<const HttpAccess> access, HttpTransfers& transfers, const ObjectCache* cache)
       : url_(std::move(url)),
         access_(std::move(access)),
         transfers_(transfers),
-        cache_(cache == nullptr ? std::nullopt : std::optional(*cache)),
-        kept_(kept) {}
+        cache_(cache == nullptr ? std::nullopt : std::optional(*cache)) {}
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
@@ -193,7 +191,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
     const std::string name = get.span ? fmt::format("{} {}+{}", get.url, get.span->begin, get.span->bytes) : get.url;
     std::optional<ObjectCache::Entry> kept = cache_->Find(name);
     if (kept && kept->bytes.size() > get.most) kept.reset();
-    if (kept && (kept_ == WebOptions::Kept::kAreTaken || seen_.IsFresh(key, kept->version, MonotonicNow()))) {
+    if (kept && seen_.IsFresh(key, kept->version, MonotonicNow())) {
       return done(HttpObject{.bytes = std::move(kept->bytes), .size = kept->size, .version = std::move(kept->version)});
     }
     if (kept) get.known = kept->version;
@@ -232,7 +230,6 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::shared_ptr<const HttpAccess> access_;
   HttpTransfers& transfers_;
   const std::optional<ObjectCache> cache_;
-  const WebOptions::Kept kept_;
   std::atomic<std::uint64_t> unwritten_ = 0;  // bytes on their way to it
   SeenObjects seen_;
   std::mutex mutex_;              // guards what follows
@@ -284,7 +281,7 @@ Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfe
   }
   if (url.find_first_of("?#") != std::string::npos) return wrong("must have no '?' or '#'");
   while (url.ends_with('/') && url.size() > path) url.pop_back();
-  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers, cache, options.kept));
+  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers, cache));
 }
 
 }  // namespace slabstream

@@ -21,9 +21,9 @@
 
 #include "common/base/check.h"
 #include "common/base/log.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
-#include "common/base/trimmed.h"
+#include "common/text/parse_number.h"
+#include "common/text/trimmed.h"
 #include "data/stores/transfer.h"
 
 namespace slabstream {

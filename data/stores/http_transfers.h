@@ -30,10 +30,10 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/base/web_traffic.h"
+#include "common/memory/bytes.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/s3.h"
 
@@ -41,14 +41,14 @@ namespace slabstream {
 
 // What goes along with the requests of a store, as long as no redirect leads to another server.
 struct HttpAccess {
-  std::string query;                 // of each address, encoded; empty: none
+  std::string query;                 // added to each address, encoded; empty: none
   std::vector<std::string> headers;  // "NAME: VALUE"
-  std::optional<S3Access> s3;        // that signs them
+  std::optional<S3Access> s3;        // what signs them
 };
 
 struct HttpGet {
   std::string url;                                     // absolute, encoded, without a query
-  std::optional<ByteSpan> span;                        // of the object, not empty; none: all of it
+  std::optional<ByteSpan> span;                        // bytes of the object, not empty; none: all of it
   bool only_size = false;                              // no bytes
   std::uint64_t most = 0;                              // bytes of an answer
   std::string known = {};                              // an ETag: if the object still has it, no bytes come
@@ -60,7 +60,7 @@ struct HttpObject {
   // answer so for what is not there; others, for what one may not read.
   std::string instead = {};
   Bytes bytes = {};          // fewer than asked for if the object ends before
-  std::uint64_t size = 0;    // of the whole object
+  std::uint64_t size = 0;    // size of the whole object
   std::string version = {};  // ETag, or else when it was changed; empty: the server tells neither
   bool unchanged = false;    // it is still the one that was known (HttpGet::known)
 };
@@ -78,9 +78,10 @@ class HttpTransfers {
   // So long after its first try a request fails, unless at least so many bytes a second come.
   static constexpr Duration kPatience = std::chrono::seconds(60);
   static constexpr std::uint64_t kLeastBytes = 1024;
-  // Of a host. Two processes may try one after the other, a worker and the coordinator, and a minute is the promise for both.
+  // After kSilence a host counts as silent, and requests to it fail for kRest. Two processes may try one after the
+  // other, a worker and the coordinator, and a minute is the promise for both.
   static constexpr Duration kSilence = std::chrono::seconds(30), kRest = std::chrono::seconds(10);
-  // Of an answer: headers and trailers, and what is no object, such as the page of an error.
+  // Limits of an answer: headers and trailers, and what is no object, such as the page of an error.
   static constexpr std::uint64_t kMostOfHead = std::uint64_t{256} << 10, kMostOfPage = std::uint64_t{1} << 20;
 
   struct Timing {

@@ -15,10 +15,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/cache_folder.h"
-#include "common/base/file_descriptor.h"
-#include "common/base/files.h"
 #include "common/base/log.h"
+#include "common/files/cache_folder.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/files.h"
 #include "data/stores/range_reader.h"
 
 namespace slabstream {

@@ -17,8 +17,8 @@
 #include <optional>
 #include <string>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 
@@ -26,7 +26,7 @@ class ObjectCache {
  public:
   struct Entry {
     std::string version;     // as the server named it (ETag), not empty
-    std::uint64_t size = 0;  // of the whole object
+    std::uint64_t size = 0;  // size of the whole object
     Bytes bytes;
   };
 

@@ -19,7 +19,7 @@ Result<ByteSpan> BytesOfRange(const std::string& what, std::uint64_t size, const
 // ResourceExhausted: as BytesOfRange. Messages begin with `what`.
 Result<Bytes> ReadRange(int file, const std::string& what, const ByteRange& range, std::uint64_t most);
 
-// Of a file that cannot be opened: NotFound or Unavailable.
+// Why a file cannot be opened: NotFound or Unavailable.
 Status OpenFailure(const std::string& what, int error);
 
 }  // namespace slabstream

@@ -3,8 +3,8 @@
 #include <memory>
 #include <utility>
 
-#include "common/base/background_tasks.h"
-#include "common/base/guarded.h"
+#include "common/threads/background_tasks.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {

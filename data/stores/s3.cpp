@@ -7,8 +7,8 @@
 #include <map>
 
 #include "common/base/printable.h"
-#include "common/base/trimmed.h"
-#include "common/base/url.h"
+#include "common/text/trimmed.h"
+#include "common/text/url.h"
 
 namespace slabstream {
 namespace {

@@ -11,12 +11,12 @@ namespace slabstream {
 
 struct S3Access {
   std::string key, secret;  // access key, secret access key
-  std::string token;        // of a session; empty: there is none
+  std::string token;        // the token of a session; empty: there is none
   std::string region;
 };
 
 struct S3Place {
-  std::string url;                 // of what the address names, by HTTP or HTTPS
+  std::string url;                 // what the address names, by HTTP or HTTPS
   std::optional<S3Access> access;  // none: requests are anonymous
 };
 

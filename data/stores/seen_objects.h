@@ -30,11 +30,11 @@ class SeenObjects {
     std::optional<ByteSpan> span;  // none: all of it
     std::uint64_t bytes = 0, digest = 0;
   };
-  // Of an object that came.
+  // An object that came.
   struct News {
     std::string version;       // empty: the server tells none
-    std::uint64_t size = 0;    // of the whole object; 0: the server tells none
-    std::optional<Part> part;  // that was read; none: only the size was asked for
+    std::uint64_t size = 0;    // size of the whole object; 0: the server tells none
+    std::optional<Part> part;  // the part that was read; none: only the size was asked for
   };
   enum class Verdict { kSame, kChanged, kMustBeCompared };
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 

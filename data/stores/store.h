@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 
@@ -63,12 +63,10 @@ Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;
 class ObjectCache;
 struct WebOptions {
-  // Of objects in the cache: the server is asked whether they are still right, or not.
-  enum class Kept : std::uint8_t { kAreChecked, kAreTaken } kept = Kept::kAreChecked;
   std::string query = {};                 // encoded, that goes with each address; empty: none
   std::vector<std::string> headers = {};  // that go with each request: "NAME:VALUE" or "NAME:@FILE" with the value in a file
 };
-// The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
+// The objects below an address (IsUrl, common/text/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
 // by `transfers`, which must outlive it, and kept in `cache`, if any. Asks for nothing yet. It does not list. Query and headers go to this
 // server alone. What a server says of an object with HTTP 403, or with a page of HTML, counts as "there is none" (NotFound) if the server
 // then sends another object that was read before; else it is Unavailable. InvalidArgument: another address, or one with a name, a password,

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/pooled_vector.h"
 #include "data/stores/address_reach.h"
 #include "data/stores/http_transfers.h"
 
@@ -26,7 +26,7 @@ std::string InRegion(const std::string& url, const std::string& region);
 
 // Who waits for an answer, and for which bytes of it.
 struct Asker {
-  std::optional<ByteSpan> span;  // of the object; none: all of it
+  std::optional<ByteSpan> span;  // bytes of the object; none: all of it
   HttpTransfers::Done done;
 };
 
@@ -35,9 +35,9 @@ struct Transfer {
 
   HttpGet get;
   std::vector<Asker> askers;  // one, or several whose spans get.span covers
-  std::string url;            // that is asked now: of the request, or where a redirect led
+  std::string url;            // the address that is asked now: the request's, or where a redirect led
   std::string host;
-  std::string region;  // that its bucket is in, as far as the server has told; empty: it has told none
+  std::string region;  // the region of its bucket, as far as the server has told; empty: it has told none
   int tries = 0, redirects = 0;
   bool reads_start = false;         // to learn the object's size, if the server does not answer HEAD
   bool as_sent = false;             // a Content-Encoding says nothing true about the bytes
@@ -45,14 +45,14 @@ struct Transfer {
   Time begun;                       // the first try
   Duration patience{};              // from then on, for a server that sends little or nothing
 
-  // Of the present try.
+  // What follows belongs to the present try.
   Time tried;
   CURL* easy = nullptr;
   PooledVector<std::byte> body;
   std::string page;              // the beginning of an answer that is no object
-  std::uint64_t head_bytes = 0;  // of headers and trailers
+  std::uint64_t head_bytes = 0;  // bytes of headers and trailers
   std::uint64_t page_bytes = 0;
-  std::uint64_t* heard_bytes = nullptr;  // of the host: counts all that comes
+  std::uint64_t* heard_bytes = nullptr;  // the host's count of all bytes that come
   std::optional<Status> stopped;         // by us, and why
   char reason[CURL_ERROR_SIZE] = {};
   std::unique_ptr<curl_slist, void (*)(curl_slist*)> headers{nullptr, curl_slist_free_all};
@@ -60,8 +60,8 @@ struct Transfer {
   bool elsewhere() const;  // asks another host than the request
   bool trusted() const;    // asks the server of the request, to which alone its headers and its signature go
   long status() const;
-  std::optional<std::uint64_t> length() const;                              // of the body, as the server says
-  std::string header(const char* name) const;                               // of the answer; empty: there is none
+  std::optional<std::uint64_t> length() const;                              // bytes of the body, as the server says
+  std::string header(const char* name) const;                               // a header of the answer; empty: there is none
   bool is_encoded() const;                                                  // by a Content-Encoding
   bool says_html() const;                                                   // its Content-Type
   std::string Between(std::string_view begin, std::string_view end) const;  // in the page; empty: it has no such part

@@ -12,7 +12,7 @@
 #include <set>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/stores/object_key.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/read_threads.h"

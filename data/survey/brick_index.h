@@ -1,10 +1,10 @@
-// BrickIndex: the ranges of the bricks of all levels of a source. It says which voxels cannot show anything under a transfer function, so
-// that they need not be read. It says nothing else: pictures are the same without it.
+// BrickIndex: the ranges of the bricks of all levels of a source. It says which voxels cannot show anything under a
+// transfer function, so that they need not be read. It says nothing else: pictures are the same without it.
 //
-// As bytes: kIndexMagic, the length of a name (32 bits, little endian) and the name, which says of which source the index is, then for each
-// level the length of its ranges (64 bits, little endian) and the ranges: the least samples of all bricks, then the largest ones, of the
-// level's type, little endian, packed by Blosc (shuffle, zstd), and their CRC-32C. Of a brick that nobody has read the least sample is
-// above the largest one.
+// As bytes: kIndexMagic, the length of a name (32 bits, little endian) and the name, which says of which source the
+// index is, then for each level the length of its ranges (64 bits, little endian) and the ranges: the least samples of
+// all bricks, then the largest ones, of the level's type, little endian, packed by Blosc (shuffle, zstd), and their
+// CRC-32C. If nobody has read a brick, its least sample is above its largest one.
 //
 // Pure. Any thread.
 #pragma once
@@ -22,16 +22,16 @@
 
 namespace slabstream {
 
-// Of a brick that nobody has read.
+// The range of a brick that nobody has read.
 inline constexpr ValueRange kNotRead = {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
 
 struct BrickIndex {
-  std::vector<BrickRangeList> levels;  // of stored samples; kNoFiniteValue; kNotRead
+  std::vector<BrickRangeList> levels;  // ranges of stored samples, kNoFiniteValue or kNotRead
 
   friend bool operator==(const BrickIndex&, const BrickIndex&) = default;
 };
 
-// Of a source that nobody has read. ResourceExhausted: there is no memory for it.
+// The index of a source that nobody has read. ResourceExhausted: there is no memory for it.
 Result<BrickIndex> EmptyIndex(const SourceInfo& source);
 
 // Share of the voxels' bricks that were read, [0, 1].

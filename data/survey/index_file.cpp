@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/cache_folder.h"
-#include "common/base/file_lock.h"
-#include "common/base/files.h"
-#include "common/base/url.h"
+#include "common/files/cache_folder.h"
+#include "common/files/file_lock.h"
+#include "common/files/files.h"
+#include "common/text/url.h"
 
 namespace slabstream {
 namespace {

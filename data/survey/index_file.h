@@ -17,7 +17,8 @@ namespace slabstream {
 
 class IndexFile {
  public:
-  // Of the source at `path`, opened with `options` ("?channel=1", "" without). Looks at no file. NotFound: there is no cache folder.
+  // The index file of the source at `path`, opened with `options` ("?channel=1", "" without). Looks at no file.
+  // NotFound: there is no cache folder.
   static Result<IndexFile> Of(const std::string& path, std::string_view options);
 
   const std::string& path() const { return path_; }

@@ -11,7 +11,7 @@
 namespace slabstream {
 
 struct IndexProgress {
-  std::uint64_t done_bytes = 0, all_bytes = 0;  // of voxels in memory; what `index` knew before counts as done
+  std::uint64_t done_bytes = 0, all_bytes = 0;  // bytes of voxels in memory; what `index` knew before counts as done
 };
 
 struct IndexOptions {

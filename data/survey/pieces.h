@@ -12,7 +12,7 @@
 
 namespace slabstream {
 
-inline constexpr std::int64_t kPieceBytes = std::int64_t{16} << 20;  // of most pieces, at most twice as many
+inline constexpr std::int64_t kPieceBytes = std::int64_t{16} << 20;  // bytes of most pieces; no piece has more than twice as many
 
 // They tile the level, and begin at multiples of kBrick. Each holds whole blocks of the source, as far as that fits into 2 * kPieceBytes.
 std::vector<Box> PiecesOf(const SourceLevel& level);

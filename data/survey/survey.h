@@ -25,30 +25,17 @@ inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes 
 struct SurveyBytes {
   std::int64_t exact = kExactBytes, coarse = kSurveyBytes;
 };
-// Of a source behind an address: the first picture waits until they have come.
+// The survey of a source behind an address reads less: the first picture waits until the bytes have come.
 inline constexpr SurveyBytes kFarSurvey = {.exact = 8 << 20, .coarse = 8 << 20};
 
 struct Survey {
-  int level = 0;        // of `summary`
-  bool sample = false;  // of that level was read, not all of it
-  // Of that level. It has no bricks if only a sample was read.
+  int level = 0;        // the level that `summary` describes
+  bool sample = false;  // a sample of that level was read, not all of it
+  // The summary of that level. It has no bricks if only a sample was read.
   std::shared_ptr<const VolumeSummary> summary;
 };
 
 // `progress`, if any, counts what is read, on this thread. Errors of VolumeSource::Read.
 Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most = {}, ReadProgress* progress = nullptr);
-
-// A whole level in memory.
-struct LevelInMemory {
-  std::shared_ptr<const Volume> volume;
-  std::shared_ptr<const ExactSamples> exact;
-};
-enum class ExactWanted {
-  kLabels,  // whole numbers, if float32 rounds one of them
-  kAll      // all whose type is one that float32 may round
-};
-// ResourceExhausted: it does not fit; errors of VolumeSource::Read.
-Result<LevelInMemory> ReadLevel(VolumeSource& source, int level, ReadProgress* progress = nullptr,
-                                ExactWanted wanted = ExactWanted::kLabels);
 
 }  // namespace slabstream

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/base/printable.h"
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 namespace {

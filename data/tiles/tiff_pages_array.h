@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/volume_io/tiff_file.h"
 
 namespace slabstream {
@@ -17,7 +17,7 @@ namespace slabstream {
 struct TiffPlace {
   std::size_t file = 0;         // in the pool
   std::uint64_t directory = 0;  // its place there
-  std::int64_t plane = 0;       // as of TiffChunk
+  std::int64_t plane = 0;       // TiffChunk::plane
 };
 
 // Open files at directories, which are used by one thread at a time: those that were used last.
@@ -27,7 +27,7 @@ class TiffPool {
   explicit TiffPool(std::vector<std::string> files) : files_(std::move(files)) {}
 
   struct Entry {
-    std::size_t number = 0;  // of the file
+    std::size_t number = 0;  // the file's number
     std::uint64_t directory = 0;
     std::unique_ptr<TiffFile> file;
     bool is_new = true;  // nobody has used it

@@ -5,23 +5,13 @@
 #include <set>
 #include <utility>
 
-#include "common/base/printable.h"
 #include "data/sources/chunked_source.h"
 #include "data/tiles/tiff_pages_array.h"
-#include "data/volume_io/formats.h"
 #include "data/volume_io/tiff_stack.h"
-#include "data/volume_io/volume_reader.h"
 #include "data/volume_io/world_placement.h"
 
 namespace slabstream {
 namespace {
-
-bool Recognises(const std::string& path, const ReadOptions&) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return false;
-  const VolumeFormat* const format = FindFormat(path, {});
-  return format != nullptr && format->name == "TIFF";
-}
 
 // The pictures of one level; `picture`: the header of the first one.
 struct Pictures {
@@ -73,15 +63,16 @@ std::vector<std::string> WatchedFiles(const std::string& path, const TiffStack& 
   return all;
 }
 
-Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  if (Status status = CheckVolume(path, options); !status.ok()) return status;
+}  // namespace
+
+Result<std::shared_ptr<VolumeSource>> OpenTiff(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::shared_ptr<VolumeSource>();
   Result<TiffStack> stack = OpenTiffStack(path, options);
   if (!stack.ok()) return stack.status();
   const RawHeader& header = stack->header;
   if (Status status = CheckChannel(path, header, stack->of_pages); !status.ok()) return status;
-  if (stack->of_pages.channel == kLuminance) {
-    return Status::InvalidArgument(path + ": cannot be read tile by tile: luminance needs several components of a voxel");
-  }
+  if (stack->of_pages.channel == kLuminance) return std::shared_ptr<VolumeSource>();
   const Result<WorldPlacement> placed = PlaceInWorld(header, path);
   if (!placed.ok()) return placed.status();
   const VolumeGeometry& geometry = placed->geometry;
@@ -98,7 +89,10 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
                            .window = stack->window,
                            .notes = header.notes,
                            .files = WatchedFiles(path, *stack)}};
-  if (header.channels.empty()) pyramid.info.channels.resize(header.components > 1 ? std::size_t(header.components) : 0);
+  if (header.channels.empty() && header.components > 1) {
+    pyramid.info.channels.resize(std::size_t(header.components));
+    pyramid.info.components = header.components;
+  }
   const auto pool = std::make_shared<TiffPool>(stack->files);
   for (Pictures& level : *levels) {
     const Vec3 size = ToVec3({level.picture.size.x, level.picture.size.y, geometry.size.z});
@@ -115,18 +109,6 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
          .origin = geometry.orientation.origin + first});
   }
   return MakeChunkedSource(path, std::move(pyramid), context);
-}
-
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<std::shared_ptr<VolumeSource>> source = OpenFile(path, options, context);
-  if (!source.ok()) return Printable(source.status());
-  return source;
-}
-
-}  // namespace
-
-SourceFormat TiledTiff() {
-  return {.name = "TIFF", .recognises = Recognises, .options = {"time", "channel", "series", "spacing"}, .open = Open};
 }
 
 }  // namespace slabstream

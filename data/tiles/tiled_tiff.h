@@ -6,12 +6,18 @@
 // corners of all levels coincide.
 #pragma once
 
-#include "data/sources/source_format.h"
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "data/sources/read_context.h"
+#include "data/sources/volume_source.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
-// Recognises files by their ending. Folders of slices are not its own. `open` reads the directories of all pages. InvalidArgument, too: the
-// luminance of several components.
-SourceFormat TiledTiff();
+// VolumeFormat::open of TIFF: reads the directories of all pages. Null: a folder of slices, or the luminance of several components, which
+// are decoded as a whole.
+Result<std::shared_ptr<VolumeSource>> OpenTiff(const std::string& path, const ReadOptions& options, const SourceContext& context);
 
 }  // namespace slabstream

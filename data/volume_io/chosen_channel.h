@@ -14,7 +14,7 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMostChannels = 65536;  // of an image: as many as ReadOptions::channel can tell apart
+inline constexpr std::size_t kMostChannels = 65536;  // channels of an image: as many as ReadOptions::channel can tell apart
 
 // The one that the options take, else the first one: in [0, channels.size()). `channels`: the names of all, "" where there is none, at
 // least one. InvalidArgument, naming `path` and the channels: the options take one that is not there.

@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kMostCodecText = 4096;  // bytes for a frame; wha
 
 enum class DicomCodec { kJpeg, kJpegLs, kJpeg2000, kRle };
 
-// Of a transfer syntax (UID), if its frames can be decompressed.
+// The codec of a transfer syntax (UID), if its frames can be decompressed.
 inline std::optional<DicomCodec> FindDicomCodec(std::string_view transfer_syntax) {
   constexpr std::array<std::pair<std::string_view, DicomCodec>, 12> kCodecs = {{
       {"1.2.840.10008.1.2.4.50", DicomCodec::kJpeg},

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <span>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {

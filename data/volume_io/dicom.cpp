@@ -98,7 +98,7 @@ VolumeFormat Dicom() {
 }
 
 bool IsDicom(const std::string& path) {
-  const VolumeFormat* const format = FindFormat(path, {});
+  const VolumeFormat* const format = FindFormat(FileFormats(), path, {});
   return format != nullptr && format->read == Read;
 }
 

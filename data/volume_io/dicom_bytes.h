@@ -34,7 +34,7 @@ class DicomBytes {
   bool Load(std::int64_t offset, std::size_t bytes);
 
   std::ifstream file_;
-  std::unique_ptr<Decompressor> inflate_;  // of a deflated data set
+  std::unique_ptr<Decompressor> inflate_;  // decompresses a deflated data set
   std::int64_t size_ = -1, begin_ = 0;
   std::vector<std::byte> window_;  // bytes from begin_ on
 };

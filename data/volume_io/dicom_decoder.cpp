@@ -15,8 +15,8 @@
 #include <sstream>
 #include <thread>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/program_beside.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/program_beside.h"
 
 namespace slabstream {
 namespace {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <string_view>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/binary_header.h"
 #include "data/volume_io/dicom_bytes.h"
 

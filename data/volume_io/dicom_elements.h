@@ -30,8 +30,8 @@ class DicomElements {
  public:
   struct Element {
     DicomTag tag = 0;
-    std::string value;                 // as in the file
-    std::vector<DicomElements> items;  // of a sequence
+    std::string value;                 // the value as the file has it
+    std::vector<DicomElements> items;  // the items of a sequence
   };
 
   // The caller of these functions knows the value representation of a tag. Absent, empty and broken values are left out.
@@ -63,11 +63,11 @@ class DicomElements {
 
 // Where the pixels of a file are.
 struct DicomPixelData {
-  std::int64_t offset = 0;       // of the first byte behind the element's header; 0: the file has no pixels
+  std::int64_t offset = 0;       // where the first byte behind the element's header is; 0: the file has no pixels
   std::int64_t bytes = 0;        // as many as the element claims, or as the file has, if these are fewer
   bool encapsulated = false;     // in fragments, which are items
-  bool words = false;            // of 16 bits, whose bytes big endian swaps, for any bits of a pixel
-  bool floats = false;           // of 32 or 64 bits, instead of integers
+  bool words = false;            // words of 16 bits, whose bytes big endian swaps, for any bits of a pixel
+  bool floats = false;           // floats of 32 or 64 bits, instead of integers
   std::int64_t deflated_at = 0;  // not 0: where the data set is deflated in the file; `offset` and `bytes` are of the decompressed one
 };
 

@@ -9,9 +9,9 @@
 #include <map>
 #include <type_traits>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/dicom_decoder.h"
 #include "data/volume_io/payload.h"

@@ -38,9 +38,9 @@ struct DicomFrame {
 struct DicomPixelFormat {
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
-  bool is_float = false;  // of 32 or 64 bits; what is above then says nothing
+  bool is_float = false;  // floats of 32 or 64 bits; what is above then says nothing
 
-  // Of the pixels as they are in memory, where a single bit takes a byte.
+  // The type of the pixels in memory, where a single bit takes a byte.
   SampleType type() const;
   friend bool operator==(const DicomPixelFormat&, const DicomPixelFormat&) = default;
 };
@@ -73,7 +73,8 @@ struct DicomImage {
   Status trouble;                      // why its frames cannot be read: the file has fewer than it claims, or they are no slices
 
   std::int64_t frame_pixels() const { return std::int64_t{columns} * rows; }
-  // As they are stored; frames follow each other without a gap. Of 1 bit a pixel, the lowest bit of a byte is its first pixel.
+  // Bits of a frame as it is stored; frames follow each other without a gap. If a pixel has 1 bit, the lowest bit of a
+  // byte is its first pixel.
   std::int64_t frame_bits() const { return frame_pixels() * format.bits_allocated; }
   bool is_segmentation() const { return segmentation != DicomSegmentation::kNone; }
   // The colours of a label map's palette stand for its labels.

@@ -7,8 +7,8 @@
 #include <functional>
 #include <map>
 
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/dicom_frames.h"
 #include "data/volume_io/dicom_segments.h"
 #include "data/volume_io/payload.h"

@@ -13,17 +13,17 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxFilesLookedAt = std::size_t{1} << 18;  // of a folder
+inline constexpr std::size_t kMaxFilesLookedAt = std::size_t{1} << 18;  // files of a folder
 
 struct DicomSeries {
-  // As in the files; texts may hold anything.
+  // Texts of the files; they may hold anything.
   std::string uid, number, modality, description;
   std::vector<DicomImage> images;
-  std::size_t copies = 0;  // of these images, of the same SOPInstanceUID and pixels, that are left out
+  std::size_t copies = 0;  // images that are left out, since they have the SOPInstanceUID and the pixels of one of these
   // What it is instead of a volume, such as "a localizer"; empty: it is chosen if it is the only one.
   std::string other;
   Status trouble;    // not ok: why it cannot be read; Printable
-  DicomStack stack;  // of all frames of all images, one image after the other; if there is no trouble
+  DicomStack stack;  // all frames of all images, one image after the other; if there is no trouble
 
   std::size_t frame_count() const;
 };

@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/world_placement.h"
 

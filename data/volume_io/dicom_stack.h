@@ -32,13 +32,13 @@ struct DicomSlice {
 };
 
 struct DicomStack {
-  Index3 size;                // of each volume
+  Index3 size;                // the size of each volume
   int volumes = 1;            // in the order of the values that tell them apart
   std::string told_apart;     // "EchoTime 4.6, 9.2"; "": one volume
   std::array<Vec3, 3> steps;  // from a voxel to the next one along a row, a column and the stack; mm to right, anterior, superior
   Vec3 origin;
   std::vector<std::size_t> order;    // numbers of slices by their position, one volume after the other
-  std::vector<std::int32_t> places;  // of a segmentation: the slice that each frame is a part of
+  std::vector<std::int32_t> places;  // for a segmentation: the slice that each frame is a part of
 };
 
 // InvalidArgument: fewer than two slices, slices without a place or of different sizes, planes or spacings, several at the same position

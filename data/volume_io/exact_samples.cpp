@@ -37,20 +37,12 @@ namespace {
 constexpr double kMostFloat = std::numeric_limits<float>::max(), kLeastFloat = std::numeric_limits<float>::min();
 
 // Samples that no float32 holds, and what makes them fit; "": it holds them all, but for their last digits.
-template <class T>
-std::string BeyondFloat(std::span<const T> samples) {
-  std::size_t beyond = 0;
-  double greatest = 0;
-  for (const T sample : samples) {
-    const double magnitude = std::abs(double(sample));
-    if (!std::isfinite(magnitude)) continue;
-    if (magnitude > kMostFloat) ++beyond;
-    greatest = std::max(greatest, magnitude);
-  }
+std::string BeyondFloat(const FloatReach& reach) {
+  const auto& [count, beyond, greatest] = reach;
   const int digits = greatest > 0 ? int(std::floor(std::log10(greatest))) : 0;
   if (beyond > 0) {
     return fmt::format("{} of {} values are beyond those of float32 (3.4e38) and are not shown: divide the values, by 1e{} for example",
-                       beyond, samples.size(), digits);
+                       beyond, count, digits);
   }
   if (greatest > 0 && greatest < kLeastFloat) {
     return fmt::format("the largest value, {:g}, is too small for float32 (1.2e-38): multiply the values, by 1e{} for example", greatest,
@@ -61,18 +53,27 @@ std::string BeyondFloat(std::span<const T> samples) {
 
 }  // namespace
 
-std::string RoundingText(SampleType type, const ExactSamples* all) {
+void FloatReach::Add(std::span<const double> samples) {
+  count += samples.size();
+  for (const double sample : samples) {
+    const double magnitude = std::abs(sample);
+    if (!std::isfinite(magnitude)) continue;
+    if (magnitude > kMostFloat) ++beyond;
+    greatest = std::max(greatest, magnitude);
+  }
+}
+
+std::string RoundingText(SampleType type, const ExactSamples* labels, const FloatReach& reach) {
   return VisitSampleType(type, [&]<class T>(const T*) {
-    const auto samples =
-        all == nullptr ? std::span<const T>() : std::span(reinterpret_cast<const T*>(all->bytes.data()), all->bytes.size() / sizeof(T));
     if constexpr (!std::is_integral_v<T>) {
-      if (std::string beyond = BeyondFloat(samples); !beyond.empty()) return beyond;
+      if (std::string beyond = BeyondFloat(reach); !beyond.empty()) return beyond;
       return fmt::format("pictures show values of type {} rounded to float32, and none beyond 3.4e38; conversions are exact",
                          ToString(type));
     } else {
       std::string values = fmt::format("values of type {}", ToString(type));
-      if (all != nullptr) {
-        const auto [least, greatest] = std::ranges::minmax(samples);
+      if (labels != nullptr) {
+        const auto [least, greatest] =
+            std::ranges::minmax(std::span(reinterpret_cast<const T*>(labels->bytes.data()), labels->bytes.size() / sizeof(T)));
         values = fmt::format("values from {} to {}", least, greatest);
       }
       return values +

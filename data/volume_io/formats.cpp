@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/base/find_named.h"
+#include "common/text/url.h"
 #include "data/volume_io/output.h"
 #include "data/volume_io/text_header.h"
 
@@ -30,7 +31,7 @@ VolumeFormat Jpeg2000();
 VolumeFormat Bmp();
 VolumeFormat Raw();
 
-const std::vector<VolumeFormat>& VolumeFormats() {
+const std::vector<VolumeFormat>& FileFormats() {
   static const std::vector<VolumeFormat> formats = {
       Nifti(),          Mgh(), Nrrd(), MetaImage(), Tiff(),     Dicom(), Mrc(), UnstructuredGrid(), VtkLegacy(), VtkImage(),
       VtkRectilinear(), Npy(), Png(),  Jpeg(),      Jpeg2000(), Bmp(),   Raw()};
@@ -48,9 +49,8 @@ std::string Joined(const std::vector<std::string_view>& texts) { return fmt::for
 
 }  // namespace
 
-const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& options) {
+const VolumeFormat* FindFormat(const std::vector<VolumeFormat>& formats, const std::string& path, const ReadOptions& options) {
   std::error_code error;
-  const std::vector<VolumeFormat>& formats = VolumeFormats();
   auto found = formats.end();
   if (!std::filesystem::is_directory(path, error)) {
     found = std::ranges::find_if(formats, [&](const VolumeFormat& format) {
@@ -62,6 +62,12 @@ const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& optio
         formats, [&](const VolumeFormat& format) { return format.recognises != nullptr && format.recognises(path, options); });
   }
   return found == formats.end() ? nullptr : &*found;
+}
+
+bool LooksLikeVolumeFile(const std::string& path) {
+  const VolumeFormat* const format = FindFormat(FileFormats(), path, {});
+  std::error_code error;
+  return format != nullptr && format->required.empty() && std::filesystem::exists(path, error);
 }
 
 std::string_view WhyUnread(const std::string& path) {
@@ -82,13 +88,13 @@ std::string_view WhyUnread(const std::string& path) {
 
 const VolumeFormat* FindWritableFormat(const std::string& path) {
   const auto found =
-      std::ranges::find_if(VolumeFormats(), [&](const VolumeFormat& format) { return EndsInOneOf(path, format.written_endings); });
-  return found == VolumeFormats().end() ? nullptr : &*found;
+      std::ranges::find_if(FileFormats(), [&](const VolumeFormat& format) { return EndsInOneOf(path, format.written_endings); });
+  return found == FileFormats().end() ? nullptr : &*found;
 }
 
-std::string ReadableText() {
+std::string ReadableText(const std::vector<VolumeFormat>& formats) {
   std::vector<std::string_view> endings, others;
-  for (const VolumeFormat& format : VolumeFormats()) {
+  for (const VolumeFormat& format : formats) {
     for (const std::string_view ending : format.endings) {
       if (std::ranges::find(endings, ending) == endings.end()) endings.push_back(ending);
     }
@@ -99,7 +105,7 @@ std::string ReadableText() {
 
 std::string WritableEndings() {
   std::vector<std::string_view> endings;
-  for (const VolumeFormat& format : VolumeFormats())
+  for (const VolumeFormat& format : FileFormats())
     endings.insert(endings.end(), format.written_endings.begin(), format.written_endings.end());
   return Joined(endings);
 }
@@ -119,7 +125,8 @@ std::string WhatIsLost(const VolumeFormat& format, const VolumeGeometry& geometr
 
 Status CheckOptions(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
   for (const ReadOption& option : ReadOptionList()) {
-    if (!option.given(options) || std::ranges::count(format.options, option.name) > 0) continue;
+    const bool taken = option.of_addresses ? IsUrl(path) : std::ranges::count(format.options, option.name) > 0;
+    if (!option.given(options) || taken) continue;
     const std::string takes = format.options.empty() ? "takes none" : "takes " + Joined(format.options);
     return Status::InvalidArgument(fmt::format("{}: {} is no option of {}, which {}", path, option.name, format.name, takes));
   }

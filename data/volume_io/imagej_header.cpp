@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/text_header.h"
 

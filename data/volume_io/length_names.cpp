@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/base/find_named.h"
-#include "common/base/trimmed.h"
+#include "common/text/trimmed.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {

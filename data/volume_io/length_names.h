@@ -11,7 +11,8 @@ namespace slabstream {
 // "mm", "microns", "Nanometers", in upper or lower case; none: a name that is not known.
 std::optional<LengthUnit> LengthUnitNamed(std::string_view name);
 
-// Of any length of the metric system, and of inches, feet, yards, miles, points and others that OME knows; none: a name that is not known.
+// Micrometres in any length of the metric system, and in inches, feet, yards, miles, points and others that OME knows;
+// none: a name that is not known.
 std::optional<double> MicrometresIn(std::string_view name);
 
 // The name that is written, in ASCII: "um". `unit` is one that files state.

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "data/volume_io/mesh_reader.h"
 
 namespace slabstream {

@@ -26,20 +26,20 @@ struct MeshFileInfo {
     const CellKind* kind = nullptr;
     std::int64_t count = 0;
   };
-  std::vector<CellCount> kinds;   // that occur, in the order of CellKinds()
+  std::vector<CellCount> kinds;   // the kinds that occur, in the order of CellKinds()
   std::vector<GridArray> arrays;  // in the file's order
   std::size_t array = 0;          // the one that is read, of `arrays`
-  std::optional<int> channel{};   // of its components: that of MeshOptions
+  std::optional<int> channel{};   // the component that is read: that of MeshOptions
 };
 
 struct LoadedMesh {
   MeshFileInfo info;
-  Bounds3 bounds;  // of the points, in the world
+  Bounds3 bounds;  // the bounds of the points, in the world
   Mesh mesh;       // its points are in the world, from bounds.low
 };
 
 struct MeshOptions {
-  // As in ReadOptions.
+  // ReadOptions::array and time.
   std::string array;
   std::optional<TimeRange> time = {};
   std::optional<int> channel = {};

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/output.h"

@@ -15,7 +15,7 @@
 
 namespace slabstream {
 
-inline constexpr std::int32_t kNifti1Bytes = 348, kNifti2Bytes = 540;  // of headers, which begin with this number
+inline constexpr std::int32_t kNifti1Bytes = 348, kNifti2Bytes = 540;  // sizes of headers, which begin with this number
 
 struct NiftiHeader {
   std::string_view version;  // "NIfTI-1", "NIfTI-2" or "Analyze 7.5"

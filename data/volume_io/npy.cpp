@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/output.h"
 

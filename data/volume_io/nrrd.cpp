@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/nrrd_axes.h"

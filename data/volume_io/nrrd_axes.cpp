@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "common/base/parse_number.h"
-#include "common/base/trimmed.h"
+#include "common/text/parse_number.h"
+#include "common/text/trimmed.h"
 
 namespace slabstream {
 namespace {

@@ -15,12 +15,12 @@
 namespace slabstream {
 
 struct NrrdAxes {
-  std::size_t first = 0;                          // of the three axes of space
+  std::size_t first = 0;                          // the first of the three axes of space
   double components = 1;                          // samples of the axes in front of them
-  std::vector<double> sizes;                      // of the three, and of those of time behind
+  std::vector<double> sizes;                      // sizes of these three, and of the axes of time behind them
   double channels = 1;                            // samples of an axis behind them that is none of time
-  std::optional<std::array<Vec3, 3>> directions;  // of the three, as in `space directions`
-  std::size_t space_numbers = 3;                  // of a position: 3, or with time 4
+  std::optional<std::array<Vec3, 3>> directions;  // directions of these three, as in `space directions`
+  std::size_t space_numbers = 3;                  // numbers of a position: 3, or with time 4
   std::vector<std::string> notes;                 // what was guessed
 };
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {

@@ -19,14 +19,14 @@ struct OmeTiffData {
   std::int64_t page = 0;                          // IFD
   std::int64_t count = 0;                         // PlaneCount; 0: all pages of the file
   std::string file_name = {};                     // "": not stated
-  std::string uuid = {};                          // of the file
+  std::string uuid = {};                          // the file's UUID
 };
 
 struct OmeHeader {
-  std::string uuid;                        // of the file that has it
+  std::string uuid;                        // the UUID of the file that has this header
   std::string metadata_file;               // BinaryOnly: the file that has the rest; "": this one
   std::vector<std::string> images = {};    // names of all
-  XmlTag pixels = {};                      // of the chosen image
+  XmlTag pixels = {};                      // the chosen image
   std::vector<std::string> channels = {};  // names, "" where there is none
   std::vector<OmeTiffData> tiff_data = {};
   bool modulo = false;  // an axis stands for two, such as slices for phases of each

@@ -11,8 +11,8 @@
 #include <set>
 #include <utility>
 
-#include "common/base/files.h"
-#include "common/base/parse_number.h"
+#include "common/files/files.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/ome_header.h"
 #include "data/volume_io/tiff_file.h"

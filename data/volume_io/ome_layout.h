@@ -13,10 +13,10 @@ namespace slabstream {
 // and ReadTextFile.
 Result<std::string> DescriptionIn(const std::string& path);
 
-// `path`: the file that has the description; files that this one names are looked for in its folder, and only there. Lengths are converted
-// to micrometres. Of several images options.series takes one, from 0; the first one without it.
-// InvalidArgument, naming `path`: no XML; sizes out of [1, kMaxVolumes]; an unknown DimensionOrder; an image that is not there. NotFound:
-// the description is in another file, which is missing.
+// `path`: the file that has the description; files that this one names are looked for in its folder, and only there.
+// Lengths are converted to micrometres. If there are several images, options.series says which one, from 0; without it,
+// the first one is taken. InvalidArgument, naming `path`: no XML; sizes out of [1, kMaxVolumes]; an unknown
+// DimensionOrder; an image that is not there. NotFound: the description is in another file, which is missing.
 Result<PageLayout> ReadOmeLayout(const std::string& path, const std::string& description, const ReadOptions& options);
 
 }  // namespace slabstream

@@ -6,7 +6,7 @@
 #include <array>
 #include <cctype>
 
-#include "common/base/url.h"
+#include "common/text/url.h"
 
 namespace slabstream {
 namespace {

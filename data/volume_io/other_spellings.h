@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-// The path of a file, or an address (IsUrl, common/base/url.h), that `text` names. `text` begins with a scheme and has no query.
+// The path of a file, or an address (IsUrl, common/text/url.h), that `text` names. `text` begins with a scheme and has no query.
 //
 //   zarr://URL, zarr2://, zarr3://, n5://, precomputed://    URL: which format it is, is seen there
 //   URL|zarr3:PATH|, and so on                               URL/PATH

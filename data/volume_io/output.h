@@ -1,10 +1,10 @@
-// Parts of writers: a header and samples go into a file that is written whole or not at all (common/base/files.h).
+// Parts of writers: a header and samples go into a file that is written whole or not at all (common/files/files.h).
 #pragma once
 
 #include <string>
 
-#include "common/base/files.h"
 #include "common/base/status.h"
+#include "common/files/files.h"
 #include "common/math/vec.h"
 #include "data/volume_io/file_samples.h"
 

@@ -14,7 +14,7 @@ namespace slabstream {
 
 // Planes that follow each other in a PageLayout's order and are pages that follow each other in a file.
 struct PageRun {
-  std::int64_t slice = 0, channel = 0, time = 0;  // of the first plane
+  std::int64_t slice = 0, channel = 0, time = 0;  // where the first plane belongs
   std::int64_t count = 0;                         // 0: as many as the file has pages from `page` on
   std::int64_t page = 0;                          // number of the first one among all directories of the file's chain
   std::size_t file = 0;                           // in PageLayout::files
@@ -23,17 +23,17 @@ struct PageRun {
 };
 
 struct PageLayout {
-  std::string source;                                // who says so, for people: "ImageJ"
+  std::string source;                                // the program that says so, for people: "ImageJ"
   std::int64_t slices = 1, channels = 1, times = 1;  // each in [1, kMaxVolumes]
   std::string order = "CZT";                         // which runs fastest from plane to plane, which next
   std::vector<std::string> channel_names = {};       // those that it says
   std::vector<PageRun> runs = {};                    // empty: planes are the pages of the file, one after the other
   std::vector<std::string> files = {};               // paths; the first one is the file itself
-  std::optional<Vec3> spacing = {};                  // of voxels
-  std::optional<LengthUnit> unit = {};               // of the spacing
+  std::optional<Vec3> spacing = {};                  // the spacing of voxels
+  std::optional<LengthUnit> unit = {};               // the unit of the spacing
   ValueMapping rescale = {};                         // from samples to data values
   std::optional<ValueRange> window = {};             // data values that its author shows
-  std::vector<std::string> notes = {};               // as of VolumeFileInfo
+  std::vector<std::string> notes = {};               // as of SourceInfo
 
   // The number of a plane in `order`.
   std::int64_t NumberOf(std::int64_t slice, std::int64_t channel, std::int64_t time) const;

@@ -32,7 +32,7 @@ struct Payload {
   // Where the samples continue, packed alike, if they lie in several files. Each of the files, the first one too, has part_bytes of them.
   std::vector<PayloadPlace> more = {};
   std::int64_t part_bytes = 0;  // 0: there is one file
-  std::int64_t passed = 0;      // of the first file's part_bytes, those that Pass has left out
+  std::int64_t passed = 0;      // bytes of the first file's part_bytes that Pass has left out
 
   bool compressed() const { return compression != Compression::kNone; }
   PayloadPlace place() const { return {file, offset, skip}; }
@@ -73,8 +73,8 @@ class PayloadStream {
 
   const Payload payload_;
   std::int64_t left_;          // bytes of the samples that are still to be read
-  std::size_t next_part_ = 0;  // of payload_.more
-  // Of the file that is read.
+  std::size_t next_part_ = 0;  // an index of payload_.more
+  // The file that is read.
   std::filesystem::path name_;
   std::int64_t part_bytes_ = 0, found_ = 0;
   std::ifstream file_;

@@ -13,8 +13,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/mesh/mesh.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/payload.h"
@@ -23,7 +23,7 @@
 
 namespace slabstream {
 
-inline constexpr int kMaxComponents = 1024;  // of a voxel
+inline constexpr int kMaxComponents = 1024;  // components of a voxel
 
 struct RawHeader {
   Index3 size;
@@ -31,27 +31,27 @@ struct RawHeader {
   int components = 1;  // in [1, kMaxComponents]
   // In [1, kMaxVolumes], one after the other in the payload; of an image with channels: of each channel, one behind the other.
   std::int64_t volumes = 1;
-  std::int64_t number = 0;  // which of them: in [0, volumes)
+  std::int64_t number = 0;  // the volume's number in [0, volumes)
   World world = World::kVoxels;
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
   std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  Vec3 origin;                       // of the centre of the first voxel
-  std::optional<LengthUnit> unit{};  // of steps and origin, if the file states it
+  Vec3 origin;                       // the centre of the first voxel
+  std::optional<LengthUnit> unit{};  // the unit of steps and origin, if the file states it
   std::string_view matrix{};         // the file's name for the steps, for messages; lives as long as the program
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
   bool labels = false;   // samples are numbers of structures, not measurements
-  // Of an image: names of its channels, and which of them this is; empty: there is one channel.
+  // The names of an image's channels, and which of them this is; empty: there is one channel.
   std::vector<std::string> channels = {};
   int channel = 0;
-  std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: VolumeFileInfo
+  std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: SourceInfo
 
-  // Of all components.
+  // Bytes of all components of a volume.
   std::int64_t sample_bytes() const {
     return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)) * components;
   }
-  // Of all volumes, or more than any file has.
+  // Bytes of all volumes, or more than any file has.
   std::int64_t all_bytes() const {
     constexpr std::int64_t kMost = std::int64_t{1} << 61;
     const std::int64_t count = volumes * std::max<std::int64_t>(1, std::int64_t(channels.size()));
@@ -62,13 +62,15 @@ struct RawHeader {
 // What a header says: the volume, and where its samples lie.
 struct LocatedSamples {
   RawHeader header;
-  Payload payload;  // of all volumes
+  Payload payload;  // the samples of all volumes
 };
 
 struct RawVolume {
   RawHeader header;
-  AlignedVector<std::byte> bytes;     // this machine's byte order; none if only headers were read
-  std::shared_ptr<const Mesh> cells;  // of an unstructured grid, in data space of the volume, which is not turned or straightened
+  AlignedVector<std::byte> bytes;  // this machine's byte order; none if only headers were read
+  // The cells of an unstructured grid, in data space of the volume, which is not turned or straightened.
+  std::shared_ptr<const Mesh> cells;
+  bool size_unknown = false;                       // headers alone do not tell it
   std::vector<std::filesystem::path> other_files;  // beside the path that is read, or the folder of many
 };
 
@@ -101,7 +103,8 @@ Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& l
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
 Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& located, const ReadOptions& options);
 
-// Of the components of a voxel the one that `channel` takes (ReadOptions::channel), or the luminance of the first three by ITU-R BT.709.
+// The component of a voxel that `channel` takes (ReadOptions::channel), or the luminance of the first three by ITU-R
+// BT.709.
 template <class T>
 T TakenComponent(const T* voxel, std::optional<int> channel) {
   if (channel != kLuminance) return voxel[channel.value_or(0)];
@@ -109,7 +112,7 @@ T TakenComponent(const T* voxel, std::optional<int> channel) {
   return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
 }
 
-// Of several components the one that options.channel takes, or their luminance, in place.
+// Keeps one of several components in place: the one that options.channel takes, or their luminance.
 void TakeChannel(RawVolume& raw, const ReadOptions& options);
 
 }  // namespace slabstream

@@ -7,8 +7,8 @@
 #include <cctype>
 #include <cmath>
 
-#include "common/base/parse_number.h"
 #include "common/mesh/lattice.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

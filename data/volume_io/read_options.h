@@ -39,27 +39,27 @@ struct TimeRange {
 Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
 
 struct ReadOptions {
-  std::string series;             // of a DICOM folder: number or UID; "": the only one. Of an OME-TIFF: an image; "": the first
-  std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
-  std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
+  std::string series;             // in a DICOM folder a number or UID; "": the only series. In an OME-TIFF an image; "": the first
+  std::optional<TimeRange> time;  // the volume of a file that holds several. Readers take one, a catalogue takes several
+  std::optional<int> channel;     // the component of a voxel, from 0; or kLuminance
   std::optional<Vec3> spacing;    // each > 0, finite
-  std::string matrix;             // which of the matrices of a NIfTI file that states both: "sform" or "qform"; "": by its codes
-  // Of VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
-  std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
+  std::string matrix;             // the matrix of a NIfTI file that states both: "sform" or "qform"; "": by its codes
+  // For VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
+  std::string array;                    // the array; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
-  // Of HDF5 files.
+  // For HDF5 files.
   std::string dataset;  // the path of one in the file, at most kMaxDatasetBytes; "": the image that its layout says, or the only volume
-  // Of raw samples.
+  // For raw samples.
   std::optional<Index3> dims;  // voxels along x, y and z, each in [1, kMaxVolumeSide]
   std::optional<SampleType> type;
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
-  bool follow_links = false;           // of folders of objects: links that lead out of the folder, such as those of git-annex, are followed
-  // Of addresses.
-  std::vector<std::string> headers;  // that go with each request: "NAME:VALUE", or "NAME:@FILE" with the value in a file
-  std::string query;                 // that stands in the address itself, such as a signature: goes with each request. Not to be shown
+  bool follow_links = false;           // in folders of objects: links that lead out of the folder, such as those of git-annex, are followed
+  // For addresses.
+  std::vector<std::string> headers;  // headers that go with each request: "NAME:VALUE", or "NAME:@FILE" with the value in a file
+  std::string query;                 // the query of the address itself, such as a signature: goes with each request. Not to be shown
   // What users cannot say.
-  std::shared_ptr<Store> store;      // that lies at the address, opened with these options; null: the path tells
+  std::shared_ptr<Store> store;      // the store at the address, opened with these options; null: the path tells
   bool describe = false;             // without `time`, a source of several volumes opens the first one
   bool labels = false;               // samples are numbers of structures, even if the file does not say so
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
@@ -78,7 +78,7 @@ struct ReadOption {
 const std::vector<ReadOption>& ReadOptionList();
 
 struct SourceText {
-  std::string path;  // of a file, or an address (IsUrl, common/base/url.h) without a query, but for the endpoint of a bucket
+  std::string path;  // of a file, or an address (IsUrl, common/text/url.h) without a query, but for the endpoint of a bucket
   ReadOptions options;
   std::string options_text;  // "?time=3,channel=1": those that say which volume it is, as they are written; empty: there are none
 };

@@ -47,43 +47,46 @@ bool ExactAsFloat(T value) {
 template <class T>
 bool IsInteger(T value) {
   if constexpr (std::is_floating_point_v<T>) {
-    return std::trunc(value) == value;  // false for NaN
+    return std::isfinite(value) && std::trunc(value) == value;
   } else {
     return true;
   }
 }
 
-// Narrows samples of 32 and 64 bits: to uint16 if all are integers within a stretch of 65536, else to float.
+// As uint16 if all are integers within a stretch of 65536.
 template <class T>
-KeptSamples Narrow(AlignedVector<std::byte>& bytes) {
-  constexpr T kSpan = 65535;
-  const std::span<T> samples = SamplesOf<T>(bytes);
-  T low = std::numeric_limits<T>::max(), high = std::numeric_limits<T>::lowest();
-  bool integers = true;
-  for (const T sample : samples) {
+std::optional<KeptSamples> Shifted(std::span<const T> samples) {
+  using Wide = std::conditional_t<std::is_same_v<T, float>, double, T>;  // sums of floats are not exact
+  constexpr Wide kSpan = 65535;
+  Wide low = std::numeric_limits<T>::max(), high = std::numeric_limits<T>::lowest();
+  for (const Wide sample : samples) {
+    if (!IsInteger(sample)) return std::nullopt;
     low = std::min(low, sample);
     high = std::max(high, sample);
-    integers = integers && IsInteger(sample);
   }
-  KeptSamples kept;
   // Compare without subtracting, which could overflow.
-  const bool fits = integers && (low >= std::numeric_limits<T>::max() - kSpan || high <= low + kSpan);
-  if (fits) {
-    const T shift = low >= 0 && high <= kSpan ? T{0} : low;
-    // shift + sample is computed as double.
-    const bool exact = std::is_floating_point_v<T> || std::max(std::abs(double(low)), std::abs(double(high))) < 0x1p53;
-    kept = {ScalarType::kUint16, double(shift), exact, {}};
-    kept.bytes.resize(samples.size() * sizeof(std::uint16_t));
-    const std::span<std::uint16_t> out = SamplesOf<std::uint16_t>(kept.bytes);
-    for (std::size_t i = 0; i < samples.size(); ++i) out[i] = std::uint16_t(samples[i] - shift);
-  } else {
-    kept.type = ScalarType::kFloat32;
-    kept.bytes.resize(samples.size() * sizeof(float));
-    const std::span<float> out = SamplesOf<float>(kept.bytes);
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      out[i] = float(samples[i]);
-      kept.exact = kept.exact && ExactAsFloat(samples[i]);
-    }
+  if (low < std::numeric_limits<T>::max() - kSpan && high > low + kSpan) return std::nullopt;
+  const Wide shift = low >= 0 && high <= kSpan ? Wide{0} : low;
+  // shift + sample is computed as double.
+  const bool exact = std::is_floating_point_v<T> || std::max(std::abs(double(low)), std::abs(double(high))) < 0x1p53;
+  KeptSamples kept{ScalarType::kUint16, double(shift), exact, {}};
+  kept.bytes.resize(samples.size() * sizeof(std::uint16_t));
+  const std::span<std::uint16_t> out = SamplesOf<std::uint16_t>(kept.bytes);
+  for (std::size_t i = 0; i < samples.size(); ++i) out[i] = std::uint16_t(samples[i] - shift);
+  return kept;
+}
+
+// Narrows samples of 32 and 64 bits: to uint16 if they fit, else to float.
+template <class T>
+KeptSamples Narrow(AlignedVector<std::byte>& bytes) {
+  const std::span<const T> samples = SamplesOf<T>(bytes);
+  if (std::optional<KeptSamples> shifted = Shifted(samples)) return *std::move(shifted);
+  KeptSamples kept{.type = ScalarType::kFloat32};
+  kept.bytes.resize(samples.size() * sizeof(float));
+  const std::span<float> out = SamplesOf<float>(kept.bytes);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    out[i] = float(samples[i]);
+    kept.exact = kept.exact && ExactAsFloat(samples[i]);
   }
   return kept;
 }
@@ -130,7 +133,14 @@ bool AllFitFloat(SampleType type, std::span<const std::byte> samples) {
   });
 }
 
-KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) { return KeepBeside(type, bytes); }
+std::optional<KeptSamples> ShiftedToUint16(SampleType type, std::span<const std::byte> samples) {
+  return VisitSampleType(type, [&]<class T>(const T*) -> std::optional<KeptSamples> {
+    if constexpr (sizeof(T) < sizeof(float))
+      return std::nullopt;
+    else
+      return Shifted(std::span(reinterpret_cast<const T*>(samples.data()), samples.size() / sizeof(T)));
+  });
+}
 
 KeptSamples KeepBeside(SampleType type, AlignedVector<std::byte>& bytes) {
   switch (type) {

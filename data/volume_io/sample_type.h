@@ -1,4 +1,5 @@
-// The sample types that volume files hold, and how they become the three types that are kept (volume_reader.h says which becomes which).
+// The sample types that volume files hold, and how they become the three types that are kept (data/open/read_volume.h says which becomes
+// which).
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/half.h"
 
@@ -50,9 +51,5 @@ struct KeptSamples {
   bool exact = true;  // every value of the file is kept exactly
   AlignedVector<std::byte> bytes;
 };
-
-// Takes over `bytes`: aligned samples of `type` in this machine's byte order. Types of the same size are converted in place; others need
-// the memory of the kept samples on top.
-KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes);
 
 }  // namespace slabstream

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "common/base/natural_order.h"
+#include "common/text/natural_order.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {
@@ -60,7 +60,7 @@ bool IsPicture(const std::string& path) {
 
 bool HasVolumeFiles(const std::string& folder) {
   std::vector<std::string_view> of_volumes;
-  for (const VolumeFormat& format : VolumeFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
+  for (const VolumeFormat& format : FileFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
   return !SlicesIn(folder, of_volumes).empty();
 }
 

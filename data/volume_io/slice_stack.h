@@ -43,8 +43,8 @@ class SliceFile {
   virtual Status ReadSamples(const RawHeader& header, std::byte* out) = 0;
 };
 
-// Of a volume of `count` slices like `slice`. Spacing: options.spacing if it is given, else that of the slice. InvalidArgument: too many.
-// DataLoss: files of `file_bytes` cannot hold it.
+// The header of a volume of `count` slices like `slice`. Spacing: options.spacing if it is given, else that of the
+// slice. InvalidArgument: too many. DataLoss: files of `file_bytes` cannot hold it.
 Result<RawHeader> HeaderOfSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
                                  const ReadOptions& options);
 

@@ -5,8 +5,8 @@
 
 #include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
-#include "common/base/trimmed.h"
-#include "common/base/url.h"
+#include "common/text/trimmed.h"
+#include "common/text/url.h"
 #include "data/volume_io/other_spellings.h"
 #include "data/volume_io/read_options.h"
 

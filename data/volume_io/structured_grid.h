@@ -19,7 +19,7 @@ namespace slabstream {
 struct PointGrid {
   std::array<double, 3> points = {1, 1, 1};  // as the file says: perhaps no whole numbers
   std::array<Vec3, 3> steps = StepsOf({1, 1, 1});
-  Vec3 origin;                // of the first point
+  Vec3 origin;                // the place of the first point
   std::string_view matrix{};  // RawHeader::matrix
 };
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

@@ -20,7 +20,7 @@ class TextCursor {
   explicit TextCursor(const std::string& path, std::int64_t begin = 0, std::int64_t end = std::int64_t{1} << 62);
 
   bool is_open() const { return file_.is_open(); }
-  std::int64_t offset() const { return offset_; }  // of the byte that is read next
+  std::int64_t offset() const { return offset_; }  // where the byte that is read next is
   void GoTo(std::int64_t offset);
 
   std::optional<char> Next();

@@ -9,8 +9,8 @@
 #include <limits>
 #include <sstream>
 
-#include "common/base/parse_number.h"
-#include "common/base/trimmed.h"
+#include "common/text/parse_number.h"
+#include "common/text/trimmed.h"
 
 namespace slabstream {
 namespace {

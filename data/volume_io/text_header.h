@@ -60,7 +60,7 @@ struct TextFormat {
   std::string first_line;              // how it begins
   const char* separators;              // each may stand between key and value
   std::string key_value;               // separates what is no field: it is found by its key with this behind it; "": all are fields
-  bool ignores_case;                   // of keys: they are found by their lower case
+  bool ignores_case;                   // whether keys are found by their lower case
   std::vector<const char*> data_keys;  // fields that name the samples' files
   bool data_ends_header;               // such a field is the last one; else an empty line ends the header
   std::vector<const char*> required;   // keys of fields that must not be empty
@@ -68,7 +68,7 @@ struct TextFormat {
   Result<TextPayload> (*read_payload)(const TextHeader& text);
 };
 
-// Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.
+// Skips lines of the header that begin with # and lines without the separator. Errors as of VolumeFormat::locate.
 Result<LocatedSamples> LocateInTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options);
 
 std::string ToLower(std::string text);

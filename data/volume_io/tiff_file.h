@@ -18,8 +18,8 @@ class TiffInput;
 
 struct TiffPage {
   std::int64_t number = 0;                  // among all directories of the file's chain, from 0
-  std::uint64_t offset = 0;                 // of its directory in the file
-  std::vector<std::uint64_t> smaller = {};  // of pictures of the page at lower resolutions, in the file's order
+  std::uint64_t offset = 0;                 // where its directory is in the file
+  std::vector<std::uint64_t> smaller = {};  // where the page's pictures at lower resolutions are, in the file's order
 };
 
 // How a picture is cut into parts that are decoded on their own: tiles, or rows of some strips each.
@@ -33,8 +33,8 @@ struct TiffChunks {
 };
 struct TiffChunk {
   std::int32_t column = 0, row = 0;  // which, counted from the upper left
-  int component = 0;                 // of those that have chunks of their own
-  // Of pictures that follow the directory's own one without directories of theirs (CheckPlanes): 0 is its own.
+  int component = 0;                 // the component, if components have chunks of their own
+  // The picture, if several follow the directory's own one without directories of theirs (CheckPlanes): 0 is its own.
   std::int64_t plane = 0;
 };
 
@@ -49,19 +49,19 @@ class TiffFile : public SliceFile {
   // All pages from this one on, and goes to the last one. DataLoss: the chain of pages is broken.
   Result<std::vector<TiffPage>> ReadPages();
 
-  std::string Description() const;  // of this page, "" if there is none
+  std::string Description() const;  // the text of this page, "" if there is none
   // A resolution, in pixels per unit; 0: not stated. ResolutionUnit: 0 not stated, 1 none, 2 inch, 3 cm.
   double XResolution() const;
   double YResolution() const;
   int ResolutionUnit() const;
   // Whether the file goes on to the end of the directory at `offset`, where it says whether there is another one.
   bool HoldsDirectory(std::uint64_t offset) const;
-  std::uint64_t size() const;  // of the file, in bytes
+  std::uint64_t size() const;  // the file's size in bytes
 
   // Its notes say what of the picture is not applied, such as a colour map. InvalidArgument: a compression, a kind of colours or a type
   // that is not supported.
   Result<RawHeader> ReadHeader() override;
-  // Of the plane that was set last (CheckPlanes), at first 0.
+  // Reads the plane that was set last (CheckPlanes), at first 0.
   Status ReadSamples(const RawHeader& header, std::byte* out) override;
   void SetPlane(std::int64_t plane) { plane_ = plane; }
 
@@ -81,10 +81,10 @@ class TiffFile : public SliceFile {
   Status Failed(StatusCode code, const std::string& why) const;
   Status Damaged() const;
 
-  unsigned Bits() const;                                                 // of a sample in the file
-  std::size_t RowBytes(std::int64_t samples) const;                      // of so many samples, in the file
+  unsigned Bits() const;                                                 // bits of a sample in the file
+  std::size_t RowBytes(std::int64_t samples) const;                      // bytes of so many samples in the file
   Status CheckCompression() const;                                       // InvalidArgument, naming it
-  Status CheckColours(int components, std::vector<std::string>& notes);  // of RawHeader
+  Status CheckColours(int components, std::vector<std::string>& notes);  // `components` and `notes` are RawHeader's
   // The bytes of a chunk before samples are unpacked; of another plane than the directory's own.
   Result<std::uint64_t> ReadStored(const TiffChunks& chunks, const TiffChunk& chunk, std::size_t row_bytes, std::span<std::byte> out);
   Result<std::uint64_t> ReadBehind(const RawHeader& header, const TiffChunks& chunks, const TiffChunk& chunk, std::size_t row_bytes,

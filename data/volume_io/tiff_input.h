@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <string>
 
-#include "common/base/file_descriptor.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
 
 namespace slabstream {
 

@@ -15,16 +15,16 @@ struct TiffSlice {
   std::size_t file = 0;                     // in TiffStack::files
   std::uint64_t directory = 0;              // its place there
   std::int64_t page = 0;                    // its number among all directories there
-  std::int64_t plane = 0;                   // as of TiffChunk
+  std::int64_t plane = 0;                   // TiffChunk::plane
   std::vector<std::uint64_t> smaller = {};  // places of its pictures at lower resolutions
 };
 
 struct TiffStack {
   std::vector<std::string> files;  // paths of those that are used
   std::vector<TiffSlice> slices;
-  RawHeader header;                  // of the volume, as the first slice says
+  RawHeader header;                  // the volume's header, as the first slice says
   ReadOptions of_pages;              // what the options say of a page's components
-  std::optional<ValueRange> window;  // as of SourceInfo
+  std::optional<ValueRange> window;  // SourceInfo::window
 
   // "a.tif: page 8", counted from 1, for messages.
   std::string NameOf(const TiffSlice& slice) const;
@@ -36,7 +36,7 @@ struct TiffStack {
 // DataLoss.
 Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& options);
 
-// Of the OME-TIFF that `path` is one file of; 1 if it stands alone or cannot be read.
+// How many files the OME-TIFF has that `path` belongs to; 1 if it stands alone or cannot be read.
 std::size_t FilesOf(const std::string& path);
 
 }  // namespace slabstream

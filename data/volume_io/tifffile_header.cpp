@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

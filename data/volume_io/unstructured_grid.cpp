@@ -15,7 +15,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   Result<LoadedMesh> loaded =
       ReadMesh(path, {.array = options.array, .time = options.time, .channel = channel, .headers_only = options.headers_only});
   if (!loaded.ok()) return loaded.status();
-  if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}};
+  if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}, .size_unknown = true};
   const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
   RawVolume raw;
   raw.header.size = lattice.size;

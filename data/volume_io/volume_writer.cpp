@@ -1,11 +1,7 @@
-#include <fmt/format.h>
-
-#include <string>
+#include "data/volume_io/volume_writer.h"
 
 #include "common/base/printable.h"
-#include "data/volume_io/file_samples.h"
 #include "data/volume_io/formats.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 

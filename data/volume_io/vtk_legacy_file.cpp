@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/payload.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/text_header.h"

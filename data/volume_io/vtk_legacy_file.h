@@ -12,9 +12,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/converted_samples.h"
 #include "data/volume_io/grid_arrays.h"
@@ -26,7 +26,8 @@ namespace slabstream {
 // Numbers in the file: `tuples` of `components` each, from byte `offset` on.
 struct VtkLegacyArray {
   std::string section;  // "POINT_DATA" or "CELL_DATA"; "": the dataset's own
-  // Of the dataset's own: its keyword, "POINTS", "CELLS", "OFFSETS", "CONNECTIVITY", "CELL_TYPES" or "X_COORDINATES".
+  // One of the dataset's own arrays has its keyword here: "POINTS", "CELLS", "OFFSETS", "CONNECTIVITY", "CELL_TYPES" or
+  // "X_COORDINATES".
   std::string name;
   std::string type_name = {};  // as the file calls it
   SampleType type = SampleType::kUint8;
@@ -91,7 +92,7 @@ class VtkLegacyFile {
   Status SkipLookupTable();
   Status SkipMetadata();
   Result<std::int64_t> ReadCount(const std::string& keyword, std::int64_t most);
-  // Of numbers; sets the type of the array.
+  // Reads the type of numbers, and sets it in the array.
   Status ReadType(VtkLegacyArray& array, const std::string& what);
   // An array whose numbers are next: passes by them.
   Status Add(VtkLegacyArray array);
@@ -106,7 +107,7 @@ class VtkLegacyFile {
   std::map<std::string, Vec3> threes_;
   std::int64_t cells_ = 0;
   std::string section_;        // that is being read
-  std::int64_t elements_ = 0;  // of it
+  std::int64_t elements_ = 0;  // elements of that section
   std::vector<VtkLegacyArray> arrays_;
 };
 

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "common/base/find_named.h"
-#include "common/base/parse_number.h"
-#include "common/base/trimmed.h"
+#include "common/text/parse_number.h"
+#include "common/text/trimmed.h"
 #include "data/codecs/codecs.h"
 #include "data/volume_io/payload.h"
 #include "data/volume_io/raw_volume.h"

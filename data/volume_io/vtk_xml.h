@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/converted_samples.h"
 #include "data/volume_io/grid_arrays.h"
@@ -43,13 +43,14 @@ struct VtkCompressor;
 
 class VtkXmlFile {
  public:
-  // Reads all but the arrays. `type`: of the dataset, "ImageData". Of a file of several times, options.time takes the arrays of one.
-  // NotFound: no such file. InvalidArgument: no XML, another type, no piece or more than kMostVtkPieces, or no such time.
+  // Reads all but the arrays. `type`: the dataset's, "ImageData". If a file has several times, options.time takes the
+  // arrays of one. NotFound: no such file. InvalidArgument: no XML, another type, no piece or more than kMostVtkPieces,
+  // or no such time.
   static Result<VtkXmlFile> Open(const std::string& path, std::string_view type, const ReadOptions& options);
 
   const XmlTag& dataset() const { return dataset_; }             // the element of the type's name
   const std::vector<XmlTag>& pieces() const { return pieces_; }  // at least one
-  std::int64_t times() const { return times_; }                  // that the file holds, at least one
+  std::int64_t times() const { return times_; }                  // times that the file holds, at least one
   std::int64_t time() const { return time_; }                    // the one whose arrays these are
   // The name of the active scalars of "PointData" or "CellData"; "": none.
   const std::string& ActiveScalars(std::string_view section) const { return section == "PointData" ? point_scalars_ : cell_scalars_; }

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/volume_io/mesh_builder.h"
 #include "data/volume_io/mesh_formats.h"
 #include "data/volume_io/raw_volume.h"

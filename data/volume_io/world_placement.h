@@ -23,13 +23,13 @@ struct AxisTurn {
 // Axes that are not at right angles: x of a straight grid = x + x_per_y * y + x_per_z * z of the slanted one; y = y + y_per_z * z; z = z.
 struct Slant {
   double x_per_y = 0, x_per_z = 0, y_per_z = 0;
-  Vec3 first;  // of the straight grid's voxel 0, 0, 0; whole numbers
+  Vec3 first;  // where the straight grid's voxel 0, 0, 0 lies; whole numbers
 };
 
 struct WorldPlacement {
   AxisTurn turn;
-  std::optional<Slant> slant;  // of the turned voxels
-  VolumeGeometry geometry;     // of the turned and straightened voxels
+  std::optional<Slant> slant;  // the slant of the turned voxels
+  VolumeGeometry geometry;     // the geometry of the turned and straightened voxels
 };
 
 // Steps whose angles differ from right ones by less than this (radians) are at right angles: files round their numbers.

@@ -15,7 +15,7 @@ namespace slabstream {
 
 struct XmlTag {
   std::string name;
-  std::map<std::string, std::string> attributes;  // of a start tag
+  std::map<std::string, std::string> attributes;  // attributes of a start tag
   std::int64_t begin = 0, end = 0;                // bytes of the input before the tag, and up to behind it
 
   // "" if it has none of this name.

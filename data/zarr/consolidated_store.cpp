@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/metadata/json_fields.h"
 #include "data/stores/range_reader.h"
 #include "data/zarr/zarr_node.h"
@@ -18,7 +18,6 @@ namespace {
 
 using metadata::Field;
 using metadata::Join;
-using metadata::Json;
 
 using Objects = std::map<std::string, std::string, std::less<>>;  // by their keys
 

@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "common/base/unwritten_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 #include "data/zarr/element_type.h"

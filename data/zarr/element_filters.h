@@ -14,7 +14,7 @@ bool IsElementFilter(std::string_view name);  // "delta"
 
 struct ElementFilter {
   CodecChain chain;
-  SampleType stored = SampleType::kUint8;  // of the elements behind it
+  SampleType stored = SampleType::kUint8;  // the type of the elements behind it
 };
 
 // `settings`: the members `dtype`, `astype` and so on. `type`: of the elements that go in. `swaps`: elements are in the byte order that

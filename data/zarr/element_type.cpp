@@ -8,13 +8,12 @@
 #include <optional>
 #include <type_traits>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream::zarr {
 namespace {
 
 using metadata::Field;
-using metadata::Json;
 
 // "NaN", "-Infinity", "0.5", or the bits in hexadecimal.
 template <class T>
@@ -45,7 +44,7 @@ std::optional<T> WholeOf(const Json& value) {
   }
   // "0.0", as some write for every type
   constexpr double kExact = 9007199254740992.0;
-  if (!value.is_number_float()) return std::nullopt;
+  if (!value.is_number()) return std::nullopt;
   const double number = value.get<double>();
   if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
   return number < 0 ? WholeOf<T>(Json(std::int64_t(number))) : WholeOf<T>(Json(std::uint64_t(number)));
@@ -55,12 +54,12 @@ template <class T>
 std::optional<T> ElementOf(const Json& value) {
   if (value.is_boolean()) return T(value.get<bool>() ? 1 : 0);
   if constexpr (!std::is_integral_v<T>) {
-    if (value.is_string()) return FloatOf<T>(value.get_ref<const std::string&>());
+    if (value.is_string()) return FloatOf<T>(value.text());
     if (!value.is_number()) return std::nullopt;
     return T(value.get<double>());
   } else {
     if (!value.is_string()) return WholeOf<T>(value);
-    const std::string& text = value.get_ref<const std::string&>();
+    const std::string& text = value.text();
     if (const std::optional<T> whole = ParseNumber<T>(text)) return whole;
     const std::optional<double> number = ParseNumber<double>(text);
     return number ? WholeOf<T>(Json(*number)) : std::nullopt;
@@ -72,7 +71,7 @@ std::optional<T> ElementOf(const Json& value) {
 Result<ElementType> ReadDtype(const Field& dtype) {
   const auto wrong = [&] { return dtype.Wrong("an integer of 1, 2, 4 or 8 bytes or a float of 2, 4 or 8, such as \"<u2\" or \">f4\""); };
   if (!dtype.is_text()) return wrong();
-  const std::string& text = dtype.value().get_ref<const std::string&>();
+  const std::string& text = dtype.value().text();
   constexpr std::size_t kLength = 3;
   if (text.size() != kLength) return wrong();
   const char order = text[0], kind = text[1], bytes = text[2];
@@ -88,7 +87,7 @@ Result<ElementType> ReadDtype(const Field& dtype) {
 Result<SampleType> ReadDataType(const Field& data_type) {
   const Field name = data_type.is_text() ? data_type : data_type["name"];  // as every extension point may be written
   if (name.is_text() && name.value() == "bool") return SampleType::kUint8;
-  const std::optional<SampleType> type = name.is_text() ? SampleTypeNamed(name.value().get_ref<const std::string&>()) : std::nullopt;
+  const std::optional<SampleType> type = name.is_text() ? SampleTypeNamed(name.value().text()) : std::nullopt;
   if (!type) return data_type.Wrong("bool or one of " + SampleTypeNames());
   return *type;
 }

@@ -19,13 +19,13 @@
 namespace slabstream::zarr {
 
 struct OmeLevel {
-  std::string path;  // of its array, from the group
+  std::string path;  // the path of its array, from the group
   OmePlace place;
 };
 
 struct OmeChannel {
   std::string name;                       // "": it has none
-  std::optional<ValueRange> window = {};  // of data values, that its author shows
+  std::optional<ValueRange> window = {};  // data values that its author shows
 };
 
 struct OmeImage {

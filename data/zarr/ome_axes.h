@@ -17,14 +17,15 @@ namespace slabstream::zarr {
 struct OmeAxis {
   std::string name;  // "z"
   AxisKind kind = AxisKind::kOther;
-  std::optional<LengthUnit> unit = {};  // of x, y and z
+  std::optional<LengthUnit> unit = {};  // the unit of x, y and z
 };
 
 // `list`: of 2 to kMaxArrayAxes axes; not stated: those of 0.1 and 0.2. Axes of type space whose names say nothing are z, y and x in this
 // order. InvalidArgument: two of a kind, or neither x nor y.
 Result<std::vector<OmeAxis>> ReadOmeAxes(const metadata::Field& list);
 
-// Of each axis: position = scale * index + translation. Scales along x, y and z are above 0, and both are finite there.
+// Where an image lies on each axis: position = scale * index + translation. Scales along x, y and z are above 0, and
+// both are finite there.
 struct OmePlace {
   std::vector<double> scale, translation;
   bool scaled = false, translated = false;  // a transformation states it

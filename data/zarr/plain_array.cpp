@@ -59,7 +59,7 @@ void NoteAxes(const std::vector<std::string>& names, const std::vector<AxisKind>
 Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
                           const AxisChoice& choice, const std::vector<std::uint64_t>& sizes, Pyramid& pyramid) {
   const std::size_t slash = node.path.rfind('/');
-  if (node.path.empty() || context.source->only_keeps()) return Status::Ok();
+  if (node.path.empty()) return Status::Ok();
   const std::string group = slash == std::string::npos ? "" : node.path.substr(0, slash);
   PyramidLevel& level = pyramid.levels.front();
   std::vector<std::string> placed, units;
@@ -103,7 +103,7 @@ std::optional<double> NumberOf(const Field& field) {
 // xarray writes _FillValue of floats as the bytes of a double in base64 into Zarr 3.
 std::optional<double> MissingValueOf(const Field& field) {
   constexpr std::size_t kBytes = 8, kTextBytes = 12;
-  if (!field.is_text() || field.value().get_ref<const std::string&>().size() != kTextBytes) return NumberOf(field);
+  if (!field.is_text() || field.value().text().size() != kTextBytes) return NumberOf(field);
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::uint64_t bits = 0, low = 0;
   const std::string text = *field.Text();
@@ -167,9 +167,8 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   const Result<AxisChoice> choice = ChooseAxes(name, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   Pyramid pyramid;
-  pyramid.info = {.format = fmt::format("Zarr {}", node.version), .times = choice->times, .time = choice->time};
-  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
-  pyramid.info.channel = choice->channel;
+  pyramid.info.format = fmt::format("Zarr {}", node.version);
+  choice->Describe(pyramid.info);
   NoteAxes(*names, *kinds, pyramid.info);
   if (Status status = UnpackValues(node, *array, pyramid); !status.ok()) return status;
   pyramid.levels.push_back(LevelOf(*array, *choice));

@@ -23,14 +23,13 @@ bool ShardIndices::Ask(const std::string& shard, Done done) {
   Index known;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = entries_.find(shard);
-    if (found == entries_.end()) {
+    const Index* const found = known_.Find(shard);
+    if (found == nullptr) {
       std::vector<Done>& waiting = waiting_[shard];
       waiting.push_back(std::move(done));
       return waiting.size() == 1;
     }
-    used_.splice(used_.begin(), used_, found->second.used);
-    known = found->second.index;
+    known = *found;
   }
   done(std::move(known));
   return false;
@@ -45,12 +44,9 @@ void ShardIndices::Put(const std::string& shard, const Result<Index>& index) {
       waiting_.erase(found);
     }
     if (index.ok()) {
-      if (const auto old = entries_.find(shard); old != entries_.end()) Remove(old);
-      used_.push_front(shard);
-      const std::uint64_t bytes = kEntryBytes + 2 * shard.size() + (*index == nullptr ? 0 : (*index)->bytes());
-      entries_[shard] = {*index, bytes, used_.begin()};
-      bytes_ += bytes;
-      while (bytes_ > most_bytes_ && !used_.empty()) Remove(entries_.find(used_.back()));
+      known_.Put(shard, *index, kEntryBytes + shard.size() + (*index == nullptr ? 0 : (*index)->bytes()));
+      known_.DropBeyond(most_bytes_);
+      if (known_.weight() > most_bytes_) known_.Drop(shard);
     }
   }
   for (const Done& done : waiting) done(index);
@@ -58,18 +54,12 @@ void ShardIndices::Put(const std::string& shard, const Result<Index>& index) {
 
 void ShardIndices::Forget(const std::string& shard) {
   const std::lock_guard lock(mutex_);
-  if (const auto found = entries_.find(shard); found != entries_.end()) Remove(found);
-}
-
-void ShardIndices::Remove(std::unordered_map<std::string, Entry>::iterator entry) {
-  bytes_ -= entry->second.bytes;
-  used_.erase(entry->second.used);
-  entries_.erase(entry);
+  known_.Drop(shard);
 }
 
 std::uint64_t ShardIndices::bytes() const {
   const std::lock_guard lock(mutex_);
-  return bytes_;
+  return known_.weight();
 }
 
 }  // namespace slabstream::zarr

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,8 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
+#include "common/base/lru_map.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/stores/store.h"
 
 namespace slabstream::zarr {
@@ -47,22 +47,13 @@ class ShardIndices {
   // So that it is read anew: it was wrong.
   void Forget(const std::string& shard);
 
-  std::uint64_t bytes() const;  // that are kept
+  std::uint64_t bytes() const;  // bytes that are kept
 
  private:
-  struct Entry {
-    Index index;
-    std::uint64_t bytes = 0;
-    std::list<std::string>::iterator used;
-  };
-  void Remove(std::unordered_map<std::string, Entry>::iterator entry);
-
   const std::uint64_t most_bytes_;
   mutable std::mutex mutex_;  // guards what follows
   std::unordered_map<std::string, std::vector<Done>> waiting_;
-  std::unordered_map<std::string, Entry> entries_;
-  std::list<std::string> used_;  // names of the entries, the last used one first
-  std::uint64_t bytes_ = 0;
+  LruMap<std::string, Index> known_;  // by shard
 };
 
 }  // namespace slabstream::zarr

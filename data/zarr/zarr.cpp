@@ -1,11 +1,11 @@
-#include "data/zarr/zarr.h"
-
+// Zarr, versions 2 and 3, in folders and zip archives: OME-Zarr images with their levels, and plain arrays.
+//
+//   scan.ome.zarr      scan.ome.zarr/labels/cells      scan.ozx?array=labels/cells      simulation.zarr?array=density,time=3
 #include <algorithm>
 #include <filesystem>
-#include <utility>
 
 #include "data/metadata/open_store_for.h"
-#include "data/sources/chunked_source.h"
+#include "data/volume_io/formats.h"
 #include "data/zarr/zarr_node.h"
 #include "data/zarr/zarr_pyramid.h"
 
@@ -26,23 +26,15 @@ bool Recognises(const std::string& path, const ReadOptions&) {
   return names.ok() && std::ranges::any_of(kNodeObjects, has);
 }
 
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
-  if (!store.ok()) return store.status();
-  Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
-  if (!pyramid.ok()) return pyramid.status();
-  return MakeChunkedSource(path, *std::move(pyramid), context);
-}
-
 }  // namespace
 }  // namespace zarr
 
-SourceFormat Zarr() {
+VolumeFormat Zarr() {
   return {.name = "Zarr",
           .recognises = zarr::Recognises,
           .options = {"time", "channel", "spacing", "array", "follow-links"},
           .markers = {zarr::kNodeObjects.begin(), zarr::kNodeObjects.end()},
-          .open = zarr::Open};
+          .open = OpenInStore<zarr::OpenPyramid>};
 }
 
 }  // namespace slabstream

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <utility>
 
-#include "common/base/guarded.h"
+#include "common/threads/guarded.h"
 #include "data/sources/decode_chunk.h"
 #include "data/zarr/zarr_layout.h"
 

@@ -8,7 +8,7 @@
 
 #include "common/base/status.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/stores/store.h"
 #include "data/zarr/shard_indices.h"
 #include "data/zarr/zarr_node.h"
@@ -18,7 +18,7 @@ namespace slabstream::zarr {
 struct ZarrArray {
   std::shared_ptr<ChunkedArray> array;
   std::vector<std::size_t> from;             // axis i of `array` is the axis from[i] of the metadata
-  std::vector<std::string> dimension_names;  // of the axes of `array`, "" where there is none; empty: there are none at all
+  std::vector<std::string> dimension_names;  // names of the axes of `array`, "" where there is none; empty: there are none at all
 };
 
 // What the arrays of a source share.

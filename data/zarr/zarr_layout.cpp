@@ -39,7 +39,7 @@ Status CheckChunkBytes(const Field& field, const std::vector<std::uint64_t>& chu
 Result<char> ReadSeparator(const Field& separator, char usual) {
   if (!separator.given()) return usual;
   if (!separator.is_text() || (separator.value() != "." && separator.value() != "/")) return separator.Wrong("\".\" or \"/\"");
-  return separator.value().get_ref<const std::string&>()[0];
+  return separator.value().text()[0];
 }
 
 Status ReadKeys(const Field& encoding, ZarrLayout& layout) {

@@ -22,7 +22,7 @@ inline constexpr std::uint64_t kMostShardChunks = std::uint64_t{1} << 20;
 
 // A chunk of the store's is a shard, which holds chunks and an index of them.
 struct Sharding {
-  std::vector<std::uint64_t> chunks;   // of a shard, along each axis of `shape`
+  std::vector<std::uint64_t> chunks;   // chunks of a shard, along each axis of `shape`
   std::vector<std::uint64_t> strides;  // from a chunk to the next one along each axis, in the index
   CodecChain index_codecs;
   std::uint64_t index_bytes = 0;  // as stored
@@ -39,12 +39,12 @@ struct ZarrLayout {
   // Its axes are in the order in which a chunk stores them, the fastest last: axis i is the axis from[i] of the metadata.
   ArrayShape shape;
   std::vector<std::size_t> from;
-  CodecChain codecs;  // of a chunk
+  CodecChain codecs;  // the codecs of a chunk
   std::optional<Sharding> sharding;
   std::string key_prefix;  // "c/", or nothing
   char key_separator = '/';
   bool separator_stated = true;              // else it may be the other one: writers of nested folders were slow to say so
-  std::vector<std::string> dimension_names;  // of the axes of `shape`, "" where there is none; empty: there are none at all
+  std::vector<std::string> dimension_names;  // names of the axes of `shape`, "" where there is none; empty: there are none at all
 
   // The name of a chunk or shard within the array's folder. `index`: of it, along each axis of `shape`.
   std::string Key(std::span<const std::uint64_t> index, char separator) const;

@@ -6,7 +6,6 @@ namespace slabstream::zarr {
 
 using metadata::Field;
 using metadata::Join;
-using metadata::Json;
 
 NodeReading::NodeReading(Store& store, const std::string& path)
     : store_(store),

@@ -16,16 +16,16 @@ namespace slabstream::zarr {
 
 struct ZarrNode {
   std::string path;           // in the store; "": its root
-  int version = 3;            // of Zarr: 2 or 3
+  int version = 3;            // Zarr's version: 2 or 3
   bool array = false;         // else a group
-  metadata::Json metadata;    // of version 2: of an array .zarray, of a group nothing
-  std::string metadata_name;  // of the store and the object: "/data/scan.zarr/0/zarr.json"
-  metadata::Json attributes;
+  Json metadata;              // of version 2: of an array .zarray, of a group nothing
+  std::string metadata_name;  // the store's name and the object's: "/data/scan.zarr/0/zarr.json"
+  Json attributes;
   std::string attributes_name;
-  std::vector<std::string> keys = {};  // of the objects that were read
+  std::vector<std::string> keys = {};  // the keys of the objects that were read
 
   metadata::Field metadata_field() const { return {metadata_name, metadata}; }
-  // Of version 3 they are a member of the metadata, so their place in messages is "attributes".
+  // In version 3 attributes are a member of the metadata, so their place in messages is "attributes".
   metadata::Field attributes_field() const {
     return version == 3 ? metadata_field()["attributes"] : metadata::Field(attributes_name, attributes);
   }

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/base/printable.h"
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "data/volume_io/length_names.h"
 #include "data/zarr/consolidated_store.h"
 #include "data/zarr/find_volume.h"

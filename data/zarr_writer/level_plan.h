@@ -11,7 +11,7 @@ namespace slabstream {
 struct WrittenLevel {
   Index3 size;               // voxels
   Index3 step = {1, 1, 1};   // voxels of the level before in one of these, 1 or 2 along each axis; the last ones may hold fewer
-  Vec3 spacing = {1, 1, 1};  // of their centres
+  Vec3 spacing = {1, 1, 1};  // the distance of their centres
   Vec3 first;                // centre of the first voxel, from that of level 0, along the axes of the volume
 };
 

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json Numbers(const Index3& v) { return {v.z, v.y, v.x}; }  // in the order of the array's axes
 Json Numbers(const Vec3& v) { return {v.z, v.y, v.x}; }
@@ -101,7 +99,7 @@ std::vector<MetadataFile> OmeMetadata(const ZarrLayout& layout, const std::vecto
   const Json axes = {Xyz(orientation.axes[0]), Xyz(orientation.axes[1]), Xyz(orientation.axes[2])};
   const Json place = {{"world", NameOf(orientation.world)}, {"origin", Xyz(straight ? Vec3{} : orientation.origin)}, {"axes", axes}};
   const Json own = {{"orientation", place}, {"values", {{"scale", mapping.scale}, {"offset", mapping.offset}}}};
-  const auto text = [](const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; };
+  const auto text = [](const Json& json) { return json.dump(2) + "\n"; };
   std::vector<MetadataFile> files;
   for (std::size_t l = 0; l < levels.size(); ++l) {
     if (layout.version == OmeZarrVersion::k04) {

@@ -29,7 +29,7 @@ struct ZarrLayout {
   SampleType type = SampleType::kUint8;
   std::int32_t chunk_side = 64;    // elements
   Index3 shard = {256, 256, 256};  // elements: multiples of chunk_side; of version 0.5
-  int codec_level = 3;             // of zstd
+  int codec_level = 3;             // zstd's level
 };
 
 // Side of a shard of a level along an axis: no longer than the chunks that hold all of it.

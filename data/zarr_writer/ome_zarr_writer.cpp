@@ -10,15 +10,15 @@
 #include <filesystem>
 #include <future>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
-#include "common/base/file_descriptor.h"
-#include "common/base/file_stamp.h"
-#include "common/base/files.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/file_stamp.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/zarr_writer/reduce.h"
 #include "data/zarr_writer/zarr_objects.h"
@@ -66,14 +66,14 @@ ZarrObjects ObjectsFor(const SourceInfo& source, const std::string& folder, cons
 // What decides the bytes that are written.
 std::string Description(const VolumeSource& source, const OmeZarrOptions& options, const Index3& shard,
                         const std::vector<MetadataFile>& metadata, const std::optional<FileStamp>& stamp) {
-  nlohmann::ordered_json files;
+  Json files;
   for (const MetadataFile& file : metadata) files[file.key] = file.text;
-  const nlohmann::ordered_json all = {{"source", options.source},
-                                      {"format", source.info().format},
-                                      {"stamp", stamp ? stamp->digest : 0},
-                                      {"region", {shard.x, shard.y, shard.z}},
-                                      {"metadata", files}};
-  return all.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const Json all = {{"source", options.source},
+                    {"format", source.info().format},
+                    {"stamp", stamp ? stamp->digest : 0},
+                    {"region", {shard.x, shard.y, shard.z}},
+                    {"metadata", files}};
+  return all.dump(1) + "\n";
 }
 
 // The folder, from the moment in which this process alone writes it.

@@ -22,14 +22,8 @@
 namespace slabstream {
 
 struct OmeZarrProgress {
-  std::uint64_t done_bytes = 0, all_bytes = 0;  // of elements, of all levels
-  int level = 0;                                // of the region that was finished last
-};
-
-// A source that is read once, slice by slice.
-struct SliceOrder {
-  Axis along = Axis::kZ;  // the slices lie one after the other along it
-  bool from_end = false;  // the last one comes first
+  std::uint64_t done_bytes = 0, all_bytes = 0;  // bytes of the elements of all levels
+  int level = 0;                                // the level of the region that was finished last
 };
 
 struct OmeZarrOptions {
@@ -39,7 +33,7 @@ struct OmeZarrOptions {
   // The source is read in this order. A shard is then a slab of as many slices as a chunk has, and shard_side says nothing.
   std::optional<SliceOrder> slices = {};
   std::int32_t coarsest_side = 0;                 // the last level is no longer than this along any axis, [8, 512]; 0: chunk_side
-  int codec_level = 3;                            // of zstd, [1, 19]
+  int codec_level = 3;                            // zstd's level, [1, 19]
   std::uint64_t memory = std::uint64_t{1} << 30;  // bytes, beside what the source takes
   std::string source;                             // what the user calls it: another one does not go on with its conversion
   std::stop_token stop;

@@ -1,13 +1,12 @@
 #include "data/zarr_writer/reduce.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
+#include "common/parallel/parallel.h"
 #include "common/volume/exact_value.h"
 
 namespace slabstream {
@@ -54,7 +53,7 @@ T MostFrequent(const std::array<T, kMost>& values, std::size_t count) {
 template <class T>
 void ReduceBox(Reduction reduction, const T* from, const Index3& size, const Index3& step, T* to, const Index3& to_size, const Index3& at) {
   const Index3 count = (size + step - Uniform(1)) / step;
-  tbb::parallel_for(0, count.z, [&](std::int32_t z) {
+  ParallelFor(0, count.z, [&](std::int32_t z) {
     for (std::int32_t y = 0; y < count.y; ++y) {
       // The rows that become one.
       std::array<const T*, 4> rows{};

@@ -10,7 +10,7 @@ namespace slabstream {
 
 enum class Reduction {
   kMean,          // rounded to the nearest whole number, halves away from zero; without NaN, unless all are NaN
-  kMostFrequent,  // of labels; the smallest one of several
+  kMostFrequent,  // for labels; if several are equally frequent, the smallest
 };
 
 // Each voxel of the result holds `step` (1 or 2 along each axis) voxels of `from`, those at its end perhaps fewer. `from`: samples of a box

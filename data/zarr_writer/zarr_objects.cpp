@@ -3,9 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -22,9 +19,10 @@
 #include <span>
 #include <system_error>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/files.h"
-#include "common/base/unwritten_vector.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/files.h"
+#include "common/memory/pooled_vector.h"
+#include "common/parallel/parallel.h"
 #include "data/codecs/codecs.h"
 
 namespace slabstream {
@@ -40,7 +38,7 @@ struct IndexEntry {
 };
 constexpr std::size_t kSumBytes = 4;  // behind the index
 
-std::size_t Threads() { return std::size_t(tbb::this_task_arena::max_concurrency()); }
+std::size_t Threads() { return std::size_t(ThreadsHere()); }
 
 // Calls function(offset of a row of the chunk, offset of it in the region, bytes) for all rows of the chunk inside the region.
 template <class Function>
@@ -206,33 +204,24 @@ Status ZarrObjects::WriteShard(const ZarrRegion& region, const std::byte* elemen
   const Index3 places = ShardOf(layout_, levels_[std::size_t(region.level)]) / layout_.chunk_side;
   std::vector<IndexEntry> index(CountIn(places));
   std::uint64_t end = 0;
-  std::size_t next = 0;
   FirstFailure failure;
-  using Part = std::pair<std::size_t, Packed>;  // number of the chunk in the region, and its bytes; none: it is left out
-  const auto take = [&](tbb::flow_control& flow) -> std::size_t {
-    if (next == CountIn(counts) || failure.any()) flow.stop();
-    return next++;
-  };
-  const auto pack = [&](std::size_t number) {
-    auto part = std::make_shared<Part>(number, Packed());
-    const Packed chunk = Chunk(size, Along(counts, number), layout_.chunk_side, BytesPerSample(layout_.type), elements);
-    if (IsZero(chunk)) return part;
+  // None: the chunk is left out.
+  const auto pack = [&](std::int64_t number) {
+    if (failure.any()) return Packed();
+    const Packed chunk = Chunk(size, Along(counts, std::size_t(number)), layout_.chunk_side, BytesPerSample(layout_.type), elements);
+    if (IsZero(chunk)) return Packed();
     Result<Packed> packed = Compress(chunk, layout_.codec_level);
     failure.Add(packed.status());
-    if (packed.ok()) part->second = *std::move(packed);
-    return part;
+    return packed.ok() ? *std::move(packed) : Packed();
   };
-  const auto append = [&](const std::shared_ptr<Part>& part) {
-    const Packed& bytes = part->second;
+  const auto append = [&](std::int64_t number, const Packed& bytes) {
     if (bytes.empty()) return;
     output->Append(bytes);
     if (!output->ok()) failure.Add(output->Close());
-    index[NumberIn(places, Along(counts, part->first))] = {end, bytes.size()};
+    index[NumberIn(places, Along(counts, std::size_t(number)))] = {end, bytes.size()};
     end += bytes.size();
   };
-  tbb::parallel_pipeline(Threads() + 1, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, take) &
-                                            tbb::make_filter<std::size_t, std::shared_ptr<Part>>(tbb::filter_mode::parallel, pack) &
-                                            tbb::make_filter<std::shared_ptr<Part>, void>(tbb::filter_mode::serial_in_order, append));
+  ParallelInOrder(std::int64_t(CountIn(counts)), std::int64_t(Threads()) + 1, pack, append);
   if (failure.any()) return failure.status();
   const auto index_bytes = std::as_bytes(std::span(index));
   const std::uint32_t sum = Crc32c(index_bytes);
@@ -244,7 +233,7 @@ Status ZarrObjects::WriteShard(const ZarrRegion& region, const std::byte* elemen
 Status ZarrObjects::WriteChunks(const ZarrRegion& region, const std::byte* elements) const {
   const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard / layout_.chunk_side * region.index;
   FirstFailure failure;
-  tbb::parallel_for(std::size_t{0}, CountIn(counts), [&](std::size_t number) {
+  ParallelFor(0, CountIn(counts), [&](std::size_t number) {
     if (failure.any()) return;
     const Index3 chunk = Along(counts, number);
     const std::string file = FileOf(region.level, first + chunk);
@@ -277,7 +266,7 @@ Status ZarrObjects::ReadShard(const ZarrRegion& region, std::byte* elements) con
   if (Status status = reader->Read(begin + index_bytes.size(), std::as_writable_bytes(std::span(&sum, 1))); !status.ok()) return status;
   if (sum != Crc32c(index_bytes)) return reader->Damaged();
   FirstFailure failure;
-  tbb::parallel_for(std::size_t{0}, CountIn(counts), [&](std::size_t number) {
+  ParallelFor(0, CountIn(counts), [&](std::size_t number) {
     const Index3 chunk = Along(counts, number);
     const IndexEntry& entry = index[NumberIn(places, chunk)];
     Packed bytes(CountIn(Uniform(layout_.chunk_side)) * BytesPerSample(layout_.type));
@@ -298,7 +287,7 @@ Status ZarrObjects::ReadShard(const ZarrRegion& region, std::byte* elements) con
 Status ZarrObjects::ReadChunks(const ZarrRegion& region, std::byte* elements) const {
   const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard / layout_.chunk_side * region.index;
   FirstFailure failure;
-  tbb::parallel_for(std::size_t{0}, CountIn(counts), [&](std::size_t number) {
+  ParallelFor(0, CountIn(counts), [&](std::size_t number) {
     const Index3 chunk = Along(counts, number);
     const Result<ObjectReader> reader = ObjectReader::Open(FileOf(region.level, first + chunk));
     if (!reader.ok()) return failure.Add(reader.status());

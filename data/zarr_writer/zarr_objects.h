@@ -17,7 +17,7 @@ namespace slabstream {
 
 struct ZarrRegion {
   int level = 0;
-  Index3 index;  // of the region, from 0 along each axis
+  Index3 index;  // the region's place, from 0 along each axis
 };
 
 class ZarrObjects {
@@ -28,7 +28,7 @@ class ZarrObjects {
   const std::vector<WrittenLevel>& levels() const { return levels_; }
   Index3 RegionsOf(int level) const;                      // along each axis
   Box BoxOf(const ZarrRegion& region) const;              // voxels
-  std::uint64_t BytesOf(const ZarrRegion& region) const;  // of their elements
+  std::uint64_t BytesOf(const ZarrRegion& region) const;  // bytes of their elements
 
   bool IsFinished(const ZarrRegion& region) const;
   // `elements`: of the region's box, x fastest. On all cores; the same bytes whatever their number. Unavailable: cannot be written.

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "common/renderers/registry.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/bench/bench_export.h"

@@ -19,7 +19,7 @@ struct BenchOptions {
   int frames = 12;                                              // in a turn of each projection, [1, kMaxTurntableFrames]
   int turns = 2;                                                // [1, kMaxTurns]
   std::optional<const RendererKind*> renderer;                  // replaces that of each case
-  ParameterTexts parameters;                                    // of the renderers of all cases
+  ParameterTexts parameters;                                    // parameters for the renderers of all cases
   std::string json_path, pictures_directory, export_directory;  // empty: not wanted
   bool list = false;
   std::string command;  // as it was typed

@@ -12,7 +12,7 @@
 #include "client/request/volume_argument.h"
 #include "common/base/did_you_mean.h"
 #include "common/renderers/sampling_rate.h"
-#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
 
 namespace slabstream {
 namespace {
@@ -196,7 +196,7 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   if (!at_service) {
     const Result<SourceText> source = ParseSourceText(argument->volume);
     if (!source.ok()) return Status(source.status().code(), "CASE " + source.status().message());
-    const Status known = CheckAnyVolume(source->path, source->options);
+    const Status known = CheckVolume(source->path, source->options);
     if (known.code() == StatusCode::kNotFound) {
       return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them){}", text,
                                           DidYouMean(text, StandardBenchCases())));

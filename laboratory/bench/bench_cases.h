@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
-#include "common/mesh/ball_grid.h"
 #include "common/renderers/registry.h"
 #include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
 #include "common/volume/volume.h"
+#include "laboratory/bench/ball_grid.h"
 
 namespace slabstream {
 
@@ -23,8 +23,9 @@ struct BenchCase {
   std::variant<SphereRequest, ClusterRequest, GridRequest, std::string> volume;  // made here, or a file's path (unused at a service)
   const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
-  std::optional<double> opacity;  // of an occupied voxel, where all have the same
-  ParameterTexts parameters;      // of the renderer; standard cases: one sample a voxel length, as other programs take by default
+  std::optional<double> opacity;  // the opacity of an occupied voxel, where all have the same
+  // The renderer's parameters; standard cases: one sample a voxel length, as other programs take by default.
+  ParameterTexts parameters;
 };
 
 std::optional<int> SideOf(const BenchCase& bench_case);  // voxels, of a volume that is made here
@@ -40,7 +41,8 @@ inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 BenchCase ClusterCase(const ClusterRequest& clusters, double opacity, const RendererKind* renderer = &DefaultRenderer());
 // Surfaces for a renderer that shows them, else translucent.
 BenchCase StandardClusters(int size, const RendererKind* renderer = &DefaultRenderer());
-// Of spheres and clusters, but with only those values shown that occupied voxels have in the half of the volume where x is large.
+// A transfer function for spheres and clusters. It shows only those values that occupied voxels have in the half of the
+// volume where x is large.
 TransferFunction HalfShown(double opacity);
 // A ball in an unstructured grid, by slicing.
 BenchCase GridCase(const GridRequest& grid);

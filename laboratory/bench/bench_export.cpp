@@ -1,17 +1,15 @@
 #include "laboratory/bench/bench_export.h"
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
 #include "common/mesh/lattice.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // The file that other programs read the cells from, and the array as the user named it ("": the file's own choice). Null: no grid is drawn.
 Result<Json> GridJson(const BenchCase& c, const Volume& volume) {
@@ -44,7 +42,7 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Mat
       {"shading",
        {{"ambient", material.ambient}, {"diffuse", material.diffuse}, {"specular", material.specular}, {"shininess", material.shininess}}}};
   if (!grid.is_null()) json["grid"] = grid;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace

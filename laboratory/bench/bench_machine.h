@@ -10,11 +10,11 @@ namespace slabstream {
 struct MachineInfo {
   std::string cpu;       // "AMD EPYC 7763 64-Core Processor"
   std::string simd;      // the instruction set that the kernels run on: "avx512"
-  int cores = 0;         // that this process may use
-  std::string flags;     // of the processor: "fpu vme de ..."
+  int cores = 0;         // cores that this process may use
+  std::string flags;     // the processor's flags: "fpu vme de ..."
   std::string kernel;    // "Linux 6.1.0-18-amd64"
-  std::string governor;  // of the first core's clock: "performance"
-  std::string compiler;  // of this program: "GCC 12.2.0"
+  std::string governor;  // the governor of the first core's clock: "performance"
+  std::string compiler;  // the compiler of this program: "GCC 12.2.0"
   double load = 0;       // mean number of threads that ran or wanted to in the last minute
 };
 MachineInfo DescribeMachine();

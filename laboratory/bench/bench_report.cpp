@@ -3,18 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "client/cli/cores.h"
 #include "client/report/frame_summary.h"
 #include "common/base/check.h"
 #include "common/base/version.h"
+#include "common/json/json.h"
 #include "laboratory/measure/statistics.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 std::vector<double> BothProjections(const BenchResult& result) {
   std::vector<double> both = result.orthographic_ms;
@@ -117,7 +115,7 @@ std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& resul
                {"threads", o.connection.local_workers > 0 ? LocalThreads(o.connection) : 0},
                {"cases", Json::array()}};
   for (const BenchResult& result : results) json["cases"].push_back(CaseJson(run, result));
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace slabstream

@@ -15,7 +15,7 @@
 
 namespace slabstream {
 
-// Of times in ms. Quantiles by nearest rank, the median as in statistics.h.
+// Times in ms. Quantiles by nearest rank, the median as in statistics.h.
 struct Spread {
   int count = 0;
   double median = 0, p05 = 0, p95 = 0, min = 0, max = 0;
@@ -25,12 +25,12 @@ Spread SpreadOf(const std::vector<double>& values);
 struct BenchResult {
   BenchCase bench_case;
   std::string skipped;            // why nothing was measured; then the rest is empty
-  VolumeDescription description;  // of the volume
+  VolumeDescription description;  // the volume's description
   double first_frame_ms = 0;      // an embedded service is empty then, so this includes reading a file
   // Request to last byte of each frame after the warm-up, in order of rendering; of projections that the renderer draws.
   std::vector<double> orthographic_ms, perspective_ms;
   std::array<double, kStageCount> stage_median_ms{};  // worker time, summed over workers
-  std::int64_t peak_rss_bytes = 0;                    // of this process: all of the service if it is embedded
+  std::int64_t peak_rss_bytes = 0;                    // the most memory that this process held: all of the service if it is embedded
 };
 
 // Sets the times and stages of a result that has none: `records[i]` belongs to `jobs[i]`.

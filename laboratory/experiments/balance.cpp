@@ -11,6 +11,7 @@
 #include "client/cli/service_connection.h"
 #include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
+#include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/policies.h"
@@ -78,7 +79,8 @@ Balance BalanceOf(const ExperimentContext& context, std::vector<BenchCase> volum
   if (balance.workers.empty()) balance.workers = {kTableWorkers, 64};
   if (context.quick() && own.workers.empty()) balance.workers.resize(1);
   std::erase_if(balance.methods, [&](const NamedPolicy& method) {
-    return !own.methods.empty() && std::ranges::find(own.methods, method.name) == own.methods.end();
+    if (own.methods.empty()) return own.at_service() && IsCompared(method.policy);
+    return std::ranges::find(own.methods, method.name) == own.methods.end();
   });
   if (!own.transfers.empty()) balance.later = own.transfers.back();
   return balance;
@@ -163,7 +165,7 @@ void RunAtService(ExperimentContext& context, Results& results) {
 
 }  // namespace
 
-void DeclareBalance(CLI::App& app, OwnOptions& options) {
+void DeclareBalance(const Command& app, OwnOptions& options) {
   DeclareSubjects(app, options, "16,64: 16 on all paths, 64 on the first one; with --quick 16");
   std::vector<std::string_view> names;
   for (const Path& path : Paths()) names.push_back(path.name);
@@ -174,8 +176,8 @@ void DeclareBalance(CLI::App& app, OwnOptions& options) {
   for (const NamedPolicy& method : methods) method_names.push_back(method.name);
   AddParsedList(app, "--methods", options.methods, OneOf(method_names), "Ways to balance (default: all)");
   AddService(app, options.service)
-      ->description("Lead a service at this endpoint along the paths, with its workers and datasets; simulate nothing")
-      ->default_str("none: boxes are rendered alone on this machine");
+      .Description("Lead a service at this endpoint along the paths, with its workers and datasets; simulate nothing")
+      .Default("none: boxes are rendered alone on this machine");
   AddParsedList(
       app, "--transfer", options.transfers,
       [](const std::string& option, const std::string& text) -> Result<TransferChoice> {
@@ -185,7 +187,7 @@ void DeclareBalance(CLI::App& app, OwnOptions& options) {
       },
       "Two transfer functions, as for `slabstream render`: the first on all paths; on the path `transfer` the second from the middle on. "
       "Files need them for that path")
-      ->type_name("A,B");
+      .TypeName("A,B");
 }
 
 void CheckBalance(const ExperimentOptions& options) {
@@ -193,6 +195,11 @@ void CheckBalance(const ExperimentOptions& options) {
   if (transfers != 0 && transfers != 2)
     throw Failure(
         Status::InvalidArgument(fmt::format("--transfer needs two transfer functions that differ, A,B; {} was given", transfers)));
+  for (const NamedPolicy& method : BalanceMethods()) {
+    const bool named = std::ranges::find(options.own.methods, method.name) != options.own.methods.end();
+    if (named && options.own.at_service() && IsCompared(method.policy))
+      throw Failure(Status::InvalidArgument(fmt::format("--methods: a service has no '{}'; leave --service out", method.name)));
+  }
   const std::vector<BenchCase> subjects = options.own.at_service() ? SubjectsAtService(options) : SubjectsOf(options, kLeastScaledSide);
   for (const Path* path : PathsOf(options.own)) CheckSubjects(subjects, path->at(0, false));
   const auto is_possible = [](const Path* path) { return IsPossibleAtService(*path); };

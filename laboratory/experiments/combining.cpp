@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +12,7 @@
 #include "common/cli/add_option.h"
 #include "common/combining/schemes.h"
 #include "common/kernels/combine.h"
+#include "common/parallel/task_arena.h"
 #include "common/renderers/registry.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
@@ -118,7 +118,7 @@ Trial OperatorsTrial(const Combining& c, std::uint64_t seed) {
     return Json{{"seconds", MedianOf({seconds.begin() + 1, seconds.end()}).median},
                 {"page_faults", std::accumulate(faults.begin() + 1, faults.end(), 0.0)}};
   };
-  const auto on_one_thread = [run] { return tbb::task_arena(1).execute(run); };
+  const auto on_one_thread = [run] { return TaskArena(1).Run(run); };
   return {OperatorsKey(c), on_one_thread, double(c.side) * c.side * c.share * c.ranks * 2e-6 + 0.05};
 }
 
@@ -182,7 +182,7 @@ Cases CasesOf(const ExperimentContext& context) {
 
 }  // namespace
 
-void DeclareCombining(CLI::App& app, OwnOptions& options) {
+void DeclareCombining(const Command& app, OwnOptions& options) {
   static const std::vector<std::string> schemes = AllSchemes();
   AddParsedList(app, "--schemes", options.methods, OneOf({schemes.begin(), schemes.end()}),
                 fmt::format("Schemes to compare, as --combine takes them: {} (default: all)", fmt::join(schemes, ", ")));

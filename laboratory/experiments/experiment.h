@@ -9,14 +9,11 @@
 #include <vector>
 
 #include "client/cli/options.h"
+#include "common/cli/command.h"
 #include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"
 #include "laboratory/results/results.h"
-
-namespace CLI {
-class App;
-}
 
 namespace slabstream {
 
@@ -26,8 +23,8 @@ struct OwnOptions {
   std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
   std::vector<int> workers;        // numbers of workers
   std::vector<const RendererKind*> renderers;
-  std::vector<std::string> paths;         // of walks
-  std::vector<std::string> methods;       // of balance or of combining, by name
+  std::vector<std::string> paths;         // paths of walks, by name
+  std::vector<std::string> methods;       // methods of balance or of combining, by name
   std::vector<int> footprints;            // diameters of footprints, pixels
   std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a path
   ServiceChoice service;                  // a running service whose frames are measured, instead of this machine
@@ -36,7 +33,7 @@ struct OwnOptions {
 
 struct ExperimentOptions {
   std::string name;
-  std::string sweep_file;  // of `sweep`; else empty
+  std::string sweep_file;  // the file of `sweep`; else empty
   std::string folder;
   bool quick = false;  // fewer and smaller sizes, fewer workers
   double scale = 1;    // [kMinScale, 1]: of the sides of spheres and pictures
@@ -72,7 +69,7 @@ class ExperimentContext {
   // Runs the trials that the log does not hold yet, each once (Distinct), and repeats them.
   void Run(std::vector<Trial> trials);
   const TrialLog& log() const { return log_; }
-  int repeats() const { return repeats_; }  // of the last Run
+  int repeats() const { return repeats_; }  // repeats of the last Run
   bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:
@@ -87,7 +84,7 @@ struct Experiment {
   std::string_view name;
   std::string_view purpose;  // one line for --list
   void (*run)(ExperimentContext&, Results&);
-  void (*declare)(CLI::App&, OwnOptions&) = nullptr;  // adds the options that it alone has; null: none
+  void (*declare)(const Command&, OwnOptions&) = nullptr;  // adds the options that it alone has; null: none
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;  // ExperimentOptions::sweep_file
@@ -99,21 +96,21 @@ struct Experiment {
 const std::vector<Experiment>& Experiments();
 
 void RunPaper(ExperimentContext& context, Results& results);
-void DeclarePaper(CLI::App& app, OwnOptions& options);
+void DeclarePaper(const Command& app, OwnOptions& options);
 std::vector<BenchCase> PaperVolumes(const ExperimentOptions& options);
 void RunPartitions(ExperimentContext& context, Results& results);
 void CheckPartitions(const ExperimentOptions& options);
-void DeclarePartitions(CLI::App& app, OwnOptions& options);
+void DeclarePartitions(const Command& app, OwnOptions& options);
 void RunBalance(ExperimentContext& context, Results& results);
 void CheckBalance(const ExperimentOptions& options);
-void DeclareBalance(CLI::App& app, OwnOptions& options);
-void DeclareCombining(CLI::App& app, OwnOptions& options);
+void DeclareBalance(const Command& app, OwnOptions& options);
+void DeclareCombining(const Command& app, OwnOptions& options);
 void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
 void RunScaling(ExperimentContext& context, Results& results);
 void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
-void DeclareSweep(CLI::App& app, OwnOptions& options);
+void DeclareSweep(const Command& app, OwnOptions& options);
 std::vector<BenchCase> SweepVolumes(const ExperimentOptions& options);
 
 }  // namespace slabstream

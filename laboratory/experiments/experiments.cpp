@@ -7,8 +7,8 @@ const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
       {"paper", "every table and figure of Yagel and Machiraju, the paper's beside ours", RunPaper, DeclarePaper, nullptr, false,
        PaperVolumes},
-      {"partitions", "ways to divide sparse volumes, for one view, and how good `auto` is", RunPartitions, DeclarePartitions,
-       CheckPartitions},
+      {"partitions", "ways to divide sparse volumes and to combine their images, for one view: which is best, and how good the default is",
+       RunPartitions, DeclarePartitions, CheckPartitions},
       {"balance", "ways to keep workers evenly loaded while a view, a look, a volume or a worker changes", RunBalance, DeclareBalance,
        CheckBalance, false, SubjectsAtService},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining, DeclareCombining},

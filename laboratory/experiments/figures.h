@@ -10,11 +10,11 @@
 namespace slabstream {
 
 struct FrameFigures {
-  double latency_seconds = 0;  // of a frame that was not requested ahead
+  double latency_seconds = 0;  // for a frame that was not requested ahead
   double preview_seconds = 0;  // until its first group can be seen
   double steady_seconds = 0;   // from picture to picture, with frames requested ahead
   double imbalance = 1;        // most / mean render time of a worker
-  double idle_share = 0;       // of the workers' time of that frame
+  double idle_share = 0;       // share of the workers' time of that frame
   double image_bytes = 0;      // between workers
 };
 

@@ -11,12 +11,12 @@
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/standard_combining.h"
 #include "common/planning/team.h"
 #include "common/renderers/registry.h"
 #include "common/wire/validate_request.h"
-#include "coordinator/tuning/choose_policy.h"
-#include "coordinator/tuning/service_machine.h"
 #include "laboratory/experiments/client_frames.h"
+#include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/frame_costs.h"
@@ -98,6 +98,7 @@ std::string AnglesOf(const ViewParameters& view) {
 
 Json ColumnsOf(const FrameCase& frame) {
   const auto& [decomposition, balance_by, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
+  const std::int64_t pixels = std::int64_t{frame.size.width} * frame.size.height;
   Json columns = ColumnsOf(frame.volume);
   columns.update(Json{{"workers", frame.workers},
                       {"view", AnglesOf(frame.view)},
@@ -108,7 +109,7 @@ Json ColumnsOf(const FrameCase& frame) {
                       {"balance_by", BalanceByOf(frame.policy)},
                       {"assignment", assignment},
                       {"balance", balance},
-                      {"combine", combine},
+                      {"combine", combine.empty() ? StandardCombining(std::size_t(frame.workers), pixels) : combine},
                       {"groups", groups},
                       {"teams", teams}});
   return columns;
@@ -181,24 +182,21 @@ DatasetId IdOf(const Json& identity) { return std::max<DatasetId>(1, std::stoull
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame) {
   const FrameRequest request = RequestOf(frame);
   OrThrow(Validate(request));
-  return OrThrow(ResolveRequest(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary));
+  return OrThrow(ResolveCompared(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary));
 }
 
 namespace {
 
 FramePlan PlanOf(const ResolvedRequest& resolved, int workers, std::shared_ptr<const Layout> layout) {
-  return OrThrow(
-      PlanFrame(OrThrow(MakeFrameSetup(resolved)), resolved.policy.value(), RosterOf(std::uint32_t(workers)), std::move(layout)));
+  return OrThrow(PlanFrame(OrThrow(MakeFrameSetup(resolved)), resolved.policy, RosterOf(std::uint32_t(workers)), std::move(layout)));
 }
 
 }  // namespace
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
   const ResolvedRequest resolved = Resolve(context, frame);
-  LayoutRequest request{.summary = resolved.summary.get(),
-                        .volume = &resolved.volume,
-                        .policy = &resolved.policy.value(),
-                        .slots = std::uint32_t(frame.workers)};
+  LayoutRequest request{
+      .summary = resolved.summary.get(), .volume = &resolved.volume, .policy = &resolved.policy, .slots = std::uint32_t(frame.workers)};
   const bool counts = NeedsOccupancy(resolved.frame.policy);
   const auto occupied = counts ? context.volumes().Occupied(frame.volume) : nullptr;
   request.known.occupied = occupied.get();
@@ -208,22 +206,6 @@ FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
 FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredLayouts& layouts) {
   const ResolvedRequest resolved = Resolve(context, frame);
   return PlanOf(resolved, frame.workers, layouts.Next(resolved, context.volumes().Occupied(frame.volume)));
-}
-
-FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
-  const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
-  if (!LeavesChoice(frame.policy, machine, std::size_t(frame.workers))) return frame;
-  const ResolvedRequest resolved = Resolve(context, frame);
-  const FrameSetup setup = OrThrow(MakeFrameSetup(resolved));
-  const auto occupied = context.volumes().Occupied(frame.volume);
-  frame.policy = AskFor(ChoosePolicy({.open = &resolved.frame.policy,
-                                      .resolved = &resolved,
-                                      .setup = &setup,
-                                      .known = {.occupied = occupied.get()},
-                                      .slots = std::uint32_t(frame.workers),
-                                      .machine = &machine})
-                            .policy);
-  return frame;
 }
 
 namespace {
@@ -337,8 +319,10 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
            .drawn_voxels = drawn[i],
            .covered_pixels = covered[i],
            .voxel_bytes = bytes[i],
-           .work = repeats.front()->at("work")[i].get<WorkUnits>(),
            .coverage = CoverageOf(repeats.front()->at("coverage")[i], FrameBounds(measured.plan.setup))};
+    const auto work = repeats.front()->at("work")[i].get<std::vector<double>>();
+    CHECK_EQ(work.size(), box.work.size());
+    std::ranges::copy(work, box.work.begin());
     for (std::size_t stage = 0; stage < stages.size(); ++stage) box.stage_seconds[stage] = stages[stage][i];
   }
   return measured;

@@ -60,17 +60,13 @@ Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(ExperimentContext& context, const FrameCase& frame, int turns);
 
-// The frame's request for its volume. Errors of Validate and ResolveRequest.
+// The frame's request for its volume (ResolveCompared). Errors of Validate and ResolveRequest.
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame);
 
-// The service's plan for its first frame. Errors of Resolve, MakeFrameSetup and PlanFrame. The policy leaves no choice.
+// The service's plan for its first frame. Errors of Resolve, MakeFrameSetup and PlanFrame.
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
 // The plan of the next frame with the next of these layouts.
 FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredLayouts& layouts);
-
-// The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
-// before it has seen a frame. Errors of Resolve and MakeFrameSetup.
-FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
 // A planned frame with the measured costs of its boxes: medians over repeats.
 struct MeasuredFrame {
@@ -79,8 +75,8 @@ struct MeasuredFrame {
     double seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
     double drawn_voxels = 0, covered_pixels = 0;
-    double voxel_bytes = 0;    // of the box and its halo
-    double fetched_bytes = 0;  // of these, those that its worker must fetch before it renders
+    double voxel_bytes = 0;    // voxels of the box and its halo
+    double fetched_bytes = 0;  // the part of these that its worker must fetch before it renders
     WorkUnits work{};
     CoverageMap coverage;
   };
@@ -90,8 +86,8 @@ struct MeasuredFrame {
   FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
   std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box
   double MostVoxelBytes() const;              // voxels, with halos, of the worker that holds most
-  double RenderSeconds() const;               // of all
-  double StageSeconds(Stage stage) const;     // of all
+  double RenderSeconds() const;               // the sum over all boxes
+  double StageSeconds(Stage stage) const;     // the sum over all boxes
 };
 // Both trials must have been run.
 MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame);

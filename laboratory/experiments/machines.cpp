@@ -1,7 +1,6 @@
 #include "laboratory/experiments/machines.h"
 
-#include <tbb/task_arena.h>
-
+#include "common/parallel/task_arena.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 
@@ -35,8 +34,8 @@ Trial HostTrial() {
   const auto run = []() -> Json {
     MachineModel machine = OrThrow(CalibrateThisHost(1)).machine;
     // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
-    tbb::task_arena one_thread(1);
-    machine.combining = one_thread.execute([] { return MeasureCombining(Transfer::kMessage); });
+    TaskArena one_thread(1);
+    machine.combining = one_thread.Run([] { return MeasureCombining(Transfer::kMessage); });
     Json numbers = Json::object();
     for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
     return numbers;

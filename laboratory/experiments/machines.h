@@ -22,7 +22,7 @@ struct HostModel {
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});
 // The same for every repeat of HostTrial.
 std::vector<MachineModel> Clusters(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});
-LinkModel Link(std::string_view preset);  // of LinkPresets()
+LinkModel Link(std::string_view preset);  // a name of LinkPresets()
 // The preset of experiments that do not compare links.
 inline constexpr std::string_view kLink = "10gbit";
 

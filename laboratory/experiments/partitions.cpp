@@ -6,9 +6,8 @@
 #include <string_view>
 
 #include "common/planning/assignment.h"
-#include "common/planning/policy_names.h"
-#include "coordinator/tuning/box_estimator.h"
 #include "laboratory/experiments/attachments.h"
+#include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
@@ -44,17 +43,18 @@ Comparison ComparisonOf(const ExperimentContext& context) {
   return comparison;
 }
 
-// Boxes by occupied voxels are cut for their owners, so that the assignment has little left to do.
+// Other boxes are cut for their owners, so that the assignment has little left to do.
 std::vector<NamedPolicy> PartitionsByVoxels() {
   std::vector<NamedPolicy> policies = AllPartitions();
   std::erase_if(policies, [](const NamedPolicy& named) { return named.policy.balance_by != "voxels"; });
   return policies;
 }
 
-Policy Automatic() {
-  Policy policy;
-  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = kAutomatic;
-  return policy;
+// The service's own assignments and those that it is compared with.
+std::vector<AssignmentEntry> AssignmentsToCompare() {
+  std::vector<AssignmentEntry> all = Assignments();
+  all.insert(all.end(), ComparedAssignments().begin(), ComparedAssignments().end());
+  return all;
 }
 
 std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& comparison) {
@@ -71,13 +71,10 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& compar
       }
     }
     for (const NamedPolicy& named : PartitionsByVoxels()) {
-      for (const AssignmentEntry& assignment : Assignments())
+      for (const AssignmentEntry& assignment : AssignmentsToCompare())
         add_boxes(Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
     }
-    for (const int p : comparison.workers) {
-      for (const std::string_view link : kLinks)
-        trials.push_back(BoxCostTrial(context, WithChosenPolicy(context, comparison.Frame(volume, Automatic(), p), Link(link))));
-    }
+    for (const int p : comparison.workers) add_boxes({.groups = 1}, p);
   }
   return trials;
 }
@@ -120,7 +117,7 @@ void AddLatency(ExperimentContext& context, Results& results, std::string_view p
   }
 }
 
-// Every partition under every scheme, and what `auto` takes.
+// Every partition under every scheme, and what the service does if nothing is asked for.
 void AddPolicies(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
   const FrameCase whole = comparison.Frame(volume, Combined(EqualSlabs().policy, kCombine), 1);
   AddBoxFigures(results, CaseOf("partition", whole), RecallRepeats(context, whole));
@@ -135,31 +132,13 @@ void AddPolicies(ExperimentContext& context, const Comparison& comparison, const
           AddLatency(context, results, "policy", comparison.Frame(volume, Combined(named.policy, scheme, groups), p), kLinks);
       }
     }
-    for (const std::string_view& link : kLinks) {
-      const FrameCase chosen = WithChosenPolicy(context, comparison.Frame(volume, Automatic(), p), Link(link));
-      AddLatency(context, results, "auto", chosen, std::span(&link, 1));
-    }
+    AddLatency(context, results, "default", comparison.Frame(volume, {.groups = 1}, p), kLinks);
   }
 }
 
-// What the planner expects boxes to take before it has seen a frame, beside what they take.
-void AddBoxes(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
+void AttachAllBoxes(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
     const FrameCase frame = comparison.Frame(volume, Combined(named.policy, kCombine), comparison.TableWorkers());
-    const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
-    const FramePlan& plan = repeats.front().plan;
-    const VolumeInUse in_use = context.volumes().Get(frame.volume);
-    const auto occupied = context.volumes().Occupied(frame.volume);
-    const BoxEstimator estimator(plan.setup, *in_use.summary, *occupied, nullptr, 1);
-    for (const Placement& placement : PlacementsOf(plan)) {
-      Json of = CaseOf("box", frame);
-      of["box"] = placement.id;
-      std::vector<double> seconds;
-      seconds.reserve(repeats.size());
-      for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
-      results.Add(of, "box_time", seconds, Origin::kMeasured);
-      results.Add(of, "estimated_box_time", estimator.Of(placement.box).seconds, Origin::kSimulated);
-    }
     AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
                 Recall(context, frame));
   }
@@ -167,7 +146,7 @@ void AddBoxes(ExperimentContext& context, const Comparison& comparison, const Be
 
 void AddAssignments(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
   for (const NamedPolicy& named : PartitionsByVoxels()) {
-    for (const AssignmentEntry& assignment : Assignments()) {
+    for (const AssignmentEntry& assignment : AssignmentsToCompare()) {
       const FrameCase frame =
           comparison.Frame(volume, Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
       AddBoxFigures(results, CaseOf("assignment", frame), RecallRepeats(context, frame));
@@ -177,7 +156,7 @@ void AddAssignments(ExperimentContext& context, const Comparison& comparison, co
 
 }  // namespace
 
-void DeclarePartitions(CLI::App& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
+void DeclarePartitions(const Command& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
 
 void CheckPartitions(const ExperimentOptions& options) {
   CheckSubjects(SubjectsOf(options, kLeastScaledSide), BenchView(Projection::kOrthographic, 1, 12));
@@ -188,7 +167,7 @@ void RunPartitions(ExperimentContext& context, Results& results) {
   context.Run(TrialsOf(context, comparison));
   for (const BenchCase& volume : comparison.volumes) {
     AddPolicies(context, comparison, volume, results);
-    AddBoxes(context, comparison, volume, results);
+    AttachAllBoxes(context, comparison, volume, results);
     AddAssignments(context, comparison, volume, results);
   }
 }

@@ -5,15 +5,21 @@
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/balances.h"
+#include "laboratory/experiments/compared_policies.h"
 
 namespace slabstream {
+namespace {
+
+const std::string kTreeCombine = "fan-in";  // unless they say otherwise
+
+}  // namespace
 
 std::vector<NamedPolicy> AllPartitions() {
   std::vector<NamedPolicy> policies;
   for (const DecompositionEntry& entry : Decompositions()) {
-    for (const std::string split : {"voxels", "occupied"}) {
-      policies.push_back(
-          {fmt::format("{} by {}", entry.name, split), {.decomposition = std::string(entry.name), .balance_by = split, .groups = 1}});
+    for (const std::string split : {"voxels", "bricks", "occupied"}) {
+      policies.push_back({fmt::format("{} by {}", entry.name, split),
+                          {.decomposition = std::string(entry.name), .balance_by = split, .groups = 1, .combine = kTreeCombine}});
     }
   }
   return policies;
@@ -21,15 +27,22 @@ std::vector<NamedPolicy> AllPartitions() {
 
 NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 
-NamedPolicy BalancedSlabs() { return AllPartitions().at(1); }
+NamedPolicy BalancedSlabs() { return AllPartitions().at(2); }
 
-NamedPolicy BalancedTree() { return {"kd-tree by occupied", {.decomposition = "kd-tree", .balance_by = "occupied", .groups = 1}}; }
+NamedPolicy BrickTree() {
+  return {"kd-tree by bricks", {.decomposition = "kd-tree", .balance_by = "bricks", .groups = 1, .combine = kTreeCombine}};
+}
+
+NamedPolicy BalancedTree() {
+  return {"kd-tree by occupied", {.decomposition = "kd-tree", .balance_by = "occupied", .groups = 1, .combine = kTreeCombine}};
+}
 
 std::vector<NamedPolicy> PartitionsAlongTheView() {
   std::vector<NamedPolicy> policies;
   for (const std::string decomposition : {"slab", "kd-tree"}) {
-    policies.push_back({fmt::format("{} along the view", decomposition),
-                        {.decomposition = decomposition, .balance_by = "occupied", .axis = AxisChoice::kView, .groups = 1}});
+    policies.push_back(
+        {fmt::format("{} along the view", decomposition),
+         {.decomposition = decomposition, .balance_by = "occupied", .axis = AxisChoice::kView, .groups = 1, .combine = kTreeCombine}});
   }
   return policies;
 }
@@ -45,15 +58,16 @@ std::vector<NamedPolicy> BalanceMethods() {
   const Policy tree = BalancedTree().policy;
   Policy equal = tree;
   equal.balance_by = "voxels";
-  std::vector<NamedPolicy> methods = {{"slabs", EqualSlabs().policy},
-                                      {"equal", equal},
-                                      {"random", Combined(equal, equal.combine, kBoxesAWorker, "random")},
-                                      {"rebuilt", tree}};
+  const Policy several = Combined(equal, equal.combine, kBoxesAWorker);
+  std::vector<NamedPolicy> methods = {
+      {"slabs", EqualSlabs().policy}, {"equal", equal}, {"random", several}, {"bricks", BrickTree().policy}, {"rebuilt", tree}};
+  methods[2].policy.assignment = "random";
   for (const BalanceEntry& entry : Balances()) {
-    if (entry.change == nullptr) continue;
-    NamedPolicy& method =
-        methods.emplace_back(std::string(entry.name), entry.hands_over ? Combined(equal, equal.combine, kBoxesAWorker) : tree);
-    method.policy.balance = entry.name;
+    if (entry.change != nullptr) methods.emplace_back(std::string(entry.name), tree).policy.balance = entry.name;
+  }
+  for (const ComparedBalance& entry : ComparedBalances()) {
+    const Policy& from = entry.hands_over ? several : tree;
+    methods.emplace_back(std::string(entry.name), from).policy.balance = entry.name;
   }
   return methods;
 }

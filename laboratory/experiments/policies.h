@@ -11,22 +11,23 @@ namespace slabstream {
 
 struct NamedPolicy {
   std::string name;  // "kd-tree by occupied", or of a method
-  Policy policy;     // one group
+  Policy policy;     // one group, combined by fan-in
 };
 
-// Every decomposition, divided by voxels and by occupied voxels.
+// Every decomposition, divided by voxels, by bricks and by occupied voxels.
 std::vector<NamedPolicy> AllPartitions();
-// Three of them: the paper's, and two meant to balance.
+// Four of them: the paper's, the service's own, and two by counted voxels.
 NamedPolicy EqualSlabs();
+NamedPolicy BrickTree();
 NamedPolicy BalancedSlabs();
 NamedPolicy BalancedTree();
 // Boxes cut along the traversal axis of the view, by occupied voxels: the least work at borders, but the most voxels to move when another
 // axis becomes the traversal axis.
 std::vector<NamedPolicy> PartitionsAlongTheView();
 // Ways to keep workers evenly loaded while a view moves. First those that never look at a time: "slabs", the paper's; "equal", boxes of
-// equal volume; "random", four of them a worker, with owners that are drawn; "rebuilt", BalancedTree(), cut anew when the transfer function
-// changes. Then that tree with every balance that changes boxes, by its name; those that hand over whole boxes get four of equal volume a
-// worker.
+// equal volume; "random", four of them a worker, with owners that are drawn; "bricks", BrickTree(), and "rebuilt", BalancedTree(), cut anew
+// when the transfer function changes. Then that tree with every balance that changes boxes, the compared ones too, by its name; those that
+// hand over whole boxes get four of equal volume a worker.
 std::vector<NamedPolicy> BalanceMethods();
 inline constexpr int kBoxesAWorker = 4;  // where a worker has several: with one box each there is no choice
 // The same policy, combined by `combine`.

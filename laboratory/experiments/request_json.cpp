@@ -23,7 +23,7 @@ std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", D
 Json TransferJson(const TransferChoice& transfer) { return RequestJson({.transfer = transfer})["transfer"]; }
 
 Json RequestJson(const FrameRequest& request) {
-  Json json = Json::parse(RequestToJson(request));
+  Json json = Json::Parse(RequestToJson(request)).value();
   json["dataset"] = request.dataset;
   json["transfer"] = Shortened(json["transfer"]);
   if (json.contains("overlay")) json["overlay"] = Shortened(json["overlay"]);

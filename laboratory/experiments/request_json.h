@@ -2,15 +2,13 @@
 // picture records (common/wire/request_json.h), with the dataset, and with digests for the points of transfer functions.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
 #include "common/frame/frame_request.h"
+#include "common/json/json.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 Json RequestJson(const FrameRequest& request);
 // Its field "transfer".

@@ -11,9 +11,9 @@
 #include "client/cli/interrupt.h"
 #include "commit.h"
 #include "common/base/did_you_mean.h"
-#include "common/base/files.h"
 #include "common/base/find_named.h"
 #include "common/base/version.h"
+#include "common/files/files.h"
 #include "common/transport/socket.h"
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
@@ -31,7 +31,7 @@ Json Parameters(const Experiment& experiment, const ExperimentOptions& options, 
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
-    parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
+    parameters["sweep"] = OrThrow(Json::Parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes))));
   }
   const auto& [cases, workers, renderers, paths, methods, footprints, transfers, service] = options.own;
   parameters["own"] = {{"cases", cases},     {"workers", workers},       {"renderers", Json::array()}, {"paths", paths},

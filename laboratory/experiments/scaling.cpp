@@ -126,7 +126,7 @@ double ShortestSeconds(auto&& work) {
 // What one frame costs the coordinator, and each worker that hears of it; one thread.
 Json MeasureHandOut(ExperimentContext& context, const FrameCase& frame) {
   const FramePlan plan = PlanOf(context, frame);
-  const ResolvedPolicy policy = Resolve(context, frame).policy.value();
+  const ResolvedPolicy policy = Resolve(context, frame).policy;
   const GroupAssignment assignment = AssignmentOf(plan);
   std::vector<std::byte> message;
   const double plan_seconds = ShortestSeconds([&] { (void)PlanFrame(plan.setup, policy, RosterOf(plan.slots), plan.layout); });

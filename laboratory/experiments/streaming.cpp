@@ -4,6 +4,7 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/policies.h"
 
 namespace slabstream {
 namespace {
@@ -13,7 +14,7 @@ struct Streams {
   std::vector<int> groups, workers;
   int pixels = 512;
   FrameCase Frame(const BenchCase& volume, int workers_count, int group_count) const {
-    FrameCase frame{volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), {}, workers_count};
+    FrameCase frame{volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), EqualSlabs().policy, workers_count};
     frame.policy.groups = group_count;
     return frame;
   }

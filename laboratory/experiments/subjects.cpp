@@ -17,10 +17,10 @@ constexpr int kMostWorkers = 4096;
 
 }  // namespace
 
-void DeclareSubjects(CLI::App& app, OwnOptions& options, const std::string& workers) {
-  app.add_option("VOLUME", options.cases,
-                 "Volumes instead of the standard ones: FILE, FILE:TRANSFER, a case of `slabstream bench --list`, or class1-SIZE, "
-                 "class2-SIZE or clusters-SIZE, which may end in -OCCUPANCY: clusters-512-0.02");
+void DeclareSubjects(const Command& app, OwnOptions& options, const std::string& workers) {
+  app.AddTexts("VOLUME", options.cases,
+               "Volumes instead of the standard ones: FILE, FILE:TRANSFER, a case of `slabstream bench --list`, or class1-SIZE, "
+               "class2-SIZE or clusters-SIZE, which may end in -OCCUPANCY: clusters-512-0.02");
   AddParsedList(
       app, "--workers", options.workers,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMostWorkers); },

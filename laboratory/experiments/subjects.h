@@ -9,12 +9,12 @@
 namespace slabstream {
 
 // VOLUME, --workers and --renderer. `workers`: the default, for --help.
-void DeclareSubjects(CLI::App& app, OwnOptions& options, const std::string& workers);
+void DeclareSubjects(const Command& app, OwnOptions& options, const std::string& workers);
 
 // What the user named, or else sparse volumes that are made here, `size` voxels a side, and in a run that is not quick the real ones.
 std::vector<BenchCase> SubjectsOf(const ExperimentOptions& options, int size);
 
-// The datasets that the user named, likewise. Throws Failure: none was named; those of ParseBenchCase.
+// The datasets that the user named, as at a service. Throws Failure: none was named; those of ParseBenchCase.
 std::vector<BenchCase> SubjectsAtService(const ExperimentOptions& options);
 
 // Before a run: each can be drawn with such a view. Throws Failure.

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "client/cli/option_groups.h"
@@ -35,11 +34,10 @@ std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
         c.team = asked.frame;
         c.team.workers = p / c.teams;
         c.team.policy.teams = 1;
-        c.team = WithChosenPolicy(context, std::move(c.team), link.link);
         c.frame = c.team;
         c.frame.workers = p;
         c.frame.policy.teams = asked.frame.policy.teams;
-        // The service has no link to vary: it follows the choice for the first one.
+        // The service has no link to vary.
         c.served = p <= kMeasuredWorkers && link.name == sweep.links.front().name;
         c.columns = ColumnsOf(c.frame);
         c.columns.update(asked.names);
@@ -87,10 +85,10 @@ SweepPlace PlaceOf(const ExperimentOptions& options) { return options.own.at_ser
 
 }  // namespace
 
-void DeclareSweep(CLI::App& app, OwnOptions& options) {
+void DeclareSweep(const Command& app, OwnOptions& options) {
   AddService(app, options.service)
-      ->description("Measure the frames of a service at this endpoint, with its workers and datasets; simulate nothing")
-      ->default_str("none: workers are simulated from measurements on this machine");
+      .Description("Measure the frames of a service at this endpoint, with its workers and datasets; simulate nothing")
+      .Default("none: workers are simulated from measurements on this machine");
 }
 
 std::vector<BenchCase> SweepVolumes(const ExperimentOptions& options) {

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <utility>
@@ -14,8 +13,9 @@
 #include "client/request/json_value.h"
 #include "client/request/request_options.h"
 #include "client/request/volume_argument.h"
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
+#include "common/json/json.h"
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
@@ -168,7 +168,8 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 
 std::string Describe(const Policy& policy) {
   std::string text = fmt::format("{} by {}, {}, {}, {} groups, {}", policy.decomposition, BalanceByOf(policy), policy.assignment,
-                                 policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups), policy.combine);
+                                 policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups),
+                                 policy.combine.empty() ? "combined as the service does" : policy.combine);
   if (policy.axis != AxisChoice::kAuto) text += fmt::format(", axis {}", NameOf(policy.axis));
   if (policy.teams > 1) text += fmt::format(", {} teams", policy.teams);
   if (policy.pixel_error > 0) text += fmt::format(", error {}", policy.pixel_error);

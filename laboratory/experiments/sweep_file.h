@@ -50,7 +50,7 @@ struct Sweep {
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;
   std::vector<SweepLink> links;
-  HostModel host;  // that is simulated
+  HostModel host;  // the host that is simulated
   ImageSize size{512, 512};
 };
 
@@ -64,7 +64,7 @@ Result<Sweep> ReadSweep(const std::string& path, SweepPlace place = SweepPlace::
 
 // A combination of volume, renderer, view and policy.
 struct SweepFrame {
-  FrameCase frame;  // of one worker
+  FrameCase frame;  // the frame for one worker
   Json names;       // what the file calls them, as columns of results: part, volume, view, variant
 };
 std::vector<SweepFrame> FramesOf(const Sweep& sweep);

@@ -11,10 +11,10 @@ namespace slabstream {
 struct Track {
   // By frame, all as long: render time of the worker that renders longest and of all; bytes that all workers fetch.
   std::vector<double> longest_seconds, imbalance, render_seconds, moved_bytes;
-  // Of some frames, or of all.
+  // By frame; some frames, or all.
   std::vector<double> latency_seconds, period_seconds;
   double moving_seconds = 0;    // over the frames but the first, in which the worker that receives most receives voxels; 0: not known
-  double most_voxel_bytes = 0;  // that a worker holds at a time; 0: not known
+  double most_voxel_bytes = 0;  // the most that a worker holds at a time; 0: not known
 };
 
 // Adds the figures of the repeats: longest_render_time (mean, 95 % of frames, worst frame), imbalance, render_time, voxel_bytes,
@@ -22,7 +22,7 @@ struct Track {
 // `simulated`: latency and period are.
 void AddTracks(Results& results, const Walk& walk, const Json& of, const std::vector<Track>& repeats, bool simulated);
 
-// Of a walk's frames, its policy and path: the columns of results.
+// The columns of results that describe a walk: its frames, policy and path.
 Json ColumnsOf(const Walk& walk);
 
 // A row a frame, with medians over the repeats.

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 namespace {
@@ -33,7 +33,8 @@ std::string WhyNot(const Json& held, const Json& wanted, Resume resume) {
   if (resume == Resume::kAnyBuild) return "";
   for (const char* who : {"commit", "machine"}) {
     const std::string before = held.value(who, "");
-    if (before != wanted[who]) return fmt::format("a run of {} '{}', not '{}' (--resume continues it anyway)", who, before, wanted[who]);
+    if (before != wanted[who])
+      return fmt::format("a run of {} '{}', not '{}' (--resume continues it anyway)", who, before, wanted[who].text());
   }
   return "";
 }
@@ -50,7 +51,8 @@ Result<TrialLog> TrialLog::Open(const std::string& folder, const RunIdentity& id
   if (known && resume != Resume::kNever) {
     const Result<std::string> text = ReadTextFile(IdentityPath(folder), kMaxIdentityBytes);
     if (!text.ok()) return text.status();
-    if (const std::string why = WhyNot(Json::parse(*text, nullptr, false), wanted, resume); !why.empty()) {
+    const Result<Json> held = Json::Parse(*text);
+    if (const std::string why = WhyNot(held.ok() ? *held : Json(), wanted, resume); !why.empty()) {
       return Status::InvalidArgument(fmt::format("--output '{}' holds {}; --fresh deletes it", folder, why));
     }
     if (Status status = log.Load(LogPath(folder)); !status.ok()) return status;
@@ -74,13 +76,13 @@ Status TrialLog::Load(const std::string& path) {
       std::filesystem::resize_file(path, whole_lines, error);
       return error ? Status::Unavailable(fmt::format("cannot write '{}': {}", path, error.message())) : Status::Ok();
     }
-    Json trial = Json::parse(line, nullptr, false);
-    if (!trial.is_object() || !trial.contains("key") || !trial.contains("repeat") || !trial["repeat"].is_number_integer() ||
-        !trial.contains("numbers")) {
+    const Result<Json> read = Json::Parse(line);
+    const Json trial = read.ok() ? *read : Json();
+    if (!trial.contains("key") || !trial.value("repeat", Json()).is_number_integer() || !trial.contains("numbers")) {
       return Status::InvalidArgument(fmt::format("'{}' line {} is not a trial; --fresh starts over", path, number));
     }
     if (const Json load = trial.value("other_load", Json()); load.is_number()) other_loads_.push_back(load.get<double>());
-    trials_[{trial["key"].dump(), trial["repeat"].get<int>()}] = std::move(trial["numbers"]);
+    trials_[{trial["key"].dump(), trial["repeat"].get<int>()}] = trial["numbers"];
     whole_lines += line.size() + 1;
   }
   return Status::Ok();

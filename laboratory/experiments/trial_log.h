@@ -9,17 +9,15 @@
 
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/json/json.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 // Trials of two runs may be mixed only if these agree.
 struct RunIdentity {
@@ -49,7 +47,7 @@ class TrialLog {
   std::size_t size() const { return trials_.size(); }
 
   Status Append(const Json& key, int repeat, Json numbers, std::optional<double> other_load = std::nullopt);
-  // Of all trials that have one.
+  // The other loads of all trials that have one.
   const std::vector<double>& other_loads() const { return other_loads_; }
 
  private:

@@ -56,8 +56,11 @@ Json NumbersOf(const Trial& trial) {
   }
 }
 
-const Json& Field(const Json& numbers, const std::string& name) {
-  return name.front() == '/' ? numbers.at(Json::json_pointer(name)) : numbers.at(name);
+const Json& Field(const Json& numbers, std::string_view name) {
+  if (!name.starts_with('/')) return numbers.at(name);
+  const std::size_t end = std::min(name.find('/', 1), name.size());
+  const Json& member = numbers.at(name.substr(1, end - 1));
+  return end == name.size() ? member : Field(member, name.substr(end));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ std::vector<Trial> Distinct(std::vector<Trial> trials);
 // that failed, which ends the run, with its key.
 void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
 
-// All repeats of a number, given by name or, with a leading slash, by JSON pointer. CHECKs that the trial was run and has the number.
+// All repeats of a number, given by its name, or by names that each follow a slash. CHECKs that the trial was run and has the number.
 // `factor`: into another unit.
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number, double factor = 1);
 inline Estimate EstimateOf(const TrialLog& log, const Json& key, const std::string& number) { return MedianOf(ValuesOf(log, key, number)); }

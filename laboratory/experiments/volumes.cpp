@@ -74,11 +74,7 @@ std::string SourceOf(const BenchCase& volume) {
 
 VolumeInUse VolumeCache::Get(const BenchCase& volume) {
   std::string source = SourceOf(volume);
-  const auto found = std::ranges::find(held_, source, &Held::source);
-  if (found != held_.end()) {
-    held_.splice(held_.begin(), held_, found);
-    return found->volume;
-  }
+  if (const VolumeInUse* held = held_.Find(source)) return *held;
   std::shared_ptr<const Volume> loaded = OrThrow(LoadBenchVolume(volume));
   if (std::holds_alternative<std::string>(volume.volume)) {
     const Json identity = FileJson(source, *loaded);
@@ -87,14 +83,10 @@ VolumeInUse VolumeCache::Get(const BenchCase& volume) {
     }
   }
   auto summary = std::make_shared<const VolumeSummary>(SummaryOf(*loaded));
-  held_.push_front({std::move(source), {std::move(loaded), std::move(summary)}});
-  std::size_t bytes = 0;
-  const auto first_too_many = std::find_if(std::next(held_.begin()), held_.end(), [&](const Held& held) {
-    bytes += held.volume.volume->block.bytes.size();
-    return bytes > budget_bytes_;
-  });
-  held_.erase(first_too_many, held_.end());
-  return held_.front().volume;
+  const std::size_t bytes = loaded->block.bytes.size();
+  const VolumeInUse& held = held_.Put(std::move(source), {std::move(loaded), std::move(summary)}, bytes);
+  held_.DropBeyond(budget_bytes_ + bytes);  // the budget is for those that are not in use
+  return held;
 }
 
 Json VolumeCache::Identity(const BenchCase& volume) {

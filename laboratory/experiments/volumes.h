@@ -1,13 +1,13 @@
 // The volumes of an experiment, kept between its trials.
 #pragma once
 
-#include <list>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/base/lru_map.h"
 #include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
@@ -36,13 +36,9 @@ class VolumeCache {
   std::shared_ptr<const OccupancyGrid> Occupied(const BenchCase& volume);
 
  private:
-  struct Held {
-    std::string source;
-    VolumeInUse volume;
-  };
   std::size_t budget_bytes_;
-  std::list<Held> held_;              // most recently used first
-  std::map<std::string, Json> read_;  // identities of files by canonical path
+  LruMap<std::string, VolumeInUse> held_;  // by source
+  std::map<std::string, Json> read_;       // identities of files by canonical path
   std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by identity and transfer
 };
 

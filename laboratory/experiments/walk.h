@@ -14,7 +14,7 @@ struct Walk {
   FrameCase frame;  // its view, and the volume of a time series, are those of the first step
   const Path* path = nullptr;
   int frames = kPathFrames;
-  std::optional<TransferChoice> later;  // of PathChange::kTransfer: from the middle on
+  std::optional<TransferChoice> later;  // the transfer function from the middle on (PathChange::kTransfer)
 };
 
 // Whether there is such a walk: a time series needs clusters, a change of the transfer function a later one.
@@ -31,7 +31,7 @@ struct WalkFrame {
   std::vector<double> worker_seconds;  // render time of each worker; data that is made for a box that changed counts
   std::vector<double> moved_bytes;     // voxels that each worker must fetch, because boxes or the volume changed
   double most_voxel_bytes = 0;         // voxels, with halos, of the worker that holds most
-  std::optional<MeasuredFrame> whole;  // of frames that are sampled: to simulate
+  std::optional<MeasuredFrame> whole;  // frames that are sampled have it: to simulate
 };
 // Every kSampledFrames-th frame is sampled.
 inline constexpr int kSampledFrames = 12;

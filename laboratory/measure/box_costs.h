@@ -23,11 +23,11 @@ struct BoxCost {
   double seconds = 0;                 // median of the later ones; the minimum is luck, since cores are at times quicker
   StageTimes stage_ns{};              // median of each, in elapsed time
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
-  std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
-  PixelBounds bounds;                 // of its local image
+  std::uint64_t drawn_voxels = 0;     // voxels that went through splat or Z-buffer
+  PixelBounds bounds;                 // pixels of its local image
   std::uint64_t covered_pixels = 0;   // non-empty pixels in the bounds
   CoverageMap coverage;               // where these pixels lie in the frame
-  std::uint64_t voxel_bytes = 0;      // of box and halo: the owner must fetch them
+  std::uint64_t voxel_bytes = 0;      // voxels of box and halo: the owner must fetch them
 };
 
 // In the order of `boxes`, which lie inside the volume and are not empty. `setup` is of this volume (FramePlan::setup). `repeats` >= 1
@@ -40,9 +40,9 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan
 // The same by a worker that may have rendered boxes of earlier frames and then keeps what it made for them.
 std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats);
 
-// For walks of many frames: each box is rendered once, and one that `changed` (by placement) twice: what is held of it is dropped before,
-// so that first_seconds has the data made for it, and seconds does not. Of a box that did not change, both are the same. Drops what the
-// worker holds of boxes that the plan does not render.
+// For walks of many frames: each box is rendered once, and one that `changed` (by placement) twice: what is held of it
+// is dropped before, so that first_seconds has the data made for it, and seconds does not. If a box did not change,
+// both are the same. Drops what the worker holds of boxes that the plan does not render.
 std::vector<BoxCost> MeasureNextFrame(LabWorker& worker, const FramePlan& plan, const std::vector<bool>& changed);
 
 // Largest / mean of the boxes' `seconds`: 1 is perfect balance, and the value if all costs are 0. With `slots` owners of several boxes

@@ -27,7 +27,7 @@ MachineModel ThisHost(int workers) {
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
   machine.workers_a_host = workers;
   machine.cores_a_host = int(std::max(std::thread::hardware_concurrency(), 1U));
-  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as in worker/thread_share.h
+  machine.picture_threads = std::min(workers, machine.cores_a_host);  // as in worker/service/thread_share.h
   return machine;
 }
 

@@ -1,7 +1,5 @@
 #include "laboratory/measure/frame_costs.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <thread>
 #include <utility>
@@ -9,9 +7,10 @@
 #include "common/base/check.h"
 #include "common/base/time.h"
 #include "common/image/run_image.h"
+#include "common/parallel/task_arena.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
-#include "coordinator/clients.h"
+#include "coordinator/frames/clients.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"
 #include "worker/renderers/renderer.h"
@@ -24,15 +23,15 @@ template <class Work>
 double SecondsOnAnotherThread(int threads, Work&& work) {
   double seconds = 0;
   std::thread([&] {
-    tbb::task_arena arena(threads);
-    arena.execute([&] { seconds = SecondsOf(work); });
+    TaskArena arena(threads);
+    arena.Run([&] { seconds = SecondsOf(work); });
   }).join();
   return seconds;
 }
 
 }  // namespace
 
-// Does the work of the display worker (worker/executor.cpp).
+// Does the work of the display worker (worker/service/executor.cpp).
 PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
   RunImage runs;
   if (setup.renderer->FrameIsPicture(setup)) {

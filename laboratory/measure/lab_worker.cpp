@@ -1,12 +1,11 @@
 #include "laboratory/measure/lab_worker.h"
 
-#include <tbb/task_arena.h>
-
 #include <atomic>
 #include <set>
 #include <utility>
 
 #include "common/base/time.h"
+#include "common/parallel/task_arena.h"
 #include "laboratory/measure/thread_time.h"
 
 namespace slabstream {
@@ -29,8 +28,8 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   RenderControl control;
   BoxRendering rendering;
   const OcclusionMask hidden = MaskBefore(box, setup);
-  tbb::task_arena one_thread(1);
-  one_thread.execute([&] {
+  TaskArena one_thread(1);
+  one_thread.Run([&] {
     const Time begin = MonotonicNow();
     rendering.processor_seconds =
         SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, hidden, control, rendering.report).value(); });

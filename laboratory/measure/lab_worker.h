@@ -18,7 +18,7 @@ namespace slabstream {
 struct BoxRendering {
   LocalImage image;
   RankReport report;
-  double processor_seconds = 0;  // of the calling thread: excludes all other work of the machine
+  double processor_seconds = 0;  // time of the calling thread: excludes all other work of the machine
   double seconds = 0;            // elapsed
 };
 
@@ -36,7 +36,7 @@ class LabWorker {
 
  private:
   const Volume& volume_;
-  std::unique_ptr<MeshCutter> cells_;  // of an unstructured grid
+  std::unique_ptr<MeshCutter> cells_;  // the cells of an unstructured grid
   const RendererKind* kind_ = nullptr;
   std::unique_ptr<Renderer> renderer_;
   std::map<Box, std::unique_ptr<BoxData>> boxes_;  // with halo

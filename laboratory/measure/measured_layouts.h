@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "coordinator/layout_table.h"
+#include "coordinator/planner/layout_table.h"
 
 namespace slabstream {
 
@@ -16,7 +16,7 @@ class MeasuredLayouts {
  public:
   explicit MeasuredLayouts(int workers) : slots_(std::uint32_t(workers)) {}
 
-  // The layout of the next frame, whose request leaves no choice and draws the voxels `occupied`.
+  // The layout of the next frame, whose request draws the voxels `occupied`.
   std::shared_ptr<const Layout> Next(ResolvedRequest request, std::shared_ptr<const OccupancyGrid> occupied) {
     last_ = std::move(request);
     occupied_ = std::move(occupied);
@@ -38,10 +38,10 @@ class MeasuredLayouts {
   }
 
  private:
-  LayoutTable::Request Wanted() const { return {&last_->policy.value(), &last_->volume, last_->summary.get(), occupied_, slots_}; }
+  LayoutTable::Request Wanted() const { return {&last_->policy, &last_->volume, last_->summary.get(), occupied_, slots_}; }
 
   std::uint32_t slots_;
-  std::optional<ResolvedRequest> last_;  // of Next
+  std::optional<ResolvedRequest> last_;  // the request of the last Next
   std::shared_ptr<const OccupancyGrid> occupied_;
   LayoutTable table_;
 };

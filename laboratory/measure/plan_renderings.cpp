@@ -4,8 +4,8 @@
 #include <future>
 #include <span>
 
-#include "common/base/task_thread.h"
 #include "common/base/time.h"
+#include "common/threads/task_thread.h"
 #include "laboratory/measure/lab_worker.h"
 #include "laboratory/measure/neighbours.h"
 

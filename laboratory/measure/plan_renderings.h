@@ -14,7 +14,7 @@ namespace slabstream {
 
 struct PlanSeconds {
   std::vector<double> boxes;  // by BoxId; alone
-  double slowdown = 0;        // of two workers that render together (neighbours.h); 0 with one
+  double slowdown = 0;        // how much two workers that render together slow each other down (neighbours.h); 0 with one
 };
 
 class PlanRenderings {

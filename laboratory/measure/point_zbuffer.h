@@ -32,8 +32,9 @@ class PointZBuffer {
   // Numbers of pixels.
   struct Holes {
     std::size_t covered = 0;  // by a face
-    std::size_t empty = 0;    // of these: not written
-    std::size_t behind = 0;   // of these: the voxel lies more than a voxel's diagonal behind the face, so it is not the face's
+    std::size_t empty = 0;    // the part of these that was not written
+    // The part of these whose voxel lies more than a voxel's diagonal behind the face, so it is not the face's.
+    std::size_t behind = 0;
   };
   // `faces`: the depth of the face that each pixel shows, row by row; +infinity where it shows none. Voxels have spacing 1.
   Holes HolesIn(const std::vector<float>& faces) const;

@@ -9,11 +9,11 @@
 #include <ostream>
 #include <sstream>
 
-#include "common/base/parse_number.h"
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/text/parse_number.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 #include "simulator/simulate_frames.h"

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/kernels/footprint_table.h"
 #include "worker/kernels/segment_set.h"
 
@@ -36,7 +36,7 @@ class DenseSlice {
 
  private:
   std::size_t VoxelAt(std::int32_t u, std::int32_t v) const;
-  std::size_t SheetAt(std::int32_t u, std::int32_t v) const;  // of a voxel's first pixel
+  std::size_t SheetAt(std::int32_t u, std::int32_t v) const;  // a voxel's first pixel
   void AddEachVoxel();
   void CompositeSheet();
 
@@ -44,7 +44,7 @@ class DenseSlice {
   FootprintTable footprint_;
   Lattice lattice_;            // along both axes
   std::int32_t pixels_;        // a side of the frame: all footprints lie in it
-  std::int32_t row_voxels_;    // of the stored slice, with margins
+  std::int32_t row_voxels_;    // voxels in a row of the stored slice, with margins
   std::vector<float> square_;  // k x k weights of a voxel's pixels
   AlignedVector<float> voxels_, accumulated_, filtered_, sheet_;
   std::int32_t words_;

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 
 namespace slabstream {
@@ -57,7 +57,7 @@ struct TransformMethod {
 const std::vector<TransformMethod>& TransformMethods();
 const TransformMethod& FindTransformMethod(std::string_view name);  // one of the above
 
-// Of all coordinates of all points, the largest distance from the product in double precision.
+// The largest distance of any coordinate of any point from the product in double precision.
 double LargestOffset(const TransformMatrix& matrix, const Index3& size, const TransformedPoints& points);
 
 // to[i] = from[i] + step. Both may be the same. Writes up to 64 floats beyond `count`.

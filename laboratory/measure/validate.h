@@ -25,7 +25,7 @@ namespace slabstream {
 struct ValidationCase {
   std::string name;
   std::shared_ptr<const Volume> volume;
-  FrameRequest request;  // of the first view; the dataset is filled in
+  FrameRequest request;  // the request of the first view; the dataset is filled in
   int workers = 1;       // or 2
 };
 
@@ -34,9 +34,9 @@ struct ValidationOptions {
   int turns = 15;  // frames of each view
 };
 
-// Of one frame, in seconds.
+// The parts of one frame, in seconds.
 struct FrameParts {
-  double render = 0;   // of the worker with the longest render time
+  double render = 0;   // the longest render time of a worker
   double picture = 0;  // made from the frame and encoded, by the display worker
   double latency = 0;  // from request to decoded picture
 };
@@ -55,7 +55,7 @@ struct ValidationRow {
   std::vector<ValidatedView> views;
   MachineModel machine;  // at the end
   WakeUpEstimates wake_ups;
-  Estimate slowdown;  // of two workers' renderings, over all turns and views
+  Estimate slowdown;  // the slowdown of two workers' renderings, over all turns and views
 
   ValidatedView Mean() const;  // over views, each number separately
   double error() const { return Mean().error(); }

@@ -12,7 +12,7 @@ namespace slabstream {
 class WakeUpProbe {
  public:
   // Renders some frames for each of `count` samples, 10 ms or so, by a service that lives only during the call: beside it, workers of this
-  // process would have one more thread to make pictures with (worker/thread_share.h). Fails with the service.
+  // process would have one more thread to make pictures with (worker/service/thread_share.h). Fails with the service.
   Status Sample(int count);
 
   // At least one sample must have been taken.

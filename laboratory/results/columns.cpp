@@ -26,7 +26,6 @@ std::span<const Column> CaseColumns() {
       {"stage", "stage of a frame: transform, splat, combine; or a phase of what `variant` names"},
       {"active", "share of an image's pixels that are not empty, in [0, 1]"},
       {"k", "diameter of a splat's footprint in pixels"},
-      {"box", "number of a box of the partition"},
   };
   return kColumns;
 }
@@ -82,8 +81,6 @@ std::span<const Metric> Metrics() {
       {"combine_time", "s", "from the end of the longest rendering until one worker holds the combined image"},
       {"frame_time", "s", "until one worker holds the combined image: what the paper calls the time of a frame"},
       {"run_time", "s", "processor time of one thread for what `variant` names"},
-      {"box_time", "s", "render time of one box, alone on one thread"},
-      {"estimated_box_time", "s", "what the planner expects a box to take"},
       {"error", "1", "relative error against what `variant` names"},
       {"offset", "1", "largest distance of a computed coordinate from the exact one, in pixels"},
       {"additions", "1", "floating-point additions, counted"},

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/results/columns.h"
 
 namespace slabstream {
@@ -23,7 +23,7 @@ std::string Field(const Json& value) {
     return text;
   }
   if (!value.is_string()) return value.dump();
-  const auto& text = value.get_ref<const std::string&>();
+  const auto& text = value.text();
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) {

@@ -4,7 +4,6 @@
 // One thread at a time.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <string_view>
@@ -12,12 +11,11 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/json/json.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/results/origin.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 // Who found the values of a run.
 struct FoundBy {
@@ -47,7 +45,7 @@ class Results {
 
  private:
   FoundBy by_;
-  std::vector<Json> rows_;  // as in results.jsonl
+  std::vector<Json> rows_;  // the rows of results.jsonl
   std::set<std::string> known_;
   std::vector<std::pair<std::string, std::vector<Json>>> attached_;
 };

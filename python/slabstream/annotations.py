@@ -65,15 +65,14 @@ def key_of(frame: Any, summary: Any) -> dict[str, Any]:
     return key
 
 
+_UNITS = {"file": "unknown", "millimetre": "mm", "micrometre": "µm", "nanometre": "nm", "angstrom": "Å", "centimetre": "cm", "metre": "m"}
+
+
 def _geometry_fields(geometry: Any) -> dict[str, Any]:
     """As records of pictures have it."""
-    units = {"file": "unknown", "millimetre": "mm", "micrometre": "µm", "nanometre": "nm", "angstrom": "Å", "centimetre": "cm", "metre": "m"}
-    return {
-        "world": geometry.world, "unit": units.get(geometry.unit, "voxel"),
-        "projection": "perspective" if geometry.perspective else "orthographic",
-        "right": geometry.right, "up": geometry.up, "forward": geometry.forward, "target": geometry.target,
-        "target_depth": geometry.target_depth, "pixel_size": geometry.pixel_size,
-    }
+    fields = dataclasses.asdict(geometry)
+    projection = "perspective" if fields.pop("perspective") else "orthographic"
+    return {**fields, "projection": projection, "unit": _UNITS.get(geometry.unit, "voxel")}
 
 
 def _run(rgba: Floats, format: Any, panes: Sequence[Any], purpose: str, **more: Any) -> bytes:

@@ -5,13 +5,13 @@ import concurrent.futures
 import math
 import os
 import queue
+import struct
 import threading
 import time
 import weakref
 from typing import Any, Callable, Iterable
 
 import zmq
-from zmq.utils.monitor import parse_monitor_message
 
 from . import schema
 from .address import Address
@@ -27,7 +27,7 @@ _BATCH = 256  # messages that are read before anything else is done
 
 
 def _open_socket(context: zmq.Context[Any], address: Address) -> zmq.Socket[Any]:
-    """As client/client.cpp has it: reconnects every 100 ms, and notices within 3 s that a tcp connection is cut."""
+    """As common/transport/socket.cpp has it: reconnects every 100 ms, and notices within 3 s that a tcp connection is cut."""
     socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
     for option, value in (
         (zmq.SNDHWM, _MOST_MESSAGES),
@@ -158,8 +158,8 @@ class _Loop:
         return True
 
     def _hear_monitor(self) -> None:
-        event = parse_monitor_message(self.monitor.recv_multipart())
-        if event["event"] == zmq.EVENT_HANDSHAKE_FAILED_AUTH:  # ZeroMQ does not try again
+        event, _ = struct.unpack("=hi", self.monitor.recv_multipart()[0])  # pyzmq's own parser imports asyncio
+        if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:  # ZeroMQ does not try again
             self.requests.fail_all(f"the service at {self.endpoint} refuses the key: it was revoked or is another's", for_good=True)
 
 
@@ -173,25 +173,22 @@ class Connection:
         except zmq.ZMQError as error:
             raise Unavailable(f'endpoint "{address.endpoint}": {error.strerror}') from None
         self.close = weakref.finalize(self, self._loop.stop)
-        from . import schema  # what is asked is a ping
-
         try:
             self.ask("client_ping", schema.ClientPing(), timeout)
         except SlabstreamError:
             self.close()
             raise
 
-    def submit(self, frame: Any, deadline_seconds: float, observer: Observer) -> concurrent.futures.Future[int]:
-        """The request's number, when it has been sent."""
-        number: concurrent.futures.Future[int] = concurrent.futures.Future()
+    def submit(self, frame: Any, deadline_seconds: float, observer: Observer) -> int:
+        """The request's number."""
         requests = self._loop.requests
-        self._loop.call(lambda: number.set_result(requests.submit(frame, deadline_seconds, observer, time.monotonic())))
+        number = next(requests.numbers)
+        self._loop.call(lambda: requests.submit(number, frame, deadline_seconds, observer, time.monotonic()))
         return number
 
-    def cancel(self, number: concurrent.futures.Future[int]) -> None:
+    def cancel(self, number: int) -> None:
         """`number`: of submit()."""
-        requests = self._loop.requests
-        self._loop.call(lambda: requests.cancel(number.result()))  # calls keep their order: it is known by then
+        self._loop.call(lambda: self._loop.requests.cancel(number))
 
     def upload(self, order: Any, parts: Iterable[memoryview]) -> Any:
         """Sends a volume: an AddVolume, then its bytes in parts of at most MOST_PART_BYTES, which are asked for as the service takes them.
@@ -199,8 +196,8 @@ class Connection:
         answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
         changed = threading.Condition()
         allowed, sent = 0, 0
-        nonces: list[int] = []
         requests = self._loop.requests
+        nonce = next(requests.numbers)
 
         def credited(most: int) -> None:
             nonlocal allowed
@@ -213,10 +210,10 @@ class Connection:
                 changed.notify()
 
         def send(begin: int, part: memoryview) -> None:
-            self._loop.call(lambda: requests.send_part(nonces[0], begin, part))
+            self._loop.call(lambda: requests.send_part(nonce, begin, part))
 
         answer.add_done_callback(ended)
-        self._loop.call(lambda: nonces.append(requests.begin_upload(order, answer, credited, time.monotonic())))
+        self._loop.call(lambda: requests.ask(nonce, "add_volume", order, answer, time.monotonic(), credited))
         try:
             for part in parts:
                 with changed:
@@ -228,19 +225,19 @@ class Connection:
             return answer.result()
         except BaseException:
             if not answer.done():
-                self._loop.call(lambda: requests.drop_upload(nonces[0]))
+                self._loop.call(lambda: requests.forget(nonce))
             raise
 
     def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
         """The answer to a question or an order, or the service's refusal as an exception."""
         answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        nonces: list[int] = []
         requests = self._loop.requests
-        self._loop.call(lambda: nonces.append(requests.ask(kind, message, answer)))
+        nonce = next(requests.numbers)
+        self._loop.call(lambda: requests.ask(nonce, kind, message, answer))
         try:
             return answer.result(timeout)
         except concurrent.futures.TimeoutError:
             if answer.done():
                 raise  # the service's own
-            self._loop.call(lambda: requests.forget(nonces[0]))
+            self._loop.call(lambda: requests.forget(nonce))
             raise Unavailable(f"no service answers at {self.endpoint} within {round(1000 * timeout)} ms") from None

@@ -5,7 +5,7 @@ import dataclasses
 import difflib
 import functools
 import unicodedata
-from typing import Any, Callable, Iterable, Mapping
+from typing import Any, Callable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
 
@@ -37,74 +37,11 @@ Put = Callable[[Draft, Option, Any], None]
 # ---- fields of the request: how a value is put into one follows from the field's type in the schema
 
 
-def _set_vector(message: Any, vector: values.Vector) -> None:
-    message.x, message.y, message.z = vector
-
-
-_CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
-
-
-def _several(value: Any, count: int) -> list[Any]:
-    """Values of an option that may be repeated: one of `count` numbers or a text, or a list of such."""
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        return [value]
-    listed = list(value)
-    return [listed] if len(listed) == count and not any(isinstance(item, (str, Iterable)) for item in listed) else listed
-
-
-def _size(size: Any, name: str, value: Any) -> None:
-    size.width, size.height = values.size(name, value)
-
-
-def _scalar_range(scalar_range: Any, name: str, value: Any) -> None:
-    scalar_range.min, scalar_range.max, scalar_range.percentiles = values.scalar_range(name, value)
-
-
-def set_clip_box(box: Any, name: str, value: Any) -> None:
-    low, high, unit = values.clip_box(name, value)
-    _set_vector(box.low, low)
-    _set_vector(box.high, high)
-    box.unit = _CLIP_UNITS[unit]
-
-
-def _clip_planes(planes: Any, name: str, value: Any) -> None:
-    for item in _several(value, 4):
-        normal, offset = values.clip_plane(name, item)
-        _set_vector(planes.add(offset=offset).normal, normal)
-
-
-def _lights(lights: Any, name: str, value: Any) -> None:
-    for item in _several(value, 3):
-        _set_vector(lights.add(), values.direction(name, item))
-
-
-def _isosurfaces(surfaces: Any, name: str, value: Any) -> None:
-    for surface, (red, green, blue), opacity in values.isosurfaces(name, value):
-        surfaces.add(value=surface, r=red, g=green, b=blue, opacity=opacity)
-
-
-def _gradient_opacities(points: Any, name: str, value: Any) -> None:
-    for slope, opacity in values.gradient_opacities(name, value):
-        points.add(slope=slope, opacity=opacity)
-
-
-def _label_opacities(opacities: Any, name: str, value: Any) -> None:
-    for label, opacity in values.label_opacities(name, value):
-        opacities.add(value=label, opacity=opacity)
-
-
-def _label_ranges(ranges: Any, name: str, value: Any) -> None:
-    for item in values.label_ranges(name, value):
-        if isinstance(item, str):
-            ranges.add(name=item)
-        else:
-            ranges.add(first=item[0], last=item[1])
-
-
 #: By the type of the field's messages.
-_MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
-    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": set_clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
-    "GradientOpacityPoint": _gradient_opacities, "LabelOpacity": _label_opacities, "LabelRange": _label_ranges,
+_MESSAGES: dict[str, Callable[[str, Any], Any]] = {
+    "ImageSize": values.size, "ScalarRange": values.scalar_range, "ClipBox": values.clip_box, "ClipPlane": values.clip_planes,
+    "Isosurface": values.isosurfaces, "GradientOpacityPoint": values.gradient_opacities, "LabelOpacity": values.label_opacities,
+    "LabelRange": values.label_ranges,
 }
 
 
@@ -122,14 +59,14 @@ def _scalar(field: FieldDescriptor, option: Option, value: Any) -> Any:
     if field.cpp_type == FieldDescriptor.CPPTYPE_ENUM:  # lists the choices in their order, after the one that is never sent
         return 1 + values.choice(option.name, value, option.choices)
     if field.cpp_type == FieldDescriptor.CPPTYPE_BOOL:
-        return values.flag(option.name, value)
+        return _flag(option, value)
     if field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
         return _text(option, value)
     if value == "auto" and (option.type or "").endswith("|auto"):
         return 0  # left to the service
     if field.cpp_type in (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT):
-        return values.number(option.name, value, option.least, option.most, option.above)
-    return values.integer(option.name, value, int(option.least), int(option.most))
+        return _number(option, value)
+    return _whole(option, value)
 
 
 def _field(draft: Draft, option: Option, value: Any) -> None:
@@ -142,11 +79,12 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
         _transfer(draft, option, value, holder)
     elif field.message_type is None:
         setattr(holder, name, _scalar(field, option, value))
-    elif field.message_type.name == "Vec3" and field.label != FieldDescriptor.LABEL_REPEATED:
-        _set_vector(getattr(holder, name), values.point(option.name, value))
+    elif field.label == FieldDescriptor.LABEL_REPEATED:
+        getattr(holder, name).extend(_MESSAGES.get(field.message_type.name, values.directions)(option.name, value))
+    elif field.message_type.name == "Vec3":
+        getattr(holder, name).CopyFrom(values.vec3(values.point(option.name, value)))
     else:
-        put = _lights if field.message_type.name == "Vec3" else _MESSAGES[field.message_type.name]
-        put(getattr(holder, name), option.name, value)
+        getattr(holder, name).CopyFrom(_MESSAGES[field.message_type.name](option.name, value))
 
 
 _PRESET_OF_MAPS = "viridis"  # it spans values and has opacities as all colour maps do
@@ -165,22 +103,11 @@ def _transfer(draft: Draft, option: Option, value: Any, choice: Any) -> None:
 
 
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
-    if option.choices:
-        values.choice(option.name, value, option.choices)
-        draft.frame.parameters.add(name=option.text_name, text=str(value))
-    else:
-        number = values.number(option.name, value, option.least, option.most, option.above)
-        draft.frame.parameters.add(name=option.text_name, text=values.text_of(number))
+    text = _choice(option, value) if option.choices else values.text_of(_number(option, value))
+    draft.frame.parameters.add(name=option.text_name, text=text)
 
 
 # ---- options that are no field, or several
-
-
-def _slice_field(parse: Callable[[Option, Any], Any]) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        setattr(draft, option.name, parse(option, value))
-
-    return put
 
 
 # Azimuth and elevation in degrees, and whether only patients have such a side (common/view/named_view.h).
@@ -197,8 +124,7 @@ def _look_from(view: Any, side: str, of_patient: bool | None = None) -> None:
 
 
 def _view(draft: Draft, option: Option, value: Any) -> None:
-    values.choice(option.name, value, option.choices)
-    _look_from(draft.frame.view, value)
+    _look_from(draft.frame.view, _choice(option, value))
 
 
 def _camera(draft: Draft, option: Option, value: Any) -> None:
@@ -218,32 +144,6 @@ def _layer(draft: Draft, option: Option, value: Any) -> None:
     if value is not True:
         raise InvalidArgument(f"{option.name} {value!r} must be True: at a service, layers belong to the dataset (add_data, render of a file)")
     getattr(draft.frame, option.name).SetInParent()
-
-
-def _background(draft: Draft, option: Option, value: Any) -> None:
-    draft.format = dataclasses.replace(draft.format, background=values.color(option.name, value))
-
-
-def _depth(draft: Draft, option: Option, value: Any) -> None:
-    draft.format = dataclasses.replace(draft.format, png_bits=(8, 16)[values.choice(option.name, value, option.choices)])
-
-
-def _format(field: str) -> Put:
-    """A whole number of PictureFormat."""
-
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        number = values.integer(option.name, value, int(option.least), int(option.most))
-        draft.format = dataclasses.replace(draft.format, **{field: number})
-
-    return put
-
-
-def _annotation(parse: Callable[[Option, Any], Any]) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        annotations = dataclasses.replace(draft.format.annotations, **{option.name: parse(option, value)})
-        draft.format = dataclasses.replace(draft.format, annotations=annotations)
-
-    return put
 
 
 _MOST_TITLE_CHARACTERS = 120
@@ -270,28 +170,58 @@ def _window(draft: Draft, option: Option, value: Any) -> None:
         draft.window = values.number(option.name, value, 0, 1e30, above=True)
 
 
+def _number(option: Option, value: Any) -> float:
+    return values.number(option.name, value, option.least, option.most, option.above)
+
+
+def _whole(option: Option, value: Any) -> int:
+    return values.integer(option.name, value, int(option.least), int(option.most))
+
+
+def _flag(option: Option, value: Any) -> bool:
+    return values.flag(option.name, value)
+
+
+def _choice(option: Option, value: Any) -> str:
+    return option.choices[values.choice(option.name, value, option.choices)]
+
+
+def _in(place: str, parse: Callable[[Option, Any], Any], field: str = "") -> Put:
+    """Puts the value into this field of the draft, of its "format" or of the format's "annotations"; usually into that of the option's name."""
+
+    def put(draft: Draft, option: Option, value: Any) -> None:
+        found = {field or option.name: parse(option, value)}
+        if place == "annotations":
+            found = {place: dataclasses.replace(draft.format.annotations, **found)}
+        if place != "draft":
+            found = {"format": dataclasses.replace(draft.format, **found)}
+        vars(draft).update(found)
+
+    return put
+
+
 #: Every option of options.json is here, or has a path.
 _PUT: dict[str, Put] = {
     "view": _view,
     "camera": _camera,
-    "background": _background,
-    "depth": _depth,
-    "quality": _format("quality"),
-    "dpi": _format("dots_per_inch"),
-    "font_size": _annotation(lambda option, value: values.number(option.name, value, option.least, option.most)),
-    "title": _annotation(_line),
-    "scale_bar": _annotation(lambda option, value: values.flag(option.name, value)),
-    "orientation_marker": _annotation(lambda option, value: values.flag(option.name, value)),
-    "color_bar": _annotation(_caption),
-    "legend": _annotation(lambda option, value: values.flag(option.name, value)),
+    "background": _in("format", lambda option, value: values.color(option.name, value)),
+    "depth": _in("format", lambda option, value: int(_choice(option, value)), "png_bits"),
+    "quality": _in("format", _whole),
+    "dpi": _in("format", _whole, "dots_per_inch"),
+    "font_size": _in("annotations", _number),
+    "title": _in("annotations", _line),
+    "scale_bar": _in("annotations", _flag),
+    "orientation_marker": _in("annotations", _flag),
+    "color_bar": _in("annotations", _caption),
+    "legend": _in("annotations", _flag),
     "labels": _layer,
     "overlay": _layer,
-    "plane": _slice_field(lambda option, value: option.choices[values.choice(option.name, value, option.choices)]),
-    "at": _slice_field(lambda option, value: values.point(option.name, value)),
-    "index": _slice_field(lambda option, value: values.integer(option.name, value, 0, 65534)),
-    "thickness": _slice_field(lambda option, value: values.number(option.name, value, option.least, option.most)),
+    "plane": _in("draft", _choice),
+    "at": _in("draft", lambda option, value: values.point(option.name, value)),
+    "index": _in("draft", lambda option, value: values.integer(option.name, value, 0, 65534)),
+    "thickness": _in("draft", _number),
     "window": _window,
-    "level": _slice_field(lambda option, value: values.number(option.name, value, -1e30, 1e30)),
+    "level": _in("draft", lambda option, value: values.number(option.name, value, -1e30, 1e30)),
 }
 
 
@@ -399,10 +329,10 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         _look_from(frame.view, side, of_patient)
         frame.view.fit = True
         slab = frame.clipping.slab
-        _set_vector(slab.normal, normal)
+        slab.normal.CopyFrom(values.vec3(normal))
         slab.thickness = planes.thickness
         if planes.at is not None:
-            _set_vector(slab.through, planes.at)
+            slab.through.CopyFrom(values.vec3(planes.at))
         if planes.index is not None:
             slab.slice = planes.index + 1
         drafts.append(draft)

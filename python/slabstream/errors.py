@@ -64,18 +64,9 @@ class Internal(SlabstreamError):
     """A mistake of the service's or of this package's."""
 
 
-_BY_CODE: dict[int, type[SlabstreamError]] = {
-    1: InvalidArgument,
-    2: NotFound,
-    3: Unavailable,
-    4: ResourceExhausted,
-    5: DataLoss,
-    6: Cancelled,
-    7: DeadlineExceeded,
-    8: Internal,
-}
+_KINDS = (Internal, InvalidArgument, NotFound, Unavailable, ResourceExhausted, DataLoss, Cancelled, DeadlineExceeded, Internal)  # by code
 
 
 def error_of(code: int, message: str) -> SlabstreamError:
     """The exception for a Status of the wire. The service's sentence names fields and options of the command line: here they are keywords."""
-    return _BY_CODE.get(code, Internal)(in_keywords(message))
+    return (_KINDS[code] if 0 <= code < len(_KINDS) else Internal)(in_keywords(message))

@@ -15,8 +15,6 @@ from .errors import DataLoss, DeadlineExceeded, SlabstreamError
 from .image import Image, compose, geometry_of, statistics_of
 from .runs import read_runs
 
-_PHASES = {schema.FRAME_PHASE_QUEUED: "queued", schema.FRAME_PHASE_LOADING: "loading", schema.FRAME_PHASE_RUNNING: "running"}
-
 _log = logging.getLogger("slabstream")
 
 
@@ -45,8 +43,7 @@ class _Waiting:
 
     def progressed(self, progress: Any) -> None:
         with self.changed:
-            self.progress = Progress(_PHASES.get(progress.phase, "running"), progress.queue_position, progress.groups_done,
-                                     progress.group_count, progress.attempt, progress.workers)
+            self.progress = schema.read(Progress, progress, phase=schema.word(progress, "phase", "running"))
         if self.on_progress is not None:
             _tell(self.on_progress, self.progress)
 

@@ -5,6 +5,7 @@ import dataclasses
 import importlib
 import os
 import pathlib
+import secrets
 import shutil
 import subprocess
 import sys
@@ -78,28 +79,10 @@ class Statistics:
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 
-_UNITS = {
-    schema.LENGTH_UNIT_FILE: "file", schema.LENGTH_UNIT_MILLIMETRE: "millimetre", schema.LENGTH_UNIT_MICROMETRE: "micrometre",
-    schema.LENGTH_UNIT_NANOMETRE: "nanometre", schema.LENGTH_UNIT_ANGSTROM: "angstrom", schema.LENGTH_UNIT_CENTIMETRE: "centimetre",
-    schema.LENGTH_UNIT_METRE: "metre",
-}
-
-
 def geometry_of(message: Any) -> Geometry:
-    def vector(v: Any) -> Vector:
-        return (v.x, v.y, v.z)
-
-    return Geometry(
-        world={schema.WORLD_SCENE: "scene", schema.WORLD_PATIENT: "patient"}.get(message.world, "voxels"),
-        unit=_UNITS.get(message.unit, "voxel"),
-        perspective=message.projection == schema.PROJECTION_PERSPECTIVE,
-        right=vector(message.right),
-        up=vector(message.up),
-        forward=vector(message.forward),
-        target=vector(message.target),
-        target_depth=message.target_depth,
-        pixel_size=message.pixel_size,
-    )
+    vectors = {name: schema.xyz(getattr(message, name)) for name in ("right", "up", "forward", "target")}
+    return schema.read(Geometry, message, world=schema.word(message, "world", "voxels"), unit=schema.word(message, "unit", "voxel"),
+                       perspective=message.projection == schema.PROJECTION_PERSPECTIVE, **vectors)
 
 
 def statistics_of(message: Any, latency_seconds: float) -> Statistics:
@@ -107,32 +90,18 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
     for report in message.reports:
         for name, nanoseconds in zip(_STAGES, report.stage_ns):
             stages[name] += nanoseconds * 1e-9
-    return Statistics(
-        workers=message.workers,
-        groups=message.groups,
-        attempts=message.attempts,
-        renderer=message.renderer,
-        decomposition=message.decomposition,
-        axis=message.axis,
-        combine=message.combine,
-        balance_by=message.balance_by,
-        assignment=message.assignment,
-        balance=message.balance,
-        queued_seconds=message.queued_ns * 1e-9,
-        frame_seconds=(message.end_ns - message.begin_ns) * 1e-9,
-        latency_seconds=latency_seconds,
-        worker_seconds=stages,
+    return schema.read(
+        Statistics, message, message=message, queued_seconds=message.queued_ns * 1e-9,
+        frame_seconds=(message.end_ns - message.begin_ns) * 1e-9, latency_seconds=latency_seconds, worker_seconds=stages,
         levels=tuple(use.level for use in message.levels),
         voxel_bytes=sum(report.voxel_bytes for report in message.reports),
         stored_bytes=sum(report.stored_bytes for report in message.reports),
-        lowered=message.lowered,
-        message=message,
     )
 
 
 def _codes(rgba: Floats, bits: int) -> numpy.typing.NDArray[Any]:
     """Straight alpha: round(max * clamp(straight value, 0, 1)), halves away from zero, without a transfer curve; as the command line's PNG.
-    The arithmetic is that of client/image_io: floats, until the rounding."""
+    The arithmetic is that of client/pictures: floats, until the rounding."""
     alpha, most = rgba[..., 3:], numpy.float32(2**bits - 1)
     straight = numpy.zeros_like(rgba)
     numpy.divide(rgba[..., :3], alpha, out=straight[..., :3], where=most * alpha >= numpy.float32(0.5))
@@ -216,18 +185,14 @@ class Image:
             content = self.png(bits)
         else:
             content = encode(self.rgba, self.format, self._panes, kind, bits or self.format.png_bits, self.format.quality)
+        temporary = file.with_name(f".{secrets.token_hex(8)}.tmp")
         try:
-            with tempfile.NamedTemporaryFile(dir=file.parent, prefix=f".{file.name}.", delete=False) as temporary:
-                try:
-                    temporary.write(content)
-                    temporary.flush()
-                    mask = os.umask(0)
-                    os.umask(mask)
-                    os.chmod(temporary.name, 0o666 & ~mask)
-                    os.replace(temporary.name, file)
-                except BaseException:
-                    os.unlink(temporary.name)
-                    raise
+            try:
+                temporary.write_bytes(content)
+                temporary.replace(file)
+            except BaseException:
+                temporary.unlink(missing_ok=True)
+                raise
         except OSError as error:
             raise Unavailable(f"cannot write '{file}': {error.strerror}") from None
 

@@ -4,10 +4,11 @@ The path is that of common/view/camera_path.h, which says where its curves come 
 """
 from __future__ import annotations
 
-import bisect
-import dataclasses
 import math
-from typing import Any, Iterator, Mapping, Sequence, Tuple
+from typing import Any, Iterator, Mapping, Sequence
+
+import numpy
+import numpy.typing
 
 from . import schema
 from .errors import InvalidArgument
@@ -17,8 +18,7 @@ LEAST_CAMERAS, MOST_CAMERAS = 2, 1000
 _LEAST_ZOOM, _MOST_ZOOM = 1e-3, 1e4
 _LEAST_FOV, _MOST_FOV = 1.0, 60.0
 
-Vector = Tuple[float, float, float]
-Rotation = Tuple[float, float, float, float]  # w, x, y, z: a unit quaternion
+Numbers = numpy.typing.NDArray[numpy.float64]
 
 
 def turned_views(first: Any, frames: int, turns: int) -> Iterator[Any]:
@@ -51,88 +51,70 @@ def cameras_of(path: Any) -> tuple[list[float], list[dict[str, Any]]]:
     return times, cameras
 
 
-# ---- vectors and rotations
+# ---- rotations: unit quaternions w, x, y, z; and turns: vectors of as many radians as they are long, about themselves. One, or an array of them.
 
 
-def _add(a: Sequence[float], b: Sequence[float], scale: float = 1) -> tuple[float, ...]:
-    return tuple(x + scale * y for x, y in zip(a, b))
+def _length(vectors: Any) -> Any:
+    return numpy.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _cross(a: Sequence[float], b: Sequence[float]) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def _unit(vector: Any) -> Numbers:
+    found: Numbers = vector / _length(vector)
+    return found
 
 
-def _unit(a: Sequence[float]) -> tuple[float, ...]:
-    return tuple(x / math.hypot(*a) for x in a)
+def _product(a: Numbers, b: Numbers) -> Numbers:
+    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    return numpy.concatenate([aw * bw - (av * bv).sum(-1, keepdims=True), aw * bv + bw * av + numpy.cross(av, bv)], -1)
 
 
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return sum(x * y for x, y in zip(a, b))
+def _inverse(a: Numbers) -> Numbers:
+    return a * (1, -1, -1, -1)
 
 
-def _product(a: Rotation, b: Rotation) -> Rotation:
-    return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
+def _rotation_by(turn: Numbers) -> Numbers:
+    half = 0.5 * _length(turn)
+    return numpy.concatenate([numpy.cos(half), 0.5 * numpy.sinc(half / math.pi) * turn], -1)
 
 
-def _inverse(a: Rotation) -> Rotation:
-    return a[0], -a[1], -a[2], -a[3]
-
-
-def _rotation_by(turn: Sequence[float]) -> Rotation:
-    """By |turn| radians about `turn`."""
-    half = 0.5 * math.hypot(*turn)
-    scale = 0.5 if half < 1e-9 else 0.5 * math.sin(half) / half
-    return math.cos(half), scale * turn[0], scale * turn[1], scale * turn[2]
-
-
-def _turn_of(rotation: Rotation) -> tuple[float, ...]:
+def _turn_of(rotation: Numbers) -> Numbers:
     """The shortest turn that makes the rotation."""
-    sign = -1 if rotation[0] < 0 else 1
-    sine = math.hypot(*rotation[1:])
-    scale = sign * (2 if sine < 1e-9 else 2 * math.atan2(sine, sign * rotation[0]) / sine)
-    return tuple(scale * x for x in rotation[1:])
+    rotation = numpy.where(rotation[..., :1] < 0, -rotation, rotation)
+    sine = _length(rotation[..., 1:])
+    turn: Numbers = 2 / numpy.sinc(numpy.arctan2(sine, rotation[..., :1]) / math.pi) * rotation[..., 1:]
+    return turn
 
 
-_Axes = Tuple[Sequence[float], Sequence[float], Sequence[float]]  # to the right and upwards in the picture, and away from the viewer
+def _level_axes(view: Any) -> Any:
+    """Three vectors at the view's azimuth and elevation: to the right and upwards, and away from the viewer."""
+    azimuth, elevation = math.radians(view.azimuth_degrees), math.radians(view.elevation_degrees)
+    sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
+    return (ca, sa, 0.0), (-se * sa, se * ca, ce), (-ce * sa, ce * ca, -se)
 
 
-def _axes_of(view: Any) -> _Axes:
-    roll = math.radians(view.roll_degrees)
+def _axes_of(view: Any) -> Numbers:
+    """The same in the picture, which may be rolled."""
     if view.HasField("eye"):
-        target, eye = _point(view.look_at), _point(view.eye)
-        forward = _unit(_add(target, eye, -1))
-        right: Sequence[float] = _cross(forward, _unit(_point(view.up)) if view.HasField("up") else (0, 0, 1))
-        if math.hypot(*right) < 1e-6:
-            right = _cross(forward, (0, 1, 0))
-        right = _unit(right)
-        up: Sequence[float] = _cross(right, forward)
+        forward = _unit(numpy.subtract(schema.xyz(view.look_at), schema.xyz(view.eye)))
+        right = numpy.cross(forward, _unit(schema.xyz(view.up)) if view.HasField("up") else (0, 0, 1))
+        right = _unit(right if numpy.linalg.norm(right) >= 1e-6 else numpy.cross(forward, (0, 1, 0)))
+        up = numpy.cross(right, forward)
     else:
-        azimuth, elevation = math.radians(view.azimuth_degrees), math.radians(view.elevation_degrees)
-        sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
-        right, up, forward = (ca, sa, 0.0), (-se * sa, se * ca, ce), (-ce * sa, ce * ca, -se)
-    c, s = math.cos(roll), math.sin(roll)
-    return _add([c * x for x in right], up, s), _add([c * x for x in up], right, -s), forward
+        right, up, forward = numpy.array(_level_axes(view))
+    c, s = math.cos(math.radians(view.roll_degrees)), math.sin(math.radians(view.roll_degrees))
+    return numpy.array([c * right + s * up, c * up - s * right, forward])
 
 
-def _point(v: Any) -> Vector:
-    return v.x, v.y, v.z
+def _rotation_of(axes: Numbers) -> Numbers:
+    x, y, z = axes * ((1,), (1,), (-1,))
+    wx, wy, wz, xy, yz, zx = y[2] - z[1], z[0] - x[2], x[1] - y[0], x[1] + y[0], y[2] + z[1], z[0] + x[2]
+    multiples = numpy.array([(1 + x[0] + y[1] + z[2], wx, wy, wz), (wx, 1 + x[0] - y[1] - z[2], xy, zx),
+                             (wy, xy, 1 - x[0] + y[1] - z[2], yz), (wz, zx, yz, 1 - x[0] - y[1] + z[2])])
+    return _unit(multiples[multiples.diagonal().argmax()])  # the longest
 
 
-def _rotation_of(axes: _Axes) -> Rotation:
-    x, y, z = axes[0], axes[1], [-f for f in axes[2]]
-    squares = (1 + x[0] + y[1] + z[2], 1 + x[0] - y[1] - z[2], 1 - x[0] + y[1] - z[2], 1 - x[0] - y[1] + z[2])
-    largest = max(range(4), key=lambda i: squares[i])
-    twice = math.sqrt(squares[largest])
-    scale = 0.5 / twice
-    xy, yz, zx = scale * (x[1] + y[0]), scale * (y[2] + z[1]), scale * (z[0] + x[2])
-    wx, wy, wz = scale * (y[2] - z[1]), scale * (z[0] - x[2]), scale * (x[1] - y[0])
-    half = 0.5 * twice
-    return ((half, wx, wy, wz), (wx, half, xy, zx), (wy, xy, half, yz), (wz, zx, yz, half))[largest]
-
-
-def _turn_to(rotation: Rotation, view: Any) -> None:
-    w, x, y, z = rotation
+def _turn_to(rotation: Numbers, view: Any) -> None:
+    w, x, y, z = rotation.tolist()
     right = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)
     forward = -2 * (x * z + w * y), -2 * (y * z - w * x), -1 + 2 * (x * x + y * y)
     view.ClearField("eye")
@@ -140,22 +122,11 @@ def _turn_to(rotation: Rotation, view: Any) -> None:
     view.elevation_degrees = math.degrees(math.asin(max(-1.0, min(1.0, -forward[2]))))
     pole = math.hypot(forward[0], forward[1]) < 1e-9  # there, azimuth and roll turn the picture alike
     view.azimuth_degrees = math.degrees(math.atan2(right[1], right[0]) if pole else math.atan2(-forward[0], forward[1]))
-    view.roll_degrees = 0
-    level_right, level_up, _ = _axes_of(view)
-    view.roll_degrees = math.degrees(math.atan2(_dot(right, level_up), _dot(right, level_right)))
+    across, along = (sum(x * y for x, y in zip(right, axis)) for axis in _level_axes(view)[:2])
+    view.roll_degrees = math.degrees(math.atan2(along, across))
 
 
 # ---- the path
-
-
-@dataclasses.dataclass
-class _Knot:
-    time: float
-    view: Any
-    numbers: tuple[float, ...]  # target x, y, z; logarithms of zoom and distance; field of view
-    rotation: Rotation
-    slopes: tuple[float, ...] = ()
-    spin: tuple[float, ...] = ()
 
 
 def _has_distance(view: Any) -> bool:
@@ -181,65 +152,59 @@ def _check(times: Sequence[float], views: Sequence[Any]) -> None:
             raise InvalidArgument(f"camera {i + 1} of the path {what}")
 
 
-def _knot(time: float, view: Any) -> _Knot:
-    target = _point(view.look_at) if view.HasField("look_at") else (0.0, 0.0, 0.0)
-    distance = math.dist(target, _point(view.eye)) if view.HasField("eye") else view.distance
-    numbers = (*target, math.log(view.zoom), math.log(distance) if distance > 0 else 0.0, view.fov_degrees)
-    return _Knot(time, view, numbers, _rotation_of(_axes_of(view)))
+def _numbers_of(view: Any) -> tuple[float, ...]:
+    """Target x, y, z; logarithms of zoom and distance; field of view."""
+    target = schema.xyz(view.look_at) if view.HasField("look_at") else (0.0, 0.0, 0.0)
+    distance = math.dist(target, schema.xyz(view.eye)) if view.HasField("eye") else view.distance
+    return (*target, math.log(view.zoom), math.log(distance) if distance > 0 else 0.0, view.fov_degrees)
 
 
-def _slope_between(before: Sequence[float], after: Sequence[float], time_before: float, time_after: float) -> tuple[float, ...]:
-    """The slope of the parabola through three points, at the middle one: `before` and `after` are the slopes of its chords."""
-    return tuple((time_after * b + time_before * a) / (time_before + time_after) for b, a in zip(before, after))
+def _moved(before: Any, numbers: Sequence[float], rotation: Numbers) -> Any:
+    view = schema.ViewParameters()
+    view.CopyFrom(before)
+    _turn_to(rotation, view)
+    if view.HasField("look_at"):
+        view.look_at.x, view.look_at.y, view.look_at.z = numbers[:3]
+    view.zoom = max(_LEAST_ZOOM, min(_MOST_ZOOM, math.exp(numbers[3])))
+    has_distance = view.projection == schema.PROJECTION_PERSPECTIVE and _has_distance(before)
+    view.distance = math.exp(numbers[4]) if has_distance else 0
+    view.fov_degrees = max(_LEAST_FOV, min(_MOST_FOV, numbers[5]))
+    return view
 
 
 class Path:
     def __init__(self, times: Sequence[float], views: Sequence[Any]):
         """Views are complete, as the service fills them in."""
         _check(times, views)
-        self._knots = [_knot(time, view) for time, view in zip(times, views)]
-        pairs = list(zip(self._knots, self._knots[1:]))
-        lengths = [b.time - a.time for a, b in pairs]
-        chords = [tuple((y - x) / length for x, y in zip(a.numbers, b.numbers)) for (a, b), length in zip(pairs, lengths)]
-        turns = [tuple(t / length for t in _turn_of(_product(_inverse(a.rotation), b.rotation))) for (a, b), length in zip(pairs, lengths)]
-        for i, knot in enumerate(self._knots):
-            before, after = max(i - 1, 0), min(i, len(pairs) - 1)
-            knot.slopes = _slope_between(chords[before], chords[after], lengths[before], lengths[after])
-            knot.spin = _slope_between(turns[before], turns[after], lengths[before], lengths[after])
+        self._times, self._views = numpy.array(times), views
+        self._numbers = numpy.array([_numbers_of(view) for view in views])
+        self._rotations = numpy.array([_rotation_of(_axes_of(view)) for view in views])
+        self._between = _product(_inverse(self._rotations[:-1]), self._rotations[1:])
+        self._slopes, self._spins = self._slopes_of(numpy.diff(self._numbers, axis=0)), self._slopes_of(_turn_of(self._between))
+
+    def _slopes_of(self, steps: Numbers) -> Numbers:
+        """The slope at each camera of the parabola through it and its neighbours: `steps` lie between them."""
+        lengths = numpy.diff(self._times)[:, None]
+        chords, camera = steps / lengths, numpy.arange(len(self._times))
+        before, after = numpy.maximum(camera - 1, 0), numpy.minimum(camera, len(lengths) - 1)
+        slopes: Numbers = (lengths[after] * chords[before] + lengths[before] * chords[after]) / (lengths[before] + lengths[after])
+        return slopes
 
     def views(self, frames: int) -> Iterator[Any]:
         """The first camera is the first frame, the last camera the last one."""
-        begin, length = self._knots[0].time, self._knots[-1].time - self._knots[0].time
-        for i in range(frames):
-            yield self._at(begin if frames == 1 else begin + length * (i / (frames - 1)))
-
-    def _at(self, time: float) -> Any:
-        after = bisect.bisect_right([knot.time for knot in self._knots], time)
-        a = self._knots[max(after - 1, 0)]
-        if after in (0, len(self._knots)) or time == a.time:
-            return a.view
-        b = self._knots[after]
-        length = b.time - a.time
-        t = (time - a.time) / length
+        times = numpy.linspace(self._times[0], self._times[-1], frames)
+        b = numpy.clip(numpy.searchsorted(self._times, times, "right"), 1, len(self._times) - 1)
+        a = b - 1
+        lengths = (self._times[b] - self._times[a])[:, None]
+        t = (times - self._times[a])[:, None] / lengths
         b1, b2, b3 = 1 - (1 - t) ** 3, t * t * (3 - 2 * t), t ** 3
-        numbers = []
-        for x, y, slope_a, slope_b in zip(a.numbers, b.numbers, a.slopes, b.slopes):
-            first, third = slope_a * length / 3, slope_b * length / 3
-            numbers.append(x + b1 * first + b2 * (y - x - first - third) + b3 * third)
-        one, three = [[length / 3 * s for s in knot.spin] for knot in (a, b)]
-        between = _product(_inverse(a.rotation), b.rotation)
-        two = _turn_of(_product(_product(_rotation_by([-x for x in one]), between), _rotation_by([-x for x in three])))
-        rotation = a.rotation
+        first, third = self._slopes[a] * lengths / 3, self._slopes[b] * lengths / 3
+        numbers = self._numbers[a] + b1 * first + b2 * (self._numbers[b] - self._numbers[a] - first - third) + b3 * third
+        one, three = self._spins[a] * lengths / 3, self._spins[b] * lengths / 3
+        two = _turn_of(_product(_product(_rotation_by(-one), self._between[a]), _rotation_by(-three)))
+        rotations = self._rotations[a]
         for turn, share in ((one, b1), (two, b2), (three, b3)):
-            rotation = _product(rotation, _rotation_by([share * x for x in turn]))
-
-        view = schema.ViewParameters()
-        view.CopyFrom(a.view)
-        _turn_to(rotation, view)
-        if view.HasField("look_at"):
-            view.look_at.x, view.look_at.y, view.look_at.z = numbers[:3]
-        view.zoom = max(_LEAST_ZOOM, min(_MOST_ZOOM, math.exp(numbers[3])))
-        has_distance = view.projection == schema.PROJECTION_PERSPECTIVE and _has_distance(a.view)
-        view.distance = math.exp(numbers[4]) if has_distance else 0
-        view.fov_degrees = max(_LEAST_FOV, min(_MOST_FOV, numbers[5]))
-        return view
+            rotations = _product(rotations, _rotation_by(share * turn))
+        cameras = dict(zip(self._times.tolist(), self._views))
+        for i, time in enumerate(times.tolist()):
+            yield cameras[time] if time in cameras else _moved(self._views[a[i]], numbers[i].tolist(), rotations[i])

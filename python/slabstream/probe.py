@@ -11,6 +11,8 @@ from . import schema
 
 Vector = tuple[float, float, float]
 _JOINT_VALUES, _JOINT_SLOPES = 128, 64
+_MILLILITRES = {"millimetre": 1e-3, "centimetre": 1.0, "metre": 1e6}  # of a cube with this side
+_CUBES = {"micrometre": "\u00b5m^3", "nanometre": "nm^3", "angstrom": "\u00c5^3"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,26 +99,23 @@ def _label_of(message: Any) -> Label:
 
 
 def labels_of(message: Any) -> list[Label]:
-    return [_label_of(label) for label in message.labels]
+    return list(map(_label_of, message.labels))
 
 
 def label_statistics_of(message: Any) -> list[LabelStatistics]:
-    spacing, orientation = message.description.spacing, message.description.orientation
-    cubed = spacing.x * spacing.y * spacing.z
-    per_unit = {schema.LENGTH_UNIT_MILLIMETRE: 1e-3, schema.LENGTH_UNIT_CENTIMETRE: 1.0, schema.LENGTH_UNIT_METRE: 1e6}
-    others = {schema.LENGTH_UNIT_MICROMETRE: "\u00b5m^3", schema.LENGTH_UNIT_NANOMETRE: "nm^3", schema.LENGTH_UNIT_ANGSTROM: "\u00c5^3"}
-    length = orientation.unit
-    if length == 0 and orientation.world == schema.WORLD_PATIENT:
-        length = schema.LENGTH_UNIT_MILLIMETRE
-    if length in per_unit:
-        unit, voxel = "ml", cubed * per_unit[length]
+    spacing, orientation = schema.xyz(message.description.spacing), message.description.orientation
+    length = schema.word(orientation, "unit", "millimetre" if orientation.world == schema.WORLD_PATIENT else "")
+    cubed = spacing[0] * spacing[1] * spacing[2]
+    if length in _MILLILITRES:
+        unit, voxel = "ml", cubed * _MILLILITRES[length]
     else:
-        bare = orientation.world in (0, schema.WORLD_VOXELS) and (spacing.x, spacing.y, spacing.z) == (1, 1, 1)
-        unit, voxel = others.get(length, "voxels^3" if bare else "units^3"), cubed
+        bare = orientation.world in (0, schema.WORLD_VOXELS) and spacing == (1, 1, 1)
+        unit, voxel = _CUBES.get(length, "voxels^3" if bare else "units^3"), cubed
     found = []
     for each in message.labels:
         numbers = (each.mean, each.deviation, each.least, each.largest) if each.voxels else (None,) * 4
-        found.append(LabelStatistics(_label_of(each.label), (each.voxels + each.non_finite) * voxel, unit, each.voxels, each.non_finite, *numbers))
+        volume = (each.voxels + each.non_finite) * voxel
+        found.append(LabelStatistics(_label_of(each.label), volume, unit, each.voxels, each.non_finite, *numbers))
     return found
 
 
@@ -126,8 +125,8 @@ def sample_of(message: Any, depth: float | None = None) -> Sample | None:
         return None
     labelled = message.HasField("label")
     return Sample(
-        at=(message.at.x, message.at.y, message.at.z),
-        index=(message.voxel.z, message.voxel.y, message.voxel.x),
+        at=schema.xyz(message.at),
+        index=schema.zyx(message.voxel),
         value=None if not message.HasField("value") else int(message.value) + message.rest if message.rest else message.value,
         label=message.label.value if labelled else None,
         label_name=message.label.name if labelled else "",

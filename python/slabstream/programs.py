@@ -3,28 +3,57 @@ from __future__ import annotations
 
 import os
 import pathlib
+import select
 import shutil
 import subprocess
+import time
+from typing import Any, Sequence
 
 from .errors import NotFound
 
-# A shell script that starts "$@" and ends it when this process is gone, however it ended: then nobody holds the other end of the pipe.
-KEEPER = '"$@" </dev/null & program=$!; exec >&- 2>&-; read -r _; kill "$program"; wait "$program"'
+class Kept:
+    """A program that ends with this process, however it ends: a shell starts it, and ends it when nobody holds the other end of its pipe."""
 
+    def __init__(self, arguments: Sequence[str], then: str = "", **more: Any):
+        """`then`: commands of the shell after the end. `more`: of subprocess.Popen."""
+        script = '"$@" </dev/null & program=$!; exec >&- 2>&-; read -r _; kill "$program"; wait "$program"; ' + then
+        self._process = os.getpid()
+        self._shell = subprocess.Popen(["/bin/sh", "-c", script, "slabstream", *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                       start_new_session=True, **more)  # Ctrl-C is for this process
 
-def end_keeper(keeper: subprocess.Popen[bytes], seconds: float) -> bool:
-    """Ends what a KEEPER with pipes for input and output keeps. False: it took longer, so the keeper was killed."""
-    assert keeper.stdin is not None and keeper.stdout is not None
-    keeper.stdin.close()
-    try:
-        keeper.wait(seconds)
-        ended = True
-    except subprocess.TimeoutExpired:
-        keeper.kill()
-        keeper.wait()
-        ended = False
-    keeper.stdout.close()
-    return ended
+    def is_ours(self) -> bool:
+        """False: of a forked child, which has a copy alone."""
+        return self._process == os.getpid()
+
+    def runs(self) -> bool:
+        return self.is_ours() and self._shell.poll() is None
+
+    def first_line(self, seconds: float) -> str:
+        """What it says first; empty: it ended, or said nothing for so long."""
+        assert self._shell.stdout is not None
+        said, deadline = b"", time.monotonic() + seconds
+        while b"\n" not in said and select.select([self._shell.stdout], [], [], max(deadline - time.monotonic(), 0.0))[0]:
+            part = os.read(self._shell.stdout.fileno(), 4096)
+            if not part:
+                break
+            said += part
+        return said.decode(errors="replace").partition("\n")[0] if b"\n" in said else ""
+
+    def end(self, seconds: float) -> bool:
+        """False: it took longer, so it was killed."""
+        if not self.is_ours():
+            return True
+        assert self._shell.stdin is not None and self._shell.stdout is not None
+        self._shell.stdin.close()
+        try:
+            self._shell.wait(seconds)
+            ended = True
+        except subprocess.TimeoutExpired:
+            self._shell.kill()
+            self._shell.wait()
+            ended = False
+        self._shell.stdout.close()
+        return ended
 
 
 def find_program() -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import itertools
 import logging
 import math
 from typing import Any, Callable, Protocol
@@ -23,8 +24,6 @@ _UNKNOWN_PONGS = 2     # in a row, before a request is submitted again
 _MOST_RESUBMITS = 3    # before it fails
 _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
-_ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused", "summary_reply",
-            "sample_reply", "joint_histogram_reply", "pick_reply", "view_reply", "prefetch_reply", "statistics_reply")
 MOST_PART_BYTES = 1 << 19  # of a volume that is sent
 
 _log = logging.getLogger("slabstream")
@@ -49,10 +48,10 @@ class _Open:
 
 
 @dataclasses.dataclass
-class _Upload:
-    answer: concurrent.futures.Future[Any]  # DataReply
-    credited: Callable[[int], None]         # told how many bytes may be sent in all
-    epoch: int | None = None                # of the coordinator, once a pong has told it
+class _Question:
+    answer: concurrent.futures.Future[Any]          # the reply's message
+    credited: Callable[[int], None] | None = None   # of a volume that is sent: told how many bytes may be sent in all
+    epoch: int | None = None                        # of the coordinator that takes the volume, once a pong has told it
 
 
 class Requests:
@@ -61,19 +60,16 @@ class Requests:
         self._endpoint = endpoint
         self._send = send
         self._open: dict[int, _Open] = {}
-        self._questions: dict[int, concurrent.futures.Future[Any]] = {}  # by nonce
-        self._uploads: dict[int, _Upload] = {}  # by nonce
+        self.numbers = itertools.count(1)  # of requests and nonces; any thread may take the next one
+        self._questions: dict[int, _Question] = {}  # and orders, by nonce
         self._pinged: dict[int, list[int]] = {}  # requests of each unanswered ping, by nonce
-        self._last_request = self._last_nonce = 0
         self._received_bytes = self._told_bytes = 0
         self._next_ping = 0.0
         self._unanswered_since: float | None = None  # time of the first ping since the last message
         self._gone: str = ""  # why nothing more will be answered
 
-    def submit(self, frame: Any, deadline_seconds: float, observer: Observer, now: float) -> int:
-        """Opens a request and returns its number. The deadline counts from its arrival at the service."""
-        self._last_request += 1
-        request = self._last_request
+    def submit(self, request: int, frame: Any, deadline_seconds: float, observer: Observer, now: float) -> None:
+        """Opens a request of this number. The deadline counts from its arrival at the service."""
         seconds = min(max(deadline_seconds, 0.001), MOST_DEADLINE_SECONDS)
         message = schema.SubmitFrame(request=request, deadline_ms=int(seconds * 1000), frame=frame)
         if self._gone:
@@ -81,53 +77,38 @@ class Requests:
         elif len(self._open) >= MOST_OPEN:
             observer.failed(ResourceExhausted(f"at most {MOST_OPEN} requests may be open at once"))
         else:
-            if not self._open and not self._uploads:
-                self._next_ping = now + PING_SECONDS
+            self._begin_pings(now)
             self._open[request] = _Open(message, now + seconds, observer)
             self._send_message(submit_frame=message)
-        return request
 
     def cancel(self, request: int) -> None:
         if request in self._open:
             self._open[request].cancelled = True
             self._send_message(cancel_frame=schema.CancelFrame(request=request))
 
-    def ask(self, kind: str, message: Any, answer: concurrent.futures.Future[Any]) -> int:
-        """Sends a question or an order. The answer is the reply's message. Returns what forget() takes."""
-        self._last_nonce += 1
-        message.nonce = self._last_nonce
+    def ask(self, nonce: int, kind: str, message: Any, answer: concurrent.futures.Future[Any], now: float = 0,
+            credited: Callable[[int], None] | None = None) -> None:
+        """Sends a question or an order. The answer is the reply's message. `credited`, `now`: of an AddVolume, whose bytes follow."""
+        message.nonce = nonce
         if self._gone:
             answer.set_exception(Unavailable(self._gone))
-        else:
-            self._questions[self._last_nonce] = answer
-            self._send_message(**{kind: message})
-        return self._last_nonce
+            return
+        if credited is not None:
+            self._begin_pings(now)
+        self._questions[nonce] = _Question(answer, credited)
+        self._send_message(**{kind: message})
 
     def forget(self, nonce: int) -> None:
-        """Nobody waits for that answer now."""
-        self._questions.pop(nonce, None)
-
-    def begin_upload(self, order: Any, answer: concurrent.futures.Future[Any], credited: Callable[[int], None], now: float) -> int:
-        """Sends an AddVolume. Returns what send_part() and drop_upload() take."""
-        self._last_nonce += 1
-        order.nonce = self._last_nonce
-        if self._gone:
-            answer.set_exception(Unavailable(self._gone))
-        else:
-            if not self._open and not self._uploads:
-                self._next_ping = now + PING_SECONDS
-            self._uploads[self._last_nonce] = _Upload(answer, credited)
-            self._send_message(add_volume=order)
-        return self._last_nonce
+        """Nobody waits for that answer now. What was sent of a volume is dropped."""
+        forgotten = self._questions.pop(nonce, None)
+        if forgotten is not None and forgotten.credited is not None:
+            self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
 
     def send_part(self, nonce: int, begin: int, part: memoryview) -> None:
-        if nonce in self._uploads:
+        """Of the volume of an AddVolume."""
+        if nonce in self._questions:
             message = schema.VolumePart(nonce=nonce, begin=begin, bytes=part.nbytes)
             self._send(schema.Envelope(version=schema.WIRE_VERSION, volume_part=message), part)
-
-    def drop_upload(self, nonce: int) -> None:
-        if self._uploads.pop(nonce, None) is not None:
-            self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
 
     def receive(self, parts: list[Any], now: float) -> None:
         """A message of one or two frames, as bytes or memoryviews."""
@@ -156,9 +137,10 @@ class Requests:
         elif kind == "frame_failed":
             self._end(message.request, error_of(message.status.code, message.status.message))
         elif kind == "volume_credit":
-            if message.nonce in self._uploads:
-                self._uploads[message.nonce].credited(message.allowed)
-        elif kind in _ANSWERS:
+            upload = self._questions.get(message.nonce)
+            if upload is not None and upload.credited is not None:
+                upload.credited(message.allowed)
+        elif "nonce" in message.DESCRIPTOR.fields_by_name:
             self._answered(kind, message, now)
         else:
             _log.warning("dropped %s, which services do not send to clients", kind)
@@ -167,7 +149,7 @@ class Requests:
 
     def tick(self, now: float) -> float:
         """Pings if it is time, and fails everything if the service is silent. Returns when to call it again."""
-        if not self._open and not self._uploads:
+        if not self._pings():
             self._unanswered_since = None
             return math.inf
         if self._unanswered_since is not None and now - self._unanswered_since >= SILENCE_SECONDS:
@@ -183,22 +165,23 @@ class Requests:
         """Ends everything that is open, and if `for_good` everything that comes later."""
         if for_good:
             self._gone = why
-            for answer in self._questions.values():
-                answer.set_exception(Unavailable(why))
-            self._questions.clear()
         for request in list(self._open):
             self._end(request, Unavailable(why))
-        self._fail_uploads(why)
+        self._fail_questions(why, lambda question: for_good or question.credited is not None)
         self._pinged.clear()
         self._unanswered_since = None
 
-    def _fail_uploads(self, why: str, unless_epoch: int | None = None) -> None:
-        for nonce, upload in list(self._uploads.items()):
-            if unless_epoch is None or upload.epoch not in (None, unless_epoch):
-                del self._uploads[nonce]
-                upload.answer.set_exception(Unavailable(why))
-            else:
-                upload.epoch = unless_epoch
+    def _fail_questions(self, why: str, which: Callable[[_Question], bool]) -> None:
+        for nonce in [nonce for nonce, question in self._questions.items() if which(question)]:
+            self._questions.pop(nonce).answer.set_exception(Unavailable(why))
+
+    def _pings(self) -> bool:
+        """Whether anything is open that takes long."""
+        return bool(self._open) or any(question.credited is not None for question in self._questions.values())
+
+    def _begin_pings(self, now: float) -> None:
+        if not self._pings():
+            self._next_ping = now + PING_SECONDS
 
     def close(self) -> None:
         """Cancels what is open."""
@@ -228,20 +211,17 @@ class Requests:
             found.observer.failed(error)
 
     def _answered(self, kind: str, message: Any, now: float) -> None:
-        upload = self._uploads.pop(message.nonce, None) if kind in ("data_reply", "order_refused") else None
-        answer: concurrent.futures.Future[Any] | None
-        answer = self._questions.pop(message.nonce, None) if upload is None else upload.answer
-        if answer is None:
+        question = self._questions.pop(message.nonce, None)
+        if question is None:
             if kind == "client_pong":
                 self._ponged(message, now)
         elif kind == "order_refused":
-            answer.set_exception(error_of(message.status.code, message.status.message))
+            question.answer.set_exception(error_of(message.status.code, message.status.message))
         else:
-            answer.set_result(message)
+            question.answer.set_result(message)
 
     def _ping(self, now: float) -> None:
-        self._last_nonce += 1
-        ping = schema.ClientPing(nonce=self._last_nonce, received_bytes=self._received_bytes, open=list(self._open))
+        ping = schema.ClientPing(nonce=next(self.numbers), received_bytes=self._received_bytes, open=list(self._open))
         self._told_bytes = self._received_bytes
         self._pinged[ping.nonce] = list(ping.open)
         self._send_message(client_ping=ping)
@@ -253,7 +233,10 @@ class Requests:
         if pong.nonce not in self._pinged:
             return
         asked = self._pinged[pong.nonce]
-        self._fail_uploads(f"the service at {self._endpoint} was restarted, and the part of the volume that was sent is lost", pong.epoch)
+        lost = f"the service at {self._endpoint} was restarted, and the part of the volume that was sent is lost"
+        self._fail_questions(lost, lambda question: question.credited is not None and question.epoch not in (None, pong.epoch))
+        for question in self._questions.values():
+            question.epoch = pong.epoch
         self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
         known = set(pong.known)
         for request in asked:

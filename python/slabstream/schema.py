@@ -5,8 +5,9 @@ installed, and takes any version of protobuf from 3.20 on.
 """
 from __future__ import annotations
 
+import dataclasses
 import pathlib
-from typing import Any
+from typing import Any, Callable, TypeVar
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
@@ -34,6 +35,33 @@ def _load() -> dict[str, Any]:
 
 
 _NAMES = _load()
+
+
+def word(message: Any, field: str, unknown: str = "") -> str:
+    """The value of an enumeration as a word: "millimetre" of LENGTH_UNIT_MILLIMETRE. `unknown`: in place of 0, and of what is not known."""
+    kind = message.DESCRIPTOR.fields_by_name[field].enum_type
+    value = kind.values_by_number.get(getattr(message, field))
+    if value is None or value.number == 0:
+        return unknown
+    prefix = kind.values_by_number[0].name.removesuffix("UNSPECIFIED")
+    return str(value.name.removeprefix(prefix)).lower()
+
+
+def zyx(vector: Any) -> tuple[Any, Any, Any]:
+    return vector.z, vector.y, vector.x
+
+
+def xyz(vector: Any) -> tuple[Any, Any, Any]:
+    return vector.x, vector.y, vector.z
+
+
+_Made = TypeVar("_Made")
+
+
+def read(kind: Callable[..., _Made], message: Any, /, **given: Any) -> _Made:
+    """A dataclass of this kind: fields that are not given are those of the message of the same names."""
+    names = [field.name for field in dataclasses.fields(kind) if field.name not in given]
+    return kind(**given, **{name: getattr(message, name) for name in names})
 
 
 def __getattr__(name: str) -> Any:

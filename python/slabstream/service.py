@@ -8,32 +8,20 @@ import dataclasses
 import os
 from typing import Any, Callable, Iterator
 
-from . import schema
+from . import probe, schema, values
 from .address import Address, find_service
 from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
-from .drafts import Draft, camera_draft_of, draft_of, set_clip_box, slice_drafts_of
+from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
 from .moves import Path, cameras_of, turned_views
 from .options import COMMANDS, takes_options_of
-from .probe import (
-    Histogram,
-    JointHistogram,
-    Label,
-    LabelStatistics,
-    Sample,
-    histogram_of,
-    joint_histogram_of,
-    label_statistics_of,
-    labels_of,
-    sample_of,
-)
+from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .status import Dataset, Status, dataset_of, status_of
 from .transfer import TransferFunction, mapped
 from .uploads import upload_of
-from .values import integer, number, point
 from .viewer import Viewer
 from .volumes import layers_of, on_grid, volume_of
 
@@ -92,9 +80,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
         the file of one (docs/movies.md). `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
         that are open when the iterator is closed are cancelled."""
-        frames = integer("frames", frames, 1, _MOST_FRAMES)
-        turns = integer("turns", turns, 0, _MOST_TURNS)
-        in_flight = integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
+        frames = values.integer("frames", frames, 1, _MOST_FRAMES)
+        turns = values.integer("turns", turns, 0, _MOST_TURNS)
+        in_flight = values.integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, options)
         if path is None:
             if draft.frame.view.HasField("eye") and turns > 0:
@@ -140,28 +128,27 @@ class Service(contextlib.AbstractContextManager["Service"]):
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
         """How often which value occurs in a dataset."""
-        return histogram_of(self._summary(dataset, timeout))
+        return probe.histogram_of(self._summary(dataset, timeout))
 
     def joint_histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> JointHistogram:
         """How often which value occurs together with which slope, for two-dimensional transfer functions."""
-        return joint_histogram_of(self._connection.ask("joint_histogram_query", schema.JointHistogramQuery(dataset=dataset), timeout))
+        return probe.joint_histogram_of(self._connection.ask("joint_histogram_query", schema.JointHistogramQuery(dataset=dataset), timeout))
 
     def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
         """The labels that occur in a dataset, by value; empty: it has no labels."""
-        return labels_of(self._summary(dataset, timeout))
+        return probe.labels_of(self._summary(dataset, timeout))
 
     def label_statistics(self, dataset: str, *, clip_box: Any = None, timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
         """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
         dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it."""
-        query = schema.StatisticsQuery(dataset=dataset, labels=True)
-        set_clip_box(query.box, "clip_box", ":,:,:" if clip_box is None else clip_box)
-        return label_statistics_of(self._connection.ask("statistics_query", query, timeout))
+        box = values.clip_box("clip_box", ":,:,:" if clip_box is None else clip_box)
+        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box)
+        return probe.label_statistics_of(self._connection.ask("statistics_query", query, timeout))
 
     def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
-        x, y, z = point("at", at)
-        query = schema.SampleQuery(dataset=dataset, points=[schema.Vec3(x=x, y=y, z=z)])
-        return sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
+        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))])
+        return probe.sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
 
     @takes_options_of("render")
     def pick(self, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
@@ -170,19 +157,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         draft = draft_of(dataset, options)
         self._settle([draft])
         frame = draft.frame
-        query = schema.PickQuery(frame=frame, x=number("x", x, 0, frame.size.width), y=number("y", y, 0, frame.size.height))
+        query = schema.PickQuery(frame=frame, x=values.number("x", x, 0, frame.size.width), y=values.number("y", y, 0, frame.size.height))
         reply = self._connection.ask("pick_query", query, timeout)
-        return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
-
-    @takes_options_of("render")
-    def prefetch(self, dataset: str, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> bool:
-        """Says that the picture with these options may be asked for soon. For a second, the service fetches what it shows from the dataset's web
-        server, a few blocks at a time, and keeps it on disk (`--cache`). False: the dataset lies behind no web server, or the service
-        keeps nothing on disk."""
-        draft = draft_of(dataset, options)
-        self._settle([draft])
-        query = schema.PrefetchQuery(frame=draft.frame)
-        return bool(self._connection.ask("prefetch_query", query, timeout).fetches)
+        return probe.sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
 
     def status(self, timeout: float = ANSWER_SECONDS) -> Status:
         """Workers, datasets and counts of frames."""

@@ -6,10 +6,6 @@ from typing import Any
 
 from . import schema
 
-_STATES = {schema.DATASET_STATE_UNLOADED: "unloaded", schema.DATASET_STATE_LOADING: "loading", schema.DATASET_STATE_READY: "ready",
-           schema.DATASET_STATE_FAILED: "failed"}
-_TYPES = {schema.SCALAR_TYPE_UINT8: "uint8", schema.SCALAR_TYPE_UINT16: "uint16", schema.SCALAR_TYPE_FLOAT32: "float32"}
-
 
 @dataclasses.dataclass(frozen=True)
 class DatasetLevel:
@@ -77,49 +73,22 @@ class Status:
     web: tuple[WebTraffic, ...] = ()
 
 
-def _level_of(about: Any) -> DatasetLevel:
-    return DatasetLevel((about.size.z, about.size.y, about.size.x), (about.spacing.z, about.spacing.y, about.spacing.x))
-
-
 def dataset_of(message: Any) -> Dataset:
-    state = _STATES.get(message.state, "failed")
+    state = schema.word(message, "state", "failed")
     if state != "ready":
         return Dataset(message.name, state, message.error)
     about = message.description
-    return Dataset(
-        name=message.name,
-        state=state,
-        shape=(about.size.z, about.size.y, about.size.x),
-        spacing=(about.spacing.z, about.spacing.y, about.spacing.x),
-        dtype=_TYPES.get(about.type),
-        value_range=(message.range.min, message.range.max),
-        memory_bytes=message.memory_bytes,
-        labels=message.labels,
-        overlay=message.overlay,
-        cells=message.cells,
-        levels=tuple(map(_level_of, message.levels or [about])),
-    )
+    levels = tuple(DatasetLevel(schema.zyx(level.size), schema.zyx(level.spacing)) for level in message.levels or [about])
+    return schema.read(Dataset, message, state=state, shape=schema.zyx(about.size), spacing=schema.zyx(about.spacing),
+                       dtype=schema.word(about, "type") or None, value_range=(message.range.min, message.range.max), levels=levels)
 
 
 def status_of(message: Any, endpoint: str) -> Status:
     refused = message.refused
-    return Status(
-        endpoint=endpoint,
-        pid=message.pid,
-        uptime_seconds=message.uptime_ms / 1000,
-        clients=message.clients,
-        queued=message.queued,
-        running=message.running,
-        frames_done=message.frames_done,
-        frames_failed=message.frames_failed,
+    return schema.read(
+        Status, message, endpoint=endpoint, uptime_seconds=message.uptime_ms / 1000,
         refused=refused.bad_request + refused.unknown_dataset + refused.too_large + refused.over_quota,
-        workers_lost=message.workers_lost,
-        workers=tuple(
-            Worker(w.worker, w.pid, w.host, w.threads, w.cached_bytes, w.fetched_bytes, w.rendered_ranks, w.silent_ms / 1000, w.leaving)
-            for w in message.workers
-        ),
+        workers=tuple(schema.read(Worker, w, id=w.worker, silent_seconds=w.silent_ms / 1000) for w in message.workers),
         datasets=tuple(map(dataset_of, message.datasets)),
-        web=tuple(
-            WebTraffic(t.server, t.requests, t.retries, t.failures, t.unchanged, t.bytes, t.milliseconds / 1000) for t in message.web
-        ),
+        web=tuple(schema.read(WebTraffic, t, seconds=t.milliseconds / 1000) for t in message.web),
     )

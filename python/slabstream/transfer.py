@@ -4,20 +4,17 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import importlib.util
-import json
 import os
-import pathlib
-from typing import Any, Mapping, Sequence
+from typing import Any, Container, Mapping, Sequence
 
 import numpy
 
 from . import schema
-from .errors import InvalidArgument, NotFound
+from .errors import InvalidArgument
 from .presets import presets
+from .values import json_of
 
-_NUMBERS_PER_POINT = 4
 _MOST_POINTS = 4096
-_MOST_FILE_BYTES = 16 << 20
 _MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 _MOST_REGIONS, _MOST_CORNERS = 16, 32
 _REGION = ("Corners", "Values", "Slopes", "Color", "Opacity", "Softness")
@@ -84,100 +81,73 @@ def window(width: float, level: float) -> TransferFunction:
     return TransferFunction([(level - width / 2, (0, 0, 0)), (level + width / 2, (1, 1, 1))], [(level, 1)])
 
 
-def _curve(preset: dict[str, Any], field: str, name: str) -> list[list[float]]:
-    found = preset[field]
-    if not isinstance(found, list) or not found or len(found) % _NUMBERS_PER_POINT or len(found) > _NUMBERS_PER_POINT * _MOST_POINTS:
-        raise InvalidArgument(f"{name}: {field} must be an array of 4 numbers a point, of 1 to {_MOST_POINTS} points")
-    for i, value in enumerate(found):
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise InvalidArgument(f"{name}: {field}[{i}] is not a number")
-    return [found[i : i + _NUMBERS_PER_POINT] for i in range(0, len(found), _NUMBERS_PER_POINT)]
-
-
-def _checked_material(material: Any, name: str) -> dict[str, float]:
-    if not isinstance(material, Mapping):
-        raise InvalidArgument(f"{name}: Material is not an object")
-    for field, number in material.items():
-        if field not in _MATERIAL:
-            raise InvalidArgument(f"{name}: Material has the field {field!r}, must be one of: {', '.join(_MATERIAL)}")
-        if isinstance(number, bool) or not isinstance(number, (int, float)):
-            raise InvalidArgument(f"{name}: Material.{field} is not a number")
-    return dict(material)
-
-
-def _numbers(region: Mapping[str, Any], field: str, name: str, counts: range) -> list[float]:
-    found = region[field]
-    if not isinstance(found, list) or len(found) not in counts or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in found):
-        many = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-        raise InvalidArgument(f"{name}.{field} must be an array of {many} numbers" + (", 2 a corner" if field == "Corners" else ""))
+def _number(found: Any, name: str) -> float:
+    if isinstance(found, bool) or not isinstance(found, (int, float)):
+        raise InvalidArgument(f"{name} is not a number")
     return found
 
 
-def _region(region: Any, name: str) -> Region:
-    if not isinstance(region, Mapping):
+def _numbers(found: Any, name: str, counts: Container[int], what: str) -> list[float]:
+    if not isinstance(found, list) or len(found) not in counts:
+        raise InvalidArgument(f"{name} must be an array of {what}")
+    return [_number(value, f"{name}[{i}]") for i, value in enumerate(found)]
+
+
+def _checked_object(found: Any, name: str, known: Sequence[str]) -> Mapping[str, Any]:
+    if not isinstance(found, Mapping):
         raise InvalidArgument(f"{name} is not an object")
-    for field in region:
-        if field not in _REGION:
-            raise InvalidArgument(f"{name} has the field {field!r}, must be one of: {', '.join(_REGION)}")
-    if ("Values" in region) != ("Slopes" in region) or ("Corners" in region) == ("Values" in region):
+    for field in found:
+        if field not in known:
+            raise InvalidArgument(f"{name} has the field {field!r}, must be one of: {', '.join(known)}")
+    return found
+
+
+def _checked_material(material: Any, name: str) -> dict[str, float]:
+    found = _checked_object(material, f"{name}: Material", _MATERIAL)
+    return {field: _number(number, f"{name}: Material.{field}") for field, number in found.items()}
+
+
+def _curve(preset: dict[str, Any], field: str, name: str) -> list[list[float]]:
+    found = _numbers(preset[field], f"{name}: {field}", range(4, 4 * _MOST_POINTS + 1, 4), f"4 numbers a point, of 1 to {_MOST_POINTS} points")
+    return [found[i : i + 4] for i in range(0, len(found), 4)]
+
+
+def _region(region: Any, name: str) -> Region:
+    found = _checked_object(region, name, _REGION)
+    if ("Values" in found) != ("Slopes" in found) or ("Corners" in found) == ("Values" in found):
         raise InvalidArgument(f"{name} must have either Corners or Values and Slopes")
-    if "Color" not in region:
+    if "Color" not in found:
         raise InvalidArgument(f"{name} has no Color")
-    red, green, blue = _numbers(region, "Color", name, range(3, 4))
-    shares = {}
-    for field in ("Opacity", "Softness"):
-        if isinstance(region.get(field, 0), bool) or not isinstance(region.get(field, 0), (int, float)):
-            raise InvalidArgument(f"{name}.{field} is not a number")
-        if field in region:
-            shares[field.lower()] = region[field]
-    if "Values" in region:
-        low, high = _numbers(region, "Values", name, range(2, 3))
-        least, most = _numbers(region, "Slopes", name, range(2, 3))
+    red, green, blue = _numbers(found["Color"], f"{name}.Color", (3,), "3 numbers")
+    shares = {field.lower(): _number(found[field], f"{name}.{field}") for field in ("Opacity", "Softness") if field in found}
+    if "Values" in found:
+        (low, high), (least, most) = (_numbers(found[field], f"{name}.{field}", (2,), "2 numbers") for field in ("Values", "Slopes"))
         return Region.box((low, high), (least, most), (red, green, blue), **shares)
-    corners = _numbers(region, "Corners", name, range(6, 2 * _MOST_CORNERS + 1, 2))
+    counts = range(6, 2 * _MOST_CORNERS + 1, 2)
+    corners = _numbers(found["Corners"], f"{name}.Corners", counts, f"6 to {counts[-1]} numbers, 2 a corner")
     return Region(list(zip(corners[::2], corners[1::2])), (red, green, blue), **shares)
 
 
 def from_paraview(document: Any, name: str = "transfer") -> TransferFunction:
     """A colour map as ParaView exports it: the contents of its JSON file. `name` begins messages."""
     preset = document[0] if isinstance(document, list) and document else document
-    if isinstance(preset, dict) and "Regions" in preset:
-        return _from_regions(preset, name)
-    if not isinstance(preset, dict) or "RGBPoints" not in preset:
+    if not isinstance(preset, dict) or not preset.keys() & {"RGBPoints", "Regions"}:
         raise InvalidArgument(f"{name}: not a colour map: RGBPoints is missing")
-    colors = [(value, (red, green, blue)) for value, red, green, blue in _curve(preset, "RGBPoints", name)]
     material = _checked_material(preset["Material"], name) if "Material" in preset else None
+    if "Regions" in preset:
+        if "RGBPoints" in preset or "Points" in preset:
+            raise InvalidArgument(f"{name}: Regions stand in the place of RGBPoints and Points: one of both must go")
+        found = preset["Regions"]
+        if not isinstance(found, list) or not 1 <= len(found) <= _MOST_REGIONS:
+            raise InvalidArgument(f"{name}: Regions must be an array of 1 to {_MOST_REGIONS} regions")
+        return TransferFunction(regions=[_region(region, f"{name}: Regions[{i}]") for i, region in enumerate(found)], material=material)
+    colors = [(value, (red, green, blue)) for value, red, green, blue in _curve(preset, "RGBPoints", name)]
     if "Points" not in preset:
         return TransferFunction(colors, [(colors[0][0], 0), (colors[-1][0], 1)], material)
     opacities = []
     for value, opacity, midpoint, sharpness in _curve(preset, "Points", name):
         opacities.append((value, opacity, min(max(midpoint, _EDGE), 1 - _EDGE) if midpoint in (0, 1) else midpoint, sharpness))
     return TransferFunction(colors, opacities, material)
-
-
-def _from_regions(preset: Mapping[str, Any], name: str) -> TransferFunction:
-    if "RGBPoints" in preset or "Points" in preset:
-        raise InvalidArgument(f"{name}: Regions stand in the place of RGBPoints and Points: one of both must go")
-    found = preset["Regions"]
-    if not isinstance(found, list) or not 1 <= len(found) <= _MOST_REGIONS:
-        raise InvalidArgument(f"{name}: Regions must be an array of 1 to {_MOST_REGIONS} regions")
-    return TransferFunction(regions=[_region(region, f"{name}: Regions[{i}]") for i, region in enumerate(found)],
-                            material=_checked_material(preset["Material"], name) if "Material" in preset else None)
-
-
-def read_paraview(path: str | os.PathLike[str], name: str) -> TransferFunction:
-    """The same of a file."""
-    try:
-        text = pathlib.Path(path).read_bytes()[: _MOST_FILE_BYTES + 1]
-    except FileNotFoundError:
-        raise NotFound(f"{name} '{path}' does not exist") from None
-    except OSError as error:
-        raise InvalidArgument(f"{name} '{path}' cannot be read: {error.strerror}") from None
-    try:
-        document = json.loads(text)
-    except ValueError as error:
-        raise InvalidArgument(f"{name} {path}: not JSON: {error}") from None
-    return from_paraview(document, f"{name} {path}")
 
 
 Colors = list[tuple[float, float, float]]  # at equal distances, from the least value to the greatest
@@ -211,7 +181,7 @@ def choose(name: str, value: object, choice: Any) -> None:
     if isinstance(value, (dict, list)):
         value = from_paraview(value, name)
     elif isinstance(value, os.PathLike) or (isinstance(value, str) and (value.endswith(".json") or "/" in value)):
-        value = read_paraview(value, name)
+        value = from_paraview(json_of(name, value), f"{name} {value}")
     if isinstance(value, TransferFunction):
         choice.function.CopyFrom(value.message())
     elif isinstance(value, str) and value:

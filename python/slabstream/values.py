@@ -1,6 +1,6 @@
-"""Values of options: what Python users write, or the command line's text, turned into numbers.
+"""Values of options: what Python users write, or the command line's text, turned into numbers and messages of the wire.
 
-Each function takes the option's name, for messages, and a value. Messages are those of the command line, without dashes:
+Each function takes the option's name, for what it says of mistakes, and a value. Sentences are those of the command line, without dashes:
 "zoom 0 is out of range [0.001, 10000]". Points and directions are x, y, z of the world.
 """
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, Iterable, Sequence
 
 import numpy
 
+from . import schema
 from .errors import InvalidArgument, NotFound
 
 Vector = tuple[float, float, float]
@@ -91,8 +92,12 @@ def choice(name: str, value: object, choices: Sequence[str]) -> int:
     raise InvalidArgument(f"{name} '{value}' is not one of {', '.join(choices)}")
 
 
+def _listed(value: Any, separator: str = ",") -> list[Any]:
+    return value.split(separator) if isinstance(value, str) else list(value) if isinstance(value, Iterable) else [value]
+
+
 def _parts(name: str, value: object, count: int, shape: str) -> list[Any]:
-    found = value.split(",") if isinstance(value, str) else list(value) if isinstance(value, Iterable) else []
+    found = _listed(value)
     if len(found) != count:
         raise InvalidArgument(f"{name} {value!r} is not {shape}")
     return found
@@ -103,26 +108,27 @@ def point(name: str, value: object) -> Vector:
     return x, y, z
 
 
-def direction(name: str, value: object) -> Vector:
+def _direction(name: str, value: object) -> Vector:
     found = point(name, value)
     if found == (0, 0, 0):
         raise InvalidArgument(f"{name} {value} has no direction")
     return found
 
 
-def size(name: str, value: object) -> tuple[int, int]:
-    """Width and height: (640, 480), "640x480", or one number for a square."""
-    if isinstance(value, str):
-        sides: list[Any] = value.split("x")
-    else:
-        sides = list(value) if isinstance(value, Iterable) else [value]
+def vec3(vector: Iterable[float]) -> Any:
+    return schema.Vec3(**dict(zip("xyz", vector)))
+
+
+def size(name: str, value: object) -> Any:
+    """ImageSize: (640, 480), "640x480", or one number for a square."""
+    sides = _listed(value, "x")
     if len(sides) not in (1, 2):
         raise InvalidArgument(f"{name} {value!r} is neither WIDTHxHEIGHT nor one number")
-    return integer(name, sides[0], 1, MOST_SIDE), integer(name, sides[-1], 1, MOST_SIDE)
+    return schema.ImageSize(width=integer(name, sides[0], 1, MOST_SIDE), height=integer(name, sides[-1], 1, MOST_SIDE))
 
 
-def scalar_range(name: str, value: object) -> tuple[float, float, bool]:
-    """Low, high, and whether they are percentiles: (0, 255), "0:255", "2%:98%"."""
+def scalar_range(name: str, value: object) -> Any:
+    """ScalarRange: (0, 255), "0:255", "2%:98%"."""
     if isinstance(value, str):
         ends: list[Any] = value.split(":")
         percentiles = all(end.endswith("%") for end in ends)
@@ -135,12 +141,15 @@ def scalar_range(name: str, value: object) -> tuple[float, float, bool]:
     low, high = (number(name, end, least, most) for end in ends)
     if low >= high:
         raise InvalidArgument(f"{name} {value!r} must rise")
-    return low, high, percentiles
+    return schema.ScalarRange(min=low, max=high, percentiles=percentiles)
 
 
-def clip_box(name: str, value: object) -> tuple[Vector, Vector, str]:
-    """Low, high and the unit, "" for that of the world, "v" for voxels or "%" of the sides: ((x0, x1), (y0, y1), (z0, z1)), with None for
-    a bound that does not clip, and the unit as a fourth value if it is another; or "X0:X1,Y0:Y1,Z0:Z1%", where a unit behind any bound is that of all."""
+_CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
+
+
+def clip_box(name: str, value: object) -> Any:
+    """ClipBox: ((x0, x1), (y0, y1), (z0, z1)), with None for a bound that does not clip, and "v" for voxels or "%" of the sides as a fourth
+    value; or "X0:X1,Y0:Y1,Z0:Z1%", where a unit behind any bound is that of all."""
     unit = ""
     if isinstance(value, str):
         unit = "".join(mark for mark in "v%" if mark in value)
@@ -149,24 +158,40 @@ def clip_box(name: str, value: object) -> tuple[Vector, Vector, str]:
         axes: list[Any] = [[(end[:-1] if end[-1:] in ("v", "%") else end) or None for end in axis.split(":")] for axis in value.split(",")]
     else:
         axes = list(value) if isinstance(value, Iterable) else []
-        if len(axes) == 4 and axes[3] in ("", "v", "%"):
+        if len(axes) == 4 and axes[3] in _CLIP_UNITS:
             unit = axes.pop()
     if len(axes) != 3 or not all(isinstance(axis, Iterable) and len(list(axis)) == 2 for axis in axes):
         raise InvalidArgument(f"{name} {value!r} is not X0:X1,Y0:Y1,Z0:Z1")
     low, high = [], []
-    for letter, axis in zip("xyz", axes):
-        begin, end = axis
+    for letter, (begin, end) in zip("xyz", axes):
         low.append(-MOST_COORDINATE if begin is None else number(name, begin, -MOST_COORDINATE, MOST_COORDINATE))
         high.append(MOST_COORDINATE if end is None else number(name, end, -MOST_COORDINATE, MOST_COORDINATE))
         if low[-1] >= high[-1]:
             raise InvalidArgument(f"{name} {value!r}: {letter} runs from {low[-1]:g} to {high[-1]:g}, but must rise")
-    return (low[0], low[1], low[2]), (high[0], high[1], high[2]), unit
+    return schema.ClipBox(low=vec3(low), high=vec3(high), unit=_CLIP_UNITS[unit])
 
 
-def clip_plane(name: str, value: object) -> tuple[Vector, float]:
-    """Normal and offset: (nx, ny, nz, d), or "NX,NY,NZ,D"."""
-    parts = _parts(name, value, 4, "NX,NY,NZ,D")
-    return direction(name, parts[:3]), number(name, parts[3], -MOST_COORDINATE, MOST_COORDINATE)
+def _several(value: Any, count: int) -> list[Any]:
+    """Values of an option that may be repeated: one of `count` numbers or a text, or a list of such."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        return [value]
+    listed = list(value)
+    return [listed] if len(listed) == count and not any(isinstance(item, (str, Iterable)) for item in listed) else listed
+
+
+def clip_planes(name: str, value: object) -> list[Any]:
+    """ClipPlanes: (nx, ny, nz, d), or "NX,NY,NZ,D"; or several."""
+    found = []
+    for item in _several(value, 4):
+        parts = _parts(name, item, 4, "NX,NY,NZ,D")
+        offset = number(name, parts[3], -MOST_COORDINATE, MOST_COORDINATE)
+        found.append(schema.ClipPlane(normal=vec3(_direction(name, parts[:3])), offset=offset))
+    return found
+
+
+def directions(name: str, value: object) -> list[Any]:
+    """Vec3 of each."""
+    return [vec3(_direction(name, item)) for item in _several(value, 3)]
 
 
 def color(name: str, value: object) -> Color:
@@ -181,7 +206,7 @@ def color(name: str, value: object) -> Color:
             raise InvalidArgument(f"{name} '{value}' is neither #rrggbb nor #rrggbbaa")
         channels = [float(numpy.float32(code) / numpy.float32(255)) for code in codes]
     else:
-        parts: list[Any] = text.split(",") if isinstance(text, str) else list(text) if isinstance(text, Iterable) else []
+        parts = _listed(text)
         if len(parts) not in (3, 4):
             raise InvalidArgument(f"{name} {value!r} is neither R,G,B[,A] nor #rrggbb nor the name of a colour")
         channels = [float(numpy.float32(number(name, part, 0, 1))) for part in parts]
@@ -201,8 +226,8 @@ def _surface_texts(text: str) -> list[tuple[Any, ...]]:
     return found
 
 
-def isosurfaces(name: str, value: object) -> list[tuple[float, Vector, float]]:
-    """Value, colour and opacity of each, ascending: 120, (120, "red"), (120, "red", 0.3), a list of such, or "120:red:0.3,300"."""
+def isosurfaces(name: str, value: object) -> list[Any]:
+    """Isosurfaces, ascending: 120, (120, "red"), (120, "red", 0.3), a list of such, or "120:red:0.3,300"."""
     if isinstance(value, str):
         items = _surface_texts(value)
     else:
@@ -210,55 +235,53 @@ def isosurfaces(name: str, value: object) -> list[tuple[float, Vector, float]]:
         items = [tuple(item) if isinstance(item, tuple) else (item,) for item in listed]
     if len(items) > MOST_ISOSURFACES:
         raise InvalidArgument(f"{name} {value!r} has more than {MOST_ISOSURFACES} values")
-    found: list[tuple[float, Vector, float]] = []
+    found = []
     for item, usual in zip(items, _ISOSURFACE_COLORS):
         if not 1 <= len(item) <= 3:
             raise InvalidArgument(f"{name} {item!r} is not V[:COLOUR[:OPACITY]]")
         red, green, blue, opacity = color(name, item[1]) if len(item) > 1 else (*usual, 1.0)
         if len(item) > 2:
             opacity = number(name, item[2], 0, 1)
-        found.append((number(name, item[0], -MOST_SCALAR, MOST_SCALAR), (red, green, blue), opacity))
-    found.sort(key=lambda surface: surface[0])
+        at = number(name, item[0], -MOST_SCALAR, MOST_SCALAR)
+        found.append(schema.Isosurface(value=at, r=red, g=green, b=blue, opacity=opacity))
+    found.sort(key=lambda surface: float(surface.value))
     for one, next_one in zip(found, found[1:]):
-        if one[0] == next_one[0]:
-            raise InvalidArgument(f"{name} {value!r} has the value {one[0]:g} twice")
+        if one.value == next_one.value:
+            raise InvalidArgument(f"{name} {value!r} has the value {one.value:g} twice")
     return found
 
 
-def gradient_opacities(name: str, value: object) -> list[tuple[float, float]]:
-    """Gradient and opacity of each point: [(0, 0), (40, 1)], or "0:0,40:1"."""
-    items = [item.split(":") for item in value.split(",")] if isinstance(value, str) else list(value) if isinstance(value, Iterable) else []
+def gradient_opacities(name: str, value: object) -> list[Any]:
+    """GradientOpacityPoints: [(0, 0), (40, 1)], or "0:0,40:1"."""
     found = []
-    for item in items:
-        if not isinstance(item, Sequence) or len(item) != 2:
+    for item in _listed(value):
+        item = _listed(item, ":")
+        if len(item) != 2:
             raise InvalidArgument(f"{name} {item!r} is not GRADIENT:OPACITY")
-        found.append((number(name, item[0], 0, MOST_SCALAR), number(name, item[1], 0, 1)))
+        slope, opacity = number(name, item[0], 0, MOST_SCALAR), number(name, item[1], 0, 1)
+        found.append(schema.GradientOpacityPoint(slope=slope, opacity=opacity))
     return found
 
 
-def label_opacities(name: str, value: object) -> list[tuple[int, float]]:
-    """Label and opacity of each: {3: 0.5, 7: 0}, or "3=0.5,7=0"."""
+def label_opacities(name: str, value: object) -> list[Any]:
+    """LabelOpacities: {3: 0.5, 7: 0}, or "3=0.5,7=0"."""
     if isinstance(value, str):
         pairs: list[Any] = [item.partition("=")[::2] for item in value.split(",")]
     elif isinstance(value, dict):
         pairs = list(value.items())
     else:
         raise InvalidArgument(f"{name} {value!r} is not LABEL=OPACITY,...")
-    return [(integer(name, label, 1, MOST_LABEL), number(name, opacity, 0, 1)) for label, opacity in pairs]
+    return [schema.LabelOpacity(value=integer(name, label, 1, MOST_LABEL), opacity=number(name, opacity, 0, 1)) for label, opacity in pairs]
 
 
-def label_ranges(name: str, value: object) -> list[tuple[int, int] | str]:
-    """First and last of each, both included, or a name or a pattern: [1, (5, 9), "Temporal_*"], 3, or "1,5-9,Temporal_*"."""
-    if isinstance(value, str):
-        items: list[Any] = value.split(",")
-    else:
-        items = list(value) if isinstance(value, Iterable) else [value]
-    found: list[tuple[int, int] | str] = []
-    for item in items:
+def label_ranges(name: str, value: object) -> list[Any]:
+    """LabelRanges: labels, ranges with both ends, names and patterns: [1, (5, 9), "Temporal_*"], 3, or "1,5-9,Temporal_*"."""
+    found = []
+    for item in _listed(value):
         if isinstance(item, str) and item.strip("0123456789-"):
             if len(item.encode()) > MOST_NAME_BYTES:
                 raise InvalidArgument(f"{name} has a name of {len(item.encode())} bytes, at most {MOST_NAME_BYTES} are possible")
-            found.append(item)
+            found.append(schema.LabelRange(name=item))
             continue
         if isinstance(item, str) and "-" in item:
             item = item.split("-", 1)
@@ -266,5 +289,5 @@ def label_ranges(name: str, value: object) -> list[tuple[int, int] | str]:
         if len(ends) not in (1, 2):
             raise InvalidArgument(f"{name} {item!r} is not LABEL[-LABEL]")
         first = integer(name, ends[0], 1, MOST_LABEL)
-        found.append((first, integer(name, ends[-1], first, MOST_LABEL)))
+        found.append(schema.LabelRange(first=first, last=integer(name, ends[-1], first, MOST_LABEL)))
     return found

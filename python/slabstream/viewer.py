@@ -6,7 +6,6 @@ import base64
 import html
 import os
 import pathlib
-import select
 import socket
 import subprocess
 import threading
@@ -15,7 +14,7 @@ from typing import Any
 
 from .address import Address
 from .errors import InvalidArgument, SlabstreamError, Unavailable
-from .programs import KEEPER, end_keeper, find_program
+from .programs import Kept, find_program
 
 _START_SECONDS = 20.0
 _END_SECONDS = 10.0
@@ -51,28 +50,14 @@ class _Gateway:
             port = _free_port()
             parts = urllib.parse.urlsplit(behind_proxy.replace(_PORT, str(port)))
             arguments += ["--listen", f"127.0.0.1:{port}", "--behind-proxy", f"{parts.scheme}://{parts.netloc}"]
-        self.process = os.getpid()
-        self.keeper = subprocess.Popen(
-            ["/bin/sh", "-c", KEEPER, "viewer", str(program), *arguments],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True,
-        )
-        assert self.keeper.stdout is not None
-        ready = select.select([self.keeper.stdout], [], [], _START_SECONDS)[0]
-        words = self.keeper.stdout.readline().decode(errors="replace").split() if ready else []
+        self.program = Kept([str(program), *arguments], stderr=subprocess.DEVNULL)
+        words = self.program.first_line(_START_SECONDS).split()
         if len(words) != 2 or words[0] != "ready":
-            self.end()
+            self.program.end(_END_SECONDS)
             raise Unavailable("slabstream-gateway did not start")
         self.url = words[1]
         if behind_proxy:
             self.url = f"{parts.geturl().rstrip('/')}/#{urllib.parse.urlsplit(words[1]).fragment}"
-
-    def runs(self) -> bool:
-        return self.process == os.getpid() and self.keeper.poll() is None
-
-    def end(self) -> None:
-        if self.process != os.getpid():
-            return  # a forked child's copy
-        end_keeper(self.keeper, _END_SECONDS)
 
 
 _lock = threading.Lock()
@@ -83,7 +68,7 @@ def _gateway_of(address: Address, behind_proxy: str) -> _Gateway:
     with _lock:
         key = address.endpoint, behind_proxy
         gateway = _gateways.get(key)
-        if gateway is None or not gateway.runs():
+        if gateway is None or not gateway.program.runs():
             gateway = _gateways[key] = _Gateway(address, behind_proxy)
         return gateway
 
@@ -91,7 +76,7 @@ def _gateway_of(address: Address, behind_proxy: str) -> _Gateway:
 def _end_all() -> None:
     with _lock:
         for gateway in _gateways.values():
-            gateway.end()
+            gateway.program.end(_END_SECONDS)
         _gateways.clear()
 
 

@@ -4,6 +4,7 @@ A package of its own, since importing `slabstream` takes longer than most comman
 """
 from __future__ import annotations
 
+import functools
 import os
 import pathlib
 import sys
@@ -15,17 +16,7 @@ def run(name: str) -> None:
     os.execv(program, [program, *sys.argv[1:]])
 
 
-def slabstream() -> None:
-    run("slabstream")
-
-
-def coordinator() -> None:
-    run("slabstream-coordinator")
-
-
-def worker() -> None:
-    run("slabstream-worker")
-
-
-def gateway() -> None:
-    run("slabstream-gateway")
+slabstream = functools.partial(run, "slabstream")
+coordinator = functools.partial(run, "slabstream-coordinator")
+worker = functools.partial(run, "slabstream-worker")
+gateway = functools.partial(run, "slabstream-gateway")

@@ -6,7 +6,7 @@
 
 #include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

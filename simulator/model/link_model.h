@@ -22,8 +22,8 @@ enum class Contention : std::uint8_t {
 
 struct LinkModel {
   Contention contention = Contention::kSwitched;
-  double latency_seconds = 0;     // of one message, before any byte is counted; >= 0
-  double bytes_per_second = 1e9;  // of a wire; > 0
+  double latency_seconds = 0;     // time of one message before any byte is counted; >= 0
+  double bytes_per_second = 1e9;  // the rate of a wire; > 0
   // kFatTree: ends that share an uplink, and the ratio of their total rate to the uplink's.
   std::int32_t ports = 16;
   double oversubscription = 4;
@@ -31,7 +31,7 @@ struct LinkModel {
 };
 
 struct LinkPreset {
-  std::string_view name;     // what --link takes
+  std::string_view name;     // what sweeps and ParseLink take
   std::string_view purpose;  // one line for --help
   LinkModel link;
 };

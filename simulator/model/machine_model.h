@@ -16,12 +16,12 @@ struct CombiningCosts {
   double scan_pixel = calibration::combining::kScan;        // searched for runs, empty or not
   double encode_pixel = calibration::combining::kEncode;    // copied into a message
   double combine_pixel = calibration::combining::kCombine;  // from a message, checked, onto what is there
-  double local_pixel = calibration::combining::kLocal;      // of one image of this worker onto another one
-  double hidden_pixel = calibration::combining::kHidden;    // of the frame: searched for opaque tiles (FindHiddenTiles)
-  double cipher_byte = 0;                                   // of a message: encrypted, and again decrypted; 0: connections without keys
-  std::int32_t run_bytes = 12;                              // a run in a message
-  std::int32_t rgba_bytes = 16;                             // a pixel in a message: splatting, colours as floats
-  std::int32_t depth_bytes = 24;                            // a pixel in a message: Z-buffer
+  double local_pixel = calibration::combining::kLocal;      // a pixel of one image of this worker onto another one
+  double hidden_pixel = calibration::combining::kHidden;    // a pixel of the frame, searched for opaque tiles (FindHiddenTiles)
+  double cipher_byte = 0;         // a byte of a message, encrypted and decrypted again; 0: connections without keys
+  std::int32_t run_bytes = 12;    // a run in a message
+  std::int32_t rgba_bytes = 16;   // a pixel in a message: splatting, colours as floats
+  std::int32_t depth_bytes = 24;  // a pixel in a message: Z-buffer
   // Images are lent: their pixels stay where they are. The thread that owns the sockets announces them itself if the combining thread is
   // idle.
   bool lent = false;
@@ -49,7 +49,7 @@ struct PictureWay {
 
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
 struct Stragglers {
-  double probability = 0;  // of a worker, in each frame; [0, 1]
+  double probability = 0;  // how likely a worker is slow in a frame; [0, 1]
   double factor = 1;       // then its rendering takes this many times as long; >= 1
   std::uint64_t seed = 1;
   friend bool operator==(const Stragglers&, const Stragglers&) = default;
@@ -61,7 +61,7 @@ struct MachineModel {
   CombiningCosts combining;
   PictureWay picture;
   WakeUps wake_ups;
-  std::vector<double> speeds;  // of the workers, relative, > 0; worker i has speeds[i % size()]. Empty: all 1
+  std::vector<double> speeds;  // the workers' relative speeds, > 0; worker i has speeds[i % size()]. Empty: all 1
   Stragglers stragglers;
   std::int32_t threads = 1;          // render threads of each worker
   std::int32_t picture_threads = 0;  // threads that make a picture (`threads` if that is more): workers of one process share theirs

@@ -41,8 +41,8 @@ class Processors {
   struct Host {
     std::vector<Task> tasks;
     double since = 0;              // `left` is as of then
-    double speed = 1;              // of every task
-    std::uint64_t generation = 0;  // of its latest forecast
+    double speed = 1;              // the speed of every task
+    std::uint64_t generation = 0;  // the number of its latest forecast
   };
   struct Forecast {
     double time = 0;

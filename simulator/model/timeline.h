@@ -27,7 +27,7 @@ struct SimulatedMessage {
   enum class Kind : std::uint8_t { kPartial = 1, kGroupImage = 2, kVoxels = 3 };
   Kind kind = Kind::kPartial;
   std::uint32_t frame = 0, group = 0;
-  std::uint32_t step = 0;          // of the schedule; kPartial only
+  std::uint32_t step = 0;          // the step of the schedule; kPartial only
   std::uint32_t from = 0, to = 0;  // indices of workers; `from` of kVoxels is the coordinator: the number of workers
   double pixels = 0;               // not empty
   double bytes = 0;
@@ -42,7 +42,7 @@ struct SimulatedFrame {
 
   std::array<double, kStageCount> stage_seconds{};  // worker time, summed over workers
   double imbalance = 1;                             // most / mean render time of a worker, over all slots of the plan
-  double idle_share = 0;                    // of the workers' time from plan to last byte, without any thread at work for this frame
+  double idle_share = 0;                    // share of the workers' time from plan to last byte in which no thread works for this frame
   double image_bytes = 0, voxel_bytes = 0;  // sent
   std::uint64_t messages = 0;               // between workers
 };

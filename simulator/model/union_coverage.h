@@ -22,13 +22,13 @@ class UnionCoverage {
     double runs = 0;     // unbroken stretches of them, row by row
     Amount& operator+=(const Amount& more);
   };
-  // `pixels` are numbered y * width + x. Of a row that lies in them only in part, its share counts.
+  // `pixels` are numbered y * width + x. A row that lies in them only in part counts by its share.
   Amount Of(RankInterval ranks, PixelRange pixels) const;
 
  private:
   struct TileRow {
-    double filled = 0, runs = 0;           // of each row of pixels
-    std::int32_t first_tile = 0, end = 0;  // that are not empty, and what lies between them
+    double filled = 0, runs = 0;           // numbers of each row of pixels
+    std::int32_t first_tile = 0, end = 0;  // tile columns that are not empty, and what lies between them
   };
   // share(x): of tile x of the row that is filled.
   template <class Share>

@@ -1,5 +1,5 @@
 // What the coordinator owes to clients: fair turns, answers that are not lost, limits, deadlines, and an end to every request.
-#include "coordinator/clients.h"
+#include "coordinator/frames/clients.h"
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {

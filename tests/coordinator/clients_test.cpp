@@ -1,5 +1,5 @@
 // How much clients have not read, and who is behind.
-#include "coordinator/clients.h"
+#include "coordinator/frames/clients.h"
 
 #include <gtest/gtest.h>
 

@@ -17,9 +17,9 @@
 
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/any_message.h"
-#include "coordinator/dataset_machine.h"
-#include "coordinator/frame_machine.h"
-#include "coordinator/planner.h"
+#include "coordinator/datasets/dataset_machine.h"
+#include "coordinator/frames/frame_machine.h"
+#include "coordinator/planner/planner.h"
 
 namespace slabstream {
 
@@ -64,6 +64,7 @@ inline SubmitFrame Frame(RequestId request, int groups = 1, const std::string& d
   submit.frame.dataset = dataset;
   submit.frame.size = {64, 64};
   submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  submit.frame.policy.decomposition = "slab";
   submit.frame.policy.axis = AxisChoice::kZ;
   submit.frame.policy.groups = groups;
   return submit;
@@ -198,15 +199,15 @@ class CoordinatorScript {
   Machines machine;
   Time now{seconds(1000)};
   std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
-  std::map<WorkerId, PeerToken> tokens;  // of all that have joined
+  std::map<WorkerId, PeerToken> tokens;  // the tokens of all workers that have joined
   std::vector<PeerToken> clients;        // those that send pings
-  std::string host;                      // that clients connect from; empty: not known
-  std::string images_key;                // of workers that join
+  std::string host;                      // the host that clients connect from; empty: not known
+  std::string images_key;                // the key of workers that join
   std::vector<LoadDataset> loads;        // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;
   bool plans_at_once = true;       // else plans wait in `plans` for Plan()
-  std::vector<PlanRequest> plans;  // that were not made yet
+  std::vector<PlanRequest> plans;  // plans that were not made yet
 
   // All that comes of the event, of the plans that are made at once, too.
   Actions Step(const auto& event) {
@@ -228,7 +229,6 @@ class CoordinatorScript {
     const PlanRequest request = std::move(plans.front());
     plans.erase(plans.begin());
     const auto planned = planner.Plan(request);
-    planner.Choose(request.client, {});
     return Step(Planned{request.plan, planned});
   }
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {

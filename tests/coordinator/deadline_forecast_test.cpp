@@ -1,5 +1,5 @@
 // Frames that begin when the forecast says so, on a service that shares its time equally among clients.
-#include "coordinator/deadline_forecast.h"
+#include "coordinator/frames/deadline_forecast.h"
 
 #include <gtest/gtest.h>
 

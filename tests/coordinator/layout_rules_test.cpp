@@ -1,4 +1,4 @@
-// What the machine does about layouts and open policies: counts occupied voxels where a policy needs them, keeps layouts while views
+// What the machine does about layouts: counts occupied voxels where a policy needs them, keeps layouts while views
 // change, and lets them follow render times where balance is dynamic.
 #include "tests/coordinator/coordinator_script.h"
 #include "tests/support/renderers.h"
@@ -11,6 +11,7 @@ constexpr PeerToken kFarClient = 500;  // beyond the tokens of many workers
 SubmitFrame KdFrame(RequestId request, const std::string& balance = "static") {
   SubmitFrame submit = Frame(request);
   submit.frame.policy.decomposition = "kd-tree";
+  submit.frame.policy.balance_by = "occupied";
   submit.frame.policy.balance = balance;
   submit.frame.view.azimuth_degrees = double(request) * 30;
   return submit;
@@ -204,107 +205,50 @@ TEST(CoordinatorLayouts, SplitByCostIsMadeAnewOnceCostsAreKnown) {
   for (RequestId request = 3; request < 6; ++request) EXPECT_EQ(script.Play(frame(request), 10), second);
 }
 
-SubmitFrame OpenFrame(RequestId request) {
+// As a client asks that names nothing.
+SubmitFrame UsualFrame(RequestId request) {
   SubmitFrame submit = Frame(request, 0);
-  Policy& policy = submit.frame.policy;
-  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = "auto";
+  submit.frame.policy = {};
   submit.frame.view.azimuth_degrees = double(request) * 30;
   return submit;
 }
 
-class ChoiceScript : public BalanceScript {
- public:
-  FrameStatistics StatisticsOf(const SubmitFrame& submit, double ratio) {
-    const std::size_t counted = counts.size();
-    Actions actions = Submit(kFarClient, submit);
-    if (counts.size() > counted) Append(actions, Step(OccupiedCounted{counts.back().count, FullGrid()}));
-    std::vector<GroupAssignment> groups = HandedOut(actions);
-    for (std::size_t i = 0; i < groups.size(); ++i) {
-      Actions more = Done(groups[i], Reports(groups[i], ratio));
-      if (groups[i].key.group + 1 == groups[i].group_count) Append(more, Image(groups[i], groups[i].group_count));
-      for (GroupAssignment& group : HandedOut(more)) groups.push_back(std::move(group));
-      Append(actions, more);
-    }
-    const auto replies = ToClients<FrameReply>(actions);
-    EXPECT_EQ(replies.size(), 1U);
-    return replies.empty() ? FrameStatistics{} : replies[0].message.statistics;
-  }
-};
-
-TEST(CoordinatorPolicies, TheFirstFrameOfAnOpenPolicyWaitsForNoCountAndNoChoice) {
-  ChoiceScript script;
+TEST(CoordinatorLayouts, WithoutAPolicyNothingIsCounted) {
+  CoordinatorScript script;
   script.Join(21, 21);
-  const std::vector<GroupAssignment> begun = HandedOut(script.Submit(kFarClient, OpenFrame(1)));
+  const std::vector<GroupAssignment> begun = HandedOut(script.Submit(kFarClient, UsualFrame(1)));
   ASSERT_EQ(begun.size(), 1U) << "it waits for something";
-  ASSERT_EQ(script.counts.size(), 1U);
-  script.Step(OccupiedCounted{script.counts[0].count, Status::ResourceExhausted("no memory")});
+  EXPECT_TRUE(script.counts.empty());
   const auto replies = ToClients<FrameReply>(script.AnswerAll(script.Answer(begun[0])));
-  ASSERT_EQ(replies.size(), 1U) << "a failed count fails only what needs it";
+  ASSERT_EQ(replies.size(), 1U);
   EXPECT_EQ(replies[0].message.statistics.decomposition, "kd-tree");
-  EXPECT_EQ(replies[0].message.statistics.balance_by, "occupied");
+  EXPECT_EQ(replies[0].message.statistics.balance_by, "bricks");
   EXPECT_EQ(replies[0].message.statistics.combine, "fan-in");
-  EXPECT_FALSE(replies[0].message.statistics.predicted);
 }
 
-TEST(CoordinatorPolicies, AnOpenPolicyIsFilledInAndPredicted) {
-  ChoiceScript script;
-  const auto frame = [](RequestId request) {
-    SubmitFrame submit = OpenFrame(request);
-    submit.frame.view.azimuth_degrees = 0;
-    return submit;
-  };
-  script.StatisticsOf(frame(11), 1);  // while voxels are counted
-  script.StatisticsOf(frame(12), 1);  // while the choice is made
-  const FrameStatistics statistics = script.StatisticsOf(frame(13), 1);
-  for (const std::string& name : {statistics.decomposition, statistics.balance_by, statistics.assignment, statistics.combine}) {
-    EXPECT_NE(name, "auto");
-    EXPECT_NE(name, "");
+TEST(CoordinatorLayouts, ALookThatChangesLittleMovesNoBoxes) {
+  BalanceScript script;
+  const std::vector<Box> first = script.Play(UsualFrame(1), 1);
+  SubmitFrame clearer = UsualFrame(2);
+  clearer.frame.transfer.opacity_distance = 2;
+  EXPECT_EQ(script.Play(clearer, 1), first);
+  SubmitFrame clipped = UsualFrame(3);  // the upper half of it
+  clipped.frame.clipping.box = ClipBox{{-100, -100, 24}, {100, 100, 100}};
+  EXPECT_NE(script.Play(clipped, 1), first) << "half of the workers would have nothing to do";
+}
+
+TEST(CoordinatorPolicies, AnUnknownNameFails) {
+  CoordinatorScript script;
+  script.Join(21, 21);
+  RequestId request = 0;
+  for (const char* name : {"teleport", "auto"}) {
+    SubmitFrame submit = UsualFrame(++request);
+    submit.frame.policy.combine = name;
+    const auto failed = ToClients<FrameFailed>(script.Submit(kFarClient, submit));
+    ASSERT_EQ(failed.size(), 1U);
+    EXPECT_EQ(failed[0].message.status.code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(failed[0].message.status.message(), testing::AllOf(testing::HasSubstr(name), testing::HasSubstr("fan-in")));
   }
-  ASSERT_TRUE(statistics.predicted);
-  EXPECT_GT(statistics.predicted->latency_seconds, 0);
-  EXPECT_FALSE(script.StatisticsOf(Frame(2), 1).predicted) << "nothing was left open";
-}
-
-TEST(CoordinatorPolicies, AChoiceStaysWhileViewsChange) {
-  ChoiceScript script;
-  std::vector<Box> boxes;
-  for (RequestId request = 1; request < 14; ++request) {
-    const std::vector<Box> now = script.Play(OpenFrame(request), 1);
-    // Once costs are known, another partition must gain a lot; here nothing can.
-    if (request > 3) {
-      EXPECT_EQ(now, boxes) << "frame " << request;
-    }
-    boxes = now;
-  }
-}
-
-TEST(CoordinatorPolicies, WhatHappenedCorrectsThePrediction) {
-  ChoiceScript script;
-  double predicted = 0, happened = 0;
-  for (RequestId request = 1; request < 20; ++request) {
-    SubmitFrame submit = OpenFrame(request);
-    submit.frame.view.azimuth_degrees = 0;
-    const FrameStatistics statistics = script.StatisticsOf(submit, 1);
-    if (request < 3) continue;  // the choice is made beside these
-    ASSERT_TRUE(statistics.predicted) << "frame " << request;
-    predicted = statistics.predicted->render_seconds;
-    happened = 0;
-    for (const RankReport& report : statistics.reports) {
-      happened =
-          std::max(happened, 1e-9 * double(report.stage_ns[std::size_t(Stage::kRender)] - report.stage_ns[std::size_t(Stage::kPrepare)]));
-    }
-  }
-  EXPECT_NEAR(predicted / happened, 1, 0.1);
-}
-
-TEST(CoordinatorPolicies, AnUnknownNameFailsBesideAnOpenOne) {
-  ChoiceScript script;
-  SubmitFrame submit = OpenFrame(1);
-  submit.frame.policy.combine = "teleport";
-  const auto failed = ToClients<FrameFailed>(script.Submit(kFarClient, submit));
-  ASSERT_EQ(failed.size(), 1U);
-  EXPECT_EQ(failed[0].message.status.code(), StatusCode::kInvalidArgument);
-  EXPECT_THAT(failed[0].message.status.message(), testing::AllOf(testing::HasSubstr("teleport"), testing::HasSubstr("fan-in")));
 }
 
 TEST(CoordinatorLayouts, AnotherNumberOfWorkersIsAnotherLayout) {

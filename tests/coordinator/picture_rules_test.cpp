@@ -1,5 +1,5 @@
 // Pictures that go straight to clients: only to where the client has connected from, only if it asked, and the coordinator keeps none.
-#include "coordinator/clients.h"
+#include "coordinator/frames/clients.h"
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {

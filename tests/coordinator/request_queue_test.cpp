@@ -1,4 +1,4 @@
-#include "coordinator/request_queue.h"
+#include "coordinator/frames/request_queue.h"
 
 #include <gtest/gtest.h>
 

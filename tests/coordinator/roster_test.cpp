@@ -1,4 +1,4 @@
-#include "coordinator/roster.h"
+#include "coordinator/frames/roster.h"
 
 #include <gtest/gtest.h>
 

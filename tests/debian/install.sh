@@ -41,6 +41,7 @@ in_root slabstream render /var/lib/brain.nii.gz --local --title Brain -o /tmp/br
 say "The other packages"
 in_root bash -c "${install[*]} /dist/*.deb" >> build-debian/apt.log 2>&1
 in_root python3 -c 'import slabstream; print("import slabstream:", slabstream.__file__)'
+in_root slabstream bench --list > /dev/null
 in_root slabstream-lab --help > /dev/null
 for program in slabstream-coordinator slabstream-worker; do
   if in_root ldd "/usr/bin/$program" | grep -q OpenImageIO; then fail "$program loads OpenImageIO"; fi

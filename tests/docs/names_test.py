@@ -11,7 +11,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CODE = {".h", ".cpp", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
-TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab"}
+TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab", "slabstream-laboratory"}
 
 # What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
 # and pkg-config.
@@ -108,7 +108,7 @@ def options() -> set[str]:
 
 @functools.cache
 def subcommands() -> set[str]:
-    return set(re.findall(r'(?:add_subcommand\(|DeclareAbout\(line,)\s*"([a-z-]+)"', production()))
+    return set(re.findall(r'(?:AddCommand\(|DeclareAbout\(line,|Command = \{)\s*"([a-z-]+)"', production()))
 
 
 class Text:

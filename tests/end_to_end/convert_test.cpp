@@ -3,25 +3,24 @@
 
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 #include <vector>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 class ConvertTest : public EndToEndTest {
  protected:
-  json Info(std::vector<std::string> arguments) {
+  Json Info(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "info");
     arguments.emplace_back("--json");
-    return json::parse(MustRun(arguments).out);
+    return Json::Parse(MustRun(arguments).out).value();
   }
   std::string Read(const std::string& name) {
     std::ostringstream bytes;
@@ -41,13 +40,13 @@ class ConvertTest : public EndToEndTest {
 
 TEST_F(ConvertTest, WritesEveryFormatAndTellsSo) {
   MakeSphere("s.nrrd", 1, 20);
-  const json before = Info({"s.nrrd"});
+  const Json before = Info({"s.nrrd"});
   std::string from = "s.nrrd";
   for (const std::string to : {"a.nii", "b.nii.gz", "c.mha", "d.mhd", "e.npy", "f.vti", "g.nrrd"}) {
     const ProgramResult result = MustRun({"convert", from, to, "--progress"});
     EXPECT_THAT(result.out, HasSubstr("wrote " + to));
     EXPECT_THAT(result.err, testing::AllOf(HasSubstr("reading " + from), HasSubstr("writing " + to + ": 100 %")));
-    const json info = Info({to});
+    const Json info = Info({to});
     for (const char* field : {"size", "type", "spacing", "range", "histogram"}) EXPECT_EQ(info[field], before[field]) << to;
     from = to;
   }
@@ -89,9 +88,9 @@ TEST_F(ConvertTest, RawSamplesAreDescribedByOptionsInEitherForm) {
                                             "big",    "--offset", "4",      "--spacing", "0.5,1,2"};
   std::vector<std::string> apart = {"v.raw"};
   apart.insert(apart.end(), options.begin(), options.end());
-  const json info = Info(apart);
-  EXPECT_EQ(info["size"], (json{3, 2, 1}));
-  EXPECT_EQ(info["spacing"], (json{0.5, 1.0, 2.0}));
+  const Json info = Info(apart);
+  EXPECT_EQ(info["size"], (Json{3, 2, 1}));
+  EXPECT_EQ(info["spacing"], (Json{0.5, 1.0, 2.0}));
   EXPECT_EQ(info["range"]["max"], 256.0);
   EXPECT_EQ(Info({"v.raw?dims=3,2,1,type=uint16,endian=big,offset=4,spacing=0.5,1,2"}), info);
   // --type of convert is that of raw samples too, unless they have their own.
@@ -123,7 +122,8 @@ TEST_F(ConvertTest, LabelsOf64BitsAreExactInFilesValuesAndStores) {
     std::vector<std::string> arguments = {"value", source, "--local", "--json"};
     for (std::size_t x = 0; x < ids.size(); ++x) arguments.insert(arguments.end(), {"--at", std::to_string(x) + ",0,0"});
     std::vector<std::uint64_t> found;
-    for (const json& sample : json::parse(MustRun(arguments).out)) {
+    const Json told = Json::Parse(MustRun(arguments).out).value();
+    for (const Json& sample : told) {
       EXPECT_TRUE(sample["value"].is_number_unsigned()) << sample;
       found.push_back(sample["value"].get<std::uint64_t>());
     }

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "tests/data/volume_io/dicom_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -82,10 +82,10 @@ TEST_F(DicomTest, IsListedWithoutThePatient) {
     const std::string text = MustRun({"info", "study"}).out, json = MustRun({"info", "study", "--json"}).out;
     EXPECT_THAT(text, AllOf(HasSubstr("CT"), HasSubstr("14 x 12 x 16"), HasSubstr("1.5 x 3 x 2"), HasSubstr("1.2.3"), HasSubstr("HEAD")));
     EXPECT_EQ(text.find("--series") != std::string::npos, several);
-    const auto series = nlohmann::json::parse(json).at("series");
+    const auto series = Json::Parse(json).value().at("series");
     ASSERT_EQ(series.size(), several ? 2U : 1U);
     EXPECT_EQ(series[0]["uid"], "1.2.3");
-    EXPECT_EQ(series[0]["size"], (nlohmann::json{14, 12, 16}));
+    EXPECT_EQ(series[0]["size"], (Json{14, 12, 16}));
     for (const std::string& output : {text, json}) {
       EXPECT_THAT(output, AllOf(Not(HasSubstr("Doe")), Not(HasSubstr("Jane")), Not(HasSubstr("4711")), Not(HasSubstr("1970"))));
     }

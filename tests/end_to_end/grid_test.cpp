@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -13,7 +13,6 @@
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 constexpr int kPixels = 64;
@@ -47,10 +46,10 @@ double MeanAlpha(const PictureFile& picture) {
 
 TEST_F(GridTest, InfoTellsCellsBoundsAndArrays) {
   for (const char* file : {"grid.vtu", "grid.vtk"}) {
-    const json info = json::parse(MustRun({"info", file, "--json"}).out);
+    const Json info = Json::Parse(MustRun({"info", file, "--json"}).out).value();
     EXPECT_EQ(info["cells"], 4);
     EXPECT_EQ(info["kinds"]["wedge"], 2);
-    EXPECT_EQ(info["bounds"]["high"], (json{2.0, 1.0, 2.0}));
+    EXPECT_EQ(info["bounds"]["high"], (Json{2.0, 1.0, 2.0}));
     EXPECT_GE(info["arrays"].size(), 1U);
     EXPECT_THAT(MustRun({"info", file, "--lattice", "40"}).out, HasSubstr("40 x 20 x 40 voxels"));
   }
@@ -59,12 +58,12 @@ TEST_F(GridTest, InfoTellsCellsBoundsAndArrays) {
 TEST_F(GridTest, BenchMeasuresAndExportsIt) {
   MustRun({"bench", "grid.vtu", "--renderer", "slice", "--sampling-rate", "2", "--size", "24", "--frames", "1", "--turns", "1", "--json",
            "report.json"});
-  const json measured = json::parse(ReadFile("report.json"))["cases"][0];
+  const Json measured = Json::Parse(ReadFile("report.json")).value()["cases"][0];
   EXPECT_EQ(measured["renderer"], "slice");
-  EXPECT_EQ(measured["parameters"], (json{{"sampling-rate", "2"}}));
+  EXPECT_EQ(measured["parameters"], (Json{{"sampling-rate", "2"}}));
 
   MustRun({"bench", "grid.vtu", "--renderer", "slice", "--export", "scenes"});
-  const json scene = json::parse(ReadFile("scenes/grid-auto.scene.json"));
+  const Json scene = Json::Parse(ReadFile("scenes/grid-auto.scene.json")).value();
   EXPECT_EQ(scene["grid"]["file"], Path("grid.vtu"));
   EXPECT_EQ(scene["grid"]["array"], "");
 
@@ -83,13 +82,13 @@ TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
   const PictureFile served = Render("g", "served.exr", {"--elevation", "20", "--azimuth", "30", "--decomposition", "kd-tree"});
   EXPECT_LE(LargestDifference(alone, served), 2e-5 + 1.0 / 1024);
   // One worker less: the others fetch its cells.
-  const json status = json::parse(MustRun({"status", "--json"}).out);
+  const Json status = Json::Parse(MustRun({"status", "--json"}).out).value();
   ASSERT_EQ(::kill(status["workers"][0]["pid"].get<pid_t>(), SIGKILL), 0);
   const PictureFile after = Render("g", "after.exr", {"--elevation", "20", "--azimuth", "30", "--decomposition", "kd-tree"});
   EXPECT_LE(LargestDifference(alone, after), 2e-5 + 1.0 / 1024);
   // The same service shows it on the lattice.
   MustRun({"render", "g", "-o", "lattice.png", "--renderer", "raycast", "--size", "32"});
-  EXPECT_EQ(json::parse(MustRun({"value", "g", "--at", "0.5,0.5,0.5", "--json"}).out)[0]["inside"], true);
+  EXPECT_EQ(Json::Parse(MustRun({"value", "g", "--at", "0.5,0.5,0.5", "--json"}).out).value()[0]["inside"], true);
   MustRun({"down"});
 }
 
@@ -106,8 +105,8 @@ TEST_F(GridTest, ItsCellsAreDrawnUnlessARequestNamesARenderer) {
   const std::string pixels = render("grid.vtu", "pixels.png", {"--no-record"});
   EXPECT_EQ(pixels, render("grid.vtu", "eight.png", {"--no-record", "--sampling-rate", "8"}));
   EXPECT_NE(pixels, render("grid.vtu", "one.png", {"--no-record", "--sampling-rate", "1"}));
-  EXPECT_EQ(json::parse(ReadFile("cells.json"))["renderer"], "slice");
-  EXPECT_EQ(json::parse(ReadFile("trace.json"))["slabstream"]["frames"][0]["renderer"], "slice");
+  EXPECT_EQ(Json::Parse(ReadFile("cells.json")).value()["renderer"], "slice");
+  EXPECT_EQ(Json::Parse(ReadFile("trace.json")).value()["slabstream"]["frames"][0]["renderer"], "slice");
   EXPECT_THAT(MustRun({"info", "cells.png"}).out, HasSubstr("--renderer slice"));
   EXPECT_EQ(render("ball.nrrd", "surface.png", {"--isovalue", "128"}),
             render("ball.nrrd", "raycast.png", {"--isovalue", "128", "--renderer", "raycast"}));
@@ -133,9 +132,9 @@ TEST_F(GridTest, WhatCannotBeDrawnIsRefused) {
 
 TEST_F(GridTest, ConvertWritesTheLattice) {
   MustRun({"convert", "grid.vtu?lattice=30", "lattice.nrrd"});
-  const json info = json::parse(MustRun({"info", "lattice.nrrd", "--json"}).out);
-  EXPECT_EQ(info["size"], (json{30, 15, 30}));
-  EXPECT_GT(info["non_finite"], 0) << "outside the cells there is nothing";
+  const Json info = Json::Parse(MustRun({"info", "lattice.nrrd", "--json"}).out).value();
+  EXPECT_EQ(info["size"], (Json{30, 15, 30}));
+  EXPECT_GT(info["non_finite"].get<double>(), 0) << "outside the cells there is nothing";
 }
 
 }  // namespace

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/json/json.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -15,7 +15,6 @@
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -105,38 +104,38 @@ TEST_F(InPartsTest, StatisticsAndRecordsTellLevelsAndBytes) {
     size += entry.is_regular_file() ? entry.file_size() : 0;
   MustRun({"turntable", levels, "--local=1", "-o", "f_%04d.png", "--frames", "2", "--in-flight", "1", "--size", "64", "--level", "1",
            "--stats", "stats.json"});
-  const json stats = json::parse(ReadFile("stats.json"));
-  for (const json& frame : stats["frames"]) {
+  const Json stats = Json::Parse(ReadFile("stats.json")).value();
+  for (const Json& frame : stats["frames"]) {
     ASSERT_EQ(frame["levels"].size(), 1U);
     EXPECT_EQ(frame["levels"][0]["level"], 1);
-    EXPECT_GE(frame["levels"][0]["boxes"], 1);
-    EXPECT_GT(frame["levels"][0]["voxels"], 0);
-    EXPECT_LE(frame["levels"][0]["voxels"], 65 * 65 * 65);
+    EXPECT_GE(frame["levels"][0]["boxes"].get<double>(), 1);
+    EXPECT_GT(frame["levels"][0]["voxels"].get<double>(), 0);
+    EXPECT_LE(frame["levels"][0]["voxels"].get<double>(), 65 * 65 * 65);
   }
-  EXPECT_GT(stats["frames"][0]["bytes"]["stored"], 0) << "the coordinator reads the level for the first frame";
-  EXPECT_LE(stats["bytes"]["stored"], size) << "packed as they lie in the file";
+  EXPECT_GT(stats["frames"][0]["bytes"]["stored"].get<double>(), 0) << "the coordinator reads the level for the first frame";
+  EXPECT_LE(stats["bytes"]["stored"].get<double>(), size) << "packed as they lie in the file";
   EXPECT_EQ(stats["frames"][1]["bytes"]["stored"], 0) << "and holds it for the second one";
-  EXPECT_EQ(json::parse(MustRun({"info", "f_0000.png", "--json"}).out)["levels"], json::array({1}));
+  EXPECT_EQ(Json::Parse(MustRun({"info", "f_0000.png", "--json"}).out).value()["levels"], Json::array({1}));
   EXPECT_THAT(MustRun({"info", "f_0000.png"}).out, HasSubstr("drawn from"));
 
   MakeLarge("large.nrrd");
   MustRun({"render", "large.nrrd", "--local=1", "--memory", "768M",   "--renderer", "mip", "--azimuth", "0",       "--elevation",
            "0",      "--no-fit",   "--zoom",    "8",        "--size", "64",         "-o",  "l.png",     "--stats", "stats.json"});
-  const json in_parts = json::parse(ReadFile("stats.json"));
+  const Json in_parts = Json::Parse(ReadFile("stats.json")).value();
   EXPECT_EQ(in_parts["frames"][0]["levels"][0]["level"], 0);
-  EXPECT_GT(in_parts["bytes"]["stored"], 0) << "a worker reads it";
-  EXPECT_FALSE(json::parse(MustRun({"info", "l.png", "--json"}).out).contains("levels")) << "level 0 alone";
+  EXPECT_GT(in_parts["bytes"]["stored"].get<double>(), 0) << "a worker reads it";
+  EXPECT_FALSE(Json::Parse(MustRun({"info", "l.png", "--json"}).out).value().contains("levels")) << "level 0 alone";
 }
 
 TEST_F(InPartsTest, ConvertWritesALevelOrABoxOfIt) {
   const std::string levels = MakeLevels();
   MustRun({"convert", levels, "part.nrrd", "--level", "1", "--box", "10:20,:5,60:"});
-  const json whole = json::parse(MustRun({"info", levels, "--json"}).out)["levels"][1];
-  const json part = json::parse(MustRun({"info", "part.nrrd", "--json"}).out);
-  EXPECT_EQ(part["size"], json::array({10, 5, 5}));
+  const Json whole = Json::Parse(MustRun({"info", levels, "--json"}).out).value()["levels"][1];
+  const Json part = Json::Parse(MustRun({"info", "part.nrrd", "--json"}).out).value();
+  EXPECT_EQ(part["size"], Json::array({10, 5, 5}));
   EXPECT_EQ(part["spacing"], whole["spacing"]);
   MustRun({"convert", levels, "part.ome.zarr", "--level", "1", "--box", "10:20,:5,60:"});
-  EXPECT_EQ(json::parse(MustRun({"info", "part.ome.zarr", "--json"}).out)["histogram"], part["histogram"]);
+  EXPECT_EQ(Json::Parse(MustRun({"info", "part.ome.zarr", "--json"}).out).value()["histogram"], part["histogram"]);
   ExpectEachRefused({"convert", levels, "no.nrrd"}, {
                                                         {{"--level", "3"}, "has levels 0 to 2"},
                                                         {{"--level", "1", "--box", "0:66,:,:"}, "x from 0 to 66"},
@@ -164,7 +163,7 @@ TEST_F(InPartsTest, WhatDoesNotFitNamesTheLevelThatWouldAndDetailAutoDrawsIt) {
   command.insert(command.end(), {"--detail", "auto", "--stats", "stats.json"});
   const ProgramResult lowered = MustRun(command);
   EXPECT_THAT(lowered.err, HasSubstr("is drawn instead of level 0: "));
-  const json stats = json::parse(ReadFile("stats.json"));
+  const Json stats = Json::Parse(ReadFile("stats.json")).value();
   EXPECT_THAT(stats["frames"][0]["lowered"].get<std::string>(), HasSubstr("is drawn instead of level 0"));
   // The volume itself has no other level.
   command[1] = "rod.nrrd";
@@ -210,7 +209,7 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
     EXPECT_LE(LargestDifference(in_parts, Render("large.nrrd", view)), kSame);
     EXPECT_GT(Opaque(in_parts), 0.05);
   }
-  const json status = json::parse(MustRun({"status", "--json"}).out);
+  const Json status = Json::Parse(MustRun({"status", "--json"}).out).value();
   EXPECT_EQ(status["datasets"][0]["state"], "ready");
   EXPECT_EQ(status["datasets"][0]["memory_bytes"], 0);
   const std::size_t begin = up.find("logs are in ");
@@ -277,7 +276,7 @@ TEST_F(InPartsTest, AnIndexIsMadeOnceAndToldByInfo) {
   const std::string levels = "dense.ome.zarr";  // there is nothing around the sphere
   MakeSphere("dense.nrrd", 1, 130);
   MustRun({"convert", "dense.nrrd", levels});
-  const auto info = [&] { return json::parse(MustRun({"info", "--json", levels}).out)["index"]; };
+  const auto info = [&] { return Json::Parse(MustRun({"info", "--json", levels}).out).value()["index"]; };
   EXPECT_EQ(info(), nullptr);
   EXPECT_THAT(MustRun({"info", levels}).out, HasSubstr("index        none"));
   const PictureFile without = Render(levels, {"--local=1", "--level", "0"});
@@ -287,11 +286,11 @@ TEST_F(InPartsTest, AnIndexIsMadeOnceAndToldByInfo) {
   EXPECT_THAT(made.err, AllOf(HasSubstr("100 %"), HasSubstr("MiB/s")));
   EXPECT_EQ(info()["usable"], true);
   EXPECT_EQ(info()["read"], 1);
-  EXPECT_GT(info()["visible"], 0);
-  EXPECT_LT(info()["visible"], 1);
+  EXPECT_GT(info()["visible"].get<double>(), 0);
+  EXPECT_LT(info()["visible"].get<double>(), 1);
   EXPECT_THAT(MustRun({"info", levels}).out, HasSubstr("bricks of level 0 can be visible under transfer function 'auto'"));
   EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--level", "0"}), without), 0);
-  const std::string path = info()["path"];
+  const std::string path = info()["path"].text();
 
   // Damaged.
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 1);

@@ -3,14 +3,13 @@
 
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/program.h"
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 class MeasureTest : public EndToEndTest {
@@ -27,58 +26,58 @@ class MeasureTest : public EndToEndTest {
     }
   }
 
-  json Measure(std::vector<std::string> more) const {
+  Json Measure(std::vector<std::string> more) const {
     more.insert(more.begin(), {"measure", "ramp.nrrd", "--local=1", "--json"});
-    return json::parse(MustRun(more).out);
+    return Json::Parse(MustRun(more).out).value();
   }
 };
 
 TEST_F(MeasureTest, DistancesAndAnglesAreThoseOfTheWorld) {
-  const json found = Measure({"--distance", "1,2,3:4,6,15", "--angle", "1,0,0:0,0,0:0,2,0", "--angle", "1,0,0:0,0,0:-1,0,0"});
+  const Json found = Measure({"--distance", "1,2,3:4,6,15", "--angle", "1,0,0:0,0,0:0,2,0", "--angle", "1,0,0:0,0,0:-1,0,0"});
   ASSERT_EQ(found.size(), 3U);
   EXPECT_EQ(found[0]["length"], 13);
   EXPECT_EQ(found[0]["unit"], "mm");
-  EXPECT_NEAR(found[1]["degrees"], 90, 1e-9);
-  EXPECT_NEAR(found[2]["degrees"], 180, 1e-9);
+  EXPECT_NEAR(found[1]["degrees"].get<double>(), 90, 1e-9);
+  EXPECT_NEAR(found[2]["degrees"].get<double>(), 180, 1e-9);
   EXPECT_THAT(MustRun({"measure", "ramp.nrrd", "--local=1", "--distance", "0,0,0:0,3,4"}).out, HasSubstr("distance 5 mm\n"));
 }
 
 TEST_F(MeasureTest, ProfilesInterpolateBetweenVoxels) {
-  const json found = Measure({"--profile", "10,20,30:16,26,35", "--samples", "5"});
-  const json& values = found[0]["values"];
+  const Json found = Measure({"--profile", "10,20,30:16,26,35", "--samples", "5"});
+  const Json& values = found[0]["values"];
   ASSERT_EQ(values.size(), 5U);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(values[std::size_t(i)], (3 + 20 + 100) * i / 4.0, 1e-9) << i;
-  EXPECT_NEAR(found[0]["length"], std::sqrt(36 + 36 + 25), 1e-12);
-  const json beyond = Measure({"--profile", "0,20,30:10,20,30", "--samples", "2"})[0]["values"];
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(values[i].get<double>(), (3 + 20 + 100) * i / 4.0, 1e-9) << i;
+  EXPECT_NEAR(found[0]["length"].get<double>(), std::sqrt(36 + 36 + 25), 1e-12);
+  const Json beyond = Measure({"--profile", "0,20,30:10,20,30", "--samples", "2"})[0]["values"];
   EXPECT_TRUE(beyond[0].is_null());
   EXPECT_EQ(beyond[1], 0);
 }
 
 TEST_F(MeasureTest, BoxesHaveTheMeanAndDeviationOfTheirVoxels) {
-  const json all = Measure({"--box", ":,:,:"})[0];
+  const Json all = Measure({"--box", ":,:,:"})[0];
   EXPECT_EQ(all["voxels"], 24);
   EXPECT_EQ(all["volume"], 24 * 2 * 3 * 5);
   EXPECT_EQ(all["unit"], "mm^3");
-  EXPECT_NEAR(all["mean"], 1.5 + 10 + 50, 1e-9);
-  EXPECT_NEAR(all["deviation"], std::sqrt(1.25 + 200 / 3.0 + 2500), 1e-9);
+  EXPECT_NEAR(all["mean"].get<double>(), 1.5 + 10 + 50, 1e-9);
+  EXPECT_NEAR(all["deviation"].get<double>(), std::sqrt(1.25 + 200 / 3.0 + 2500), 1e-9);
   EXPECT_EQ(all["least"], 0);
   EXPECT_EQ(all["largest"], 123);
   for (const char* box : {"1:3,:,0:1v", "11:15,:,:31", "25:75,:,:50%"}) {
-    const json part = Measure({"--box", box})[0];
+    const Json part = Measure({"--box", box})[0];
     EXPECT_EQ(part["voxels"], 6) << box;
-    EXPECT_NEAR(part["mean"], 11.5, 1e-9) << box;
+    EXPECT_NEAR(part["mean"].get<double>(), 11.5, 1e-9) << box;
   }
-  const json none = Measure({"--box", "100:200,:,:"})[0];
+  const Json none = Measure({"--box", "100:200,:,:"})[0];
   EXPECT_EQ(none["voxels"], 0);
   EXPECT_TRUE(none["mean"].is_null());
 }
 
 // The ramp is its own labels: each value but 0 is one.
 TEST_F(MeasureTest, EachLabelHasItsVolumeAndValues) {
-  const json found = Measure({"--labels", "ramp.nrrd"})[0];
+  const Json found = Measure({"--labels", "ramp.nrrd"})[0];
   EXPECT_EQ(found["unit"], "ml");
   ASSERT_EQ(found["labels"].size(), 23U);
-  for (const json& label : found["labels"]) {
+  for (const Json& label : found["labels"]) {
     EXPECT_EQ(label["voxels"], 1);
     EXPECT_DOUBLE_EQ(label["volume"].get<double>(), 2 * 3 * 5 / 1000.0);
     for (const char* field : {"mean", "least", "largest"}) EXPECT_EQ(label[field], label["value"]) << field;

@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
@@ -293,12 +293,12 @@ TEST_F(MovieTest, FramesFrameWhatShowsInAnyOfThem) {
     arguments.insert(arguments.end(),
                      {"--local=1", "--size", "32", "--renderer", "raycast", "--transfer", "opaque", "--save-camera", "camera.json"});
     MustRun(arguments);
-    return nlohmann::json::parse(ReadFile("camera.json"));
+    return Json::Parse(ReadFile("camera.json")).value();
   };
   const auto first = camera({"render", "growing.npy", "--time", "0", "-o", "a.png"});
   const auto second = camera({"render", "growing.npy", "--time", "1", "-o", "b.png"});
   const auto both = camera({"turntable", "growing.npy", "--time", "0:1", "--turns", "0", "-o", "t%d.png"});
-  EXPECT_GT(first["zoom"], 2 * second["zoom"].get<double>());
+  EXPECT_GT(first["zoom"].get<double>(), 2 * second["zoom"].get<double>());
   EXPECT_EQ(both, second) << "the larger cube holds the smaller one";
   EXPECT_EQ(LargestDifference(ReadPicture(Path("t1.png")), ReadPicture(Path("b.png"))), 0);
 }

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 
@@ -50,9 +50,9 @@ TEST_F(NotesTest, LocalRenderingKeepsToItsMemory) {
   EXPECT_THAT(SaidBy("render", {"--memory", "1G"}), IsEmpty());
   // No more workers than the memory suits, on a machine with any number of cores.
   MustRun({"render", "ball.nrrd", "--local", "--memory", "768M", "--size", "32", "-o", "one.png", "--stats", "one.json"});
-  EXPECT_EQ(nlohmann::json::parse(ReadFile("one.json"))["plan"]["workers"], 1);
+  EXPECT_EQ(Json::Parse(ReadFile("one.json")).value()["plan"]["workers"], 1);
   MustRun({"render", "ball.nrrd", "--local=3", "--memory", "2G", "--size", "32", "-o", "three.png", "--stats", "three.json"});
-  EXPECT_EQ(nlohmann::json::parse(ReadFile("three.json"))["plan"]["workers"], 3);
+  EXPECT_EQ(Json::Parse(ReadFile("three.json")).value()["plan"]["workers"], 3);
   const ProgramResult large =
       Slabstream({"render", "ball.nrrd", "--local=1", "--memory", "800M", "--size", "8000x8000", "-o", "large.png"});
   EXPECT_EQ(large.exit_status, 1);

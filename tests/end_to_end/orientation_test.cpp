@@ -3,11 +3,11 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "common/json/json.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -193,7 +193,7 @@ TEST_F(OrientationTest, TheDefaultViewIsThatOfItsVolumeAndIsSavedAsItWasUsed) {
         return Render(volume, more);
       };
       const PictureFile picture = with({"--save-camera", Path("camera.json")});
-      const nlohmann::json camera = nlohmann::json::parse(ReadFile("camera.json"));
+      const Json camera = Json::Parse(ReadFile("camera.json")).value();
       EXPECT_EQ(camera["azimuth"], azimuth);
       EXPECT_EQ(camera["elevation"], elevation);
       EXPECT_EQ(camera["fit"], false);
@@ -202,8 +202,8 @@ TEST_F(OrientationTest, TheDefaultViewIsThatOfItsVolumeAndIsSavedAsItWasUsed) {
       EXPECT_EQ(LargestDifference(with({"--azimuth", std::to_string(azimuth), "--elevation", std::to_string(elevation), "--fit"}), picture),
                 0);
       with({"--no-fit", "--azimuth", "0", "--save-camera", Path("whole.json")});
-      EXPECT_EQ(nlohmann::json::parse(ReadFile("whole.json"))["elevation"], elevation) << "an angle that is not given keeps its default";
-      EXPECT_FALSE(nlohmann::json::parse(ReadFile("whole.json")).contains("look-at"));
+      EXPECT_EQ(Json::Parse(ReadFile("whole.json")).value()["elevation"], elevation) << "an angle that is not given keeps its default";
+      EXPECT_FALSE(Json::Parse(ReadFile("whole.json")).value().contains("look-at"));
     }
   }
 }

@@ -7,8 +7,8 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
@@ -16,7 +16,6 @@
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -36,9 +35,9 @@ class ServiceTest : public EndToEndTest {
     return MustRun({"up", "--detach", "--workers", "2", "--listen", endpoint, "--data", "ball=" + ball_});
   }
   std::vector<pid_t> Pids() const {
-    const json status = json::parse(MustRun({"status", "--json"}).out);
+    const Json status = Json::Parse(MustRun({"status", "--json"}).out).value();
     std::vector<pid_t> pids = {status["pid"].get<pid_t>()};
-    for (const json& worker : status["workers"]) pids.push_back(worker["pid"].get<pid_t>());
+    for (const Json& worker : status["workers"]) pids.push_back(worker["pid"].get<pid_t>());
     return pids;
   }
 
@@ -47,7 +46,7 @@ class ServiceTest : public EndToEndTest {
 
 TEST_F(ServiceTest, RendersTheSamePictureAsThisProcessAlone) {
   EXPECT_THAT(Up(endpoint_).out, AllOf(HasSubstr("slabstream is up at " + endpoint_), HasSubstr("slabstream render")));
-  const json before = json::parse(MustRun({"status", "--json", "--endpoint", endpoint_}).out);
+  const Json before = Json::Parse(MustRun({"status", "--json", "--endpoint", endpoint_}).out).value();
   EXPECT_EQ(before["workers"].size(), 2U);
   EXPECT_EQ(before["datasets"][0]["name"], "ball");
   EXPECT_EQ(before["datasets"][0]["state"], "unloaded");
@@ -57,9 +56,9 @@ TEST_F(ServiceTest, RendersTheSamePictureAsThisProcessAlone) {
   MustRun({"render", ball_, "--local=1", "-o", "local.exr", "--size", "64"});
   EXPECT_LE(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 2e-5 + 1.0 / 1024);
 
-  const json after = json::parse(MustRun({"status", "--json"}).out);
+  const Json after = Json::Parse(MustRun({"status", "--json"}).out).value();
   EXPECT_EQ(after["frames_done"], 1);
-  EXPECT_EQ(after["datasets"][0]["size"], (json{32, 32, 32}));
+  EXPECT_EQ(after["datasets"][0]["size"], (Json{32, 32, 32}));
   EXPECT_THAT(MustRun({"status"}).out, AllOf(HasSubstr("workers      2"), HasSubstr("ball ready 32 x 32 x 32")));
 }
 
@@ -86,7 +85,7 @@ TEST_F(ServiceTest, PictureFilesDoNotTellWhereTheyWereMade) {
 
 TEST_F(ServiceTest, NeitherThreadsNorPackingChangeThePicture) {
   MustRun({"up", "--detach", "--workers", "1", "--threads", "3", "--compress", "--listen", endpoint_, "--data", "ball=" + ball_});
-  EXPECT_EQ(json::parse(MustRun({"status", "--json"}).out)["workers"][0]["threads"], 3);
+  EXPECT_EQ(Json::Parse(MustRun({"status", "--json"}).out).value()["workers"][0]["threads"], 3);
   MustRun({"render", "ball", "-o", "service.exr", "--size", "64"});
   MustRun({"render", ball_, "--local=1", "--threads", "1", "-o", "local.exr", "--size", "64"});
   EXPECT_EQ(LargestDifference(ReadPicture(Path("service.exr")), ReadPicture(Path("local.exr"))), 0);
@@ -160,8 +159,8 @@ TEST_F(ServiceTest, VoxelsStayWithTheWorkersAcrossClients) {
   Up(endpoint_);
   MustRun({"render", "ball", "-o", "a.png", "--size", "64", "--stats", "first.json"});
   MustRun({"render", "ball", "-o", "b.png", "--size", "64", "--azimuth", "70", "--stats", "second.json"});
-  EXPECT_GT(json::parse(ReadFile("first.json"))["bytes"]["voxels"], 0);
-  EXPECT_EQ(json::parse(ReadFile("second.json"))["bytes"]["voxels"], 0);
+  EXPECT_GT(Json::Parse(ReadFile("first.json")).value()["bytes"]["voxels"].get<double>(), 0);
+  EXPECT_EQ(Json::Parse(ReadFile("second.json")).value()["bytes"]["voxels"], 0);
 }
 
 TEST_F(ServiceTest, DownLeavesNothingBehind) {
@@ -226,9 +225,9 @@ TEST_F(ServiceTest, AWorkerThatIsKilledIsStartedAgainAndDownEndsItToo) {
 
 TEST_F(ServiceTest, LimitsOfMemoryAreSharedOutAndShown) {
   MustRun({"up", "--detach", "--workers", "2", "--memory", "3GiB", "--listen", endpoint_, "--data", "ball=" + ball_});
-  const json status = json::parse(MustRun({"status", "--json"}).out);
+  const Json status = Json::Parse(MustRun({"status", "--json"}).out).value();
   EXPECT_EQ(status["memory_bytes"], 1 << 30);
-  for (const json& worker : status["workers"]) EXPECT_EQ(worker["memory_bytes"], 1 << 30);
+  for (const Json& worker : status["workers"]) EXPECT_EQ(worker["memory_bytes"], 1 << 30);
   EXPECT_THAT(MustRun({"status"}).out, HasSubstr("memory limit 1024 MiB"));
   const ProgramResult too_large = Slabstream({"render", "ball", "-o", "a.png", "--size", "8192", "--renderer", "raycast"});
   EXPECT_EQ(too_large.exit_status, 1);
@@ -238,7 +237,7 @@ TEST_F(ServiceTest, LimitsOfMemoryAreSharedOutAndShown) {
   EXPECT_EQ(too_little.exit_status, 2);
   EXPECT_THAT(too_little.err, HasSubstr("memory 512 MiB is too little for a coordinator and 2 workers, which need 768 MiB"));
   MustRun({"up", "--detach", "--memory", "1G", "--listen", endpoint_});
-  EXPECT_EQ(json::parse(MustRun({"status", "--json"}).out)["workers"].size(), 1) << "with any number of cores";
+  EXPECT_EQ(Json::Parse(MustRun({"status", "--json"}).out).value()["workers"].size(), 1) << "with any number of cores";
 }
 
 TEST_F(ServiceTest, InTheForegroundCtrlCEndsEverything) {
@@ -305,19 +304,19 @@ TEST_F(ServiceTest, DataAddsListsReloadsAndRemoves) {
   EXPECT_THAT(MustRun({"data", "add", "other=" + other, Path("inbox")}).out, AllOf(HasSubstr("ball"), HasSubstr("other")));
   std::filesystem::copy_file(other, Path("inbox/dropped.nrrd"));
   MustRun({"render", "dropped", "-o", "a.png", "--size", "32"});
-  const json list = json::parse(MustRun({"data", "list", "--json"}).out);
+  const Json list = Json::Parse(MustRun({"data", "list", "--json"}).out).value();
   ASSERT_EQ(list.size(), 3U);
   EXPECT_EQ(list[1]["name"], "dropped");
   EXPECT_EQ(list[1]["state"], "ready");
-  EXPECT_EQ(list[1]["size"], (json{24, 24, 24}));
+  EXPECT_EQ(list[1]["size"], (Json{24, 24, 24}));
   EXPECT_EQ(list[1]["type"], "uint8");
-  EXPECT_EQ(list[1]["spacing"], (json{1, 1, 1}));
-  EXPECT_GT(list[1]["memory_bytes"], 0);
+  EXPECT_EQ(list[1]["spacing"], (Json{1, 1, 1}));
+  EXPECT_GT(list[1]["memory_bytes"].get<double>(), 0);
   EXPECT_EQ(list[2]["state"], "unloaded");
   EXPECT_THAT(MustRun({"data", "list"}).out, testing::ContainsRegex("dropped +ready +[0-9]+ s +24 x 24 x 24 +uint8 +1 x 1 x 1 +"));
   MustRun({"data", "reload", "dropped", "ball"});
-  EXPECT_EQ(json::parse(MustRun({"data", "list", "--json"}).out)[1]["state"], "unloaded");
-  EXPECT_EQ(json::parse(MustRun({"data", "remove", "other", Path("inbox"), "--json"}).out).size(), 1U);
+  EXPECT_EQ(Json::Parse(MustRun({"data", "list", "--json"}).out).value()[1]["state"], "unloaded");
+  EXPECT_EQ(Json::Parse(MustRun({"data", "remove", "other", Path("inbox"), "--json"}).out).value().size(), 1U);
   EXPECT_EQ(Slabstream({"render", "dropped", "-o", "a.png"}).exit_status, 2);
 
   const ProgramResult unknown = Slabstream({"data", "remove", "ball", "nonesuch"});
@@ -361,9 +360,9 @@ TEST_F(ServiceTest, TheLogLevelIsThatOfAllProcesses) {
 TEST_F(ServiceTest, StatusTellsOfRefusedRequests) {
   Up(endpoint_);
   EXPECT_EQ(Slabstream({"render", "nonesuch", "-o", "a.png"}).exit_status, 2);
-  const json status = json::parse(MustRun({"status", "--json"}).out);
+  const Json status = Json::Parse(MustRun({"status", "--json"}).out).value();
   EXPECT_EQ(status["frames_failed"], 0);
-  EXPECT_EQ(status["requests_refused"], (json{{"bad_request", 0}, {"unknown_dataset", 1}, {"too_large", 0}, {"over_quota", 0}}));
+  EXPECT_EQ(status["requests_refused"], (Json{{"bad_request", 0}, {"unknown_dataset", 1}, {"too_large", 0}, {"over_quota", 0}}));
   EXPECT_THAT(MustRun({"status"}).out, HasSubstr("requests     1 refused (0 bad, 1 of unknown datasets, 0 too large, 0 over quota)"));
 }
 

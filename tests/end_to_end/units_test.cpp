@@ -2,15 +2,14 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
-#include <nlohmann/json.hpp>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -29,11 +28,11 @@ TEST_F(UnitsTest, AreShownAsTheFileStatesThem) {
   const std::string info = MustRun({"info", "cells.nrrd"}).out;
   EXPECT_THAT(info, HasSubstr("spacing      0.5 0.5 2 \u00b5m\n"));
   EXPECT_THAT(info, HasSubstr("extent       20 x 15 x 40 \u00b5m\n"));
-  EXPECT_EQ(json::parse(MustRun({"info", "cells.nrrd", "--json"}).out)["unit"], "\u00b5m");
+  EXPECT_EQ(Json::Parse(MustRun({"info", "cells.nrrd", "--json"}).out).value()["unit"], "\u00b5m");
   const std::vector<std::string> measure = {"measure", "cells.nrrd", "--local=1", "--distance", "0,0,0:3,4,0", "--box", ":,:,:"};
   EXPECT_THAT(MustRun(measure).out, testing::AllOf(HasSubstr("distance 5 \u00b5m\n"), HasSubstr("12000 \u00b5m^3\n")));
   MustRun({"render", "cells.nrrd", "--local=1", "--size", "300x200", "--scale-bar", "-o", "bar.png"});
-  EXPECT_EQ(json::parse(MustRun({"info", "bar.png", "--json"}).out)["geometry"]["unit"], "\u00b5m");
+  EXPECT_EQ(Json::Parse(MustRun({"info", "bar.png", "--json"}).out).value()["geometry"]["unit"], "\u00b5m");
   MustRun({"convert", "cells.nrrd", "again.nrrd"});
   EXPECT_THAT(MustRun({"info", "again.nrrd"}).out, HasSubstr("spacing      0.5 0.5 2 \u00b5m\n"));
 }
@@ -41,7 +40,7 @@ TEST_F(UnitsTest, AreShownAsTheFileStatesThem) {
 TEST_F(UnitsTest, AreNotMadeUp) {
   Make("bare.nrrd", "");
   EXPECT_THAT(MustRun({"info", "bare.nrrd"}).out, testing::AllOf(HasSubstr("spacing      0.5 0.5 2\n"), Not(HasSubstr("unit"))));
-  EXPECT_EQ(json::parse(MustRun({"info", "bare.nrrd", "--json"}).out)["unit"], "unknown");
+  EXPECT_EQ(Json::Parse(MustRun({"info", "bare.nrrd", "--json"}).out).value()["unit"], "unknown");
   EXPECT_THAT(MustRun({"measure", "bare.nrrd", "--local=1", "--distance", "0,0,0:3,4,0"}).out, HasSubstr("distance 5 units\n"));
   MakeSphere("ball.nrrd", 1, 16);
   EXPECT_THAT(MustRun({"measure", "ball.nrrd", "--local=1", "--distance", "0,0,0:3,4,0"}).out, HasSubstr("distance 5 voxels\n"));

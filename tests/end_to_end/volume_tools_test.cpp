@@ -5,44 +5,43 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 class VolumeToolsTest : public EndToEndTest {
  protected:
-  json Info(const std::string& name, std::vector<std::string> more = {}) {
+  Json Info(const std::string& name, std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"info", name, "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return json::parse(MustRun(arguments).out);
+    return Json::Parse(MustRun(arguments).out).value();
   }
 };
 
 TEST_F(VolumeToolsTest, InfoTellsWhatSphereMade) {
   for (const int sphere_class : {1, 2}) {
     MakeSphere("s.nrrd", sphere_class, 40);
-    const json info = Info("s.nrrd", {"--transfer", "opaque"});
-    EXPECT_EQ(info["size"], (json{40, 40, 40}));
+    const Json info = Info("s.nrrd", {"--transfer", "opaque"});
+    EXPECT_EQ(info["size"], (Json{40, 40, 40}));
     EXPECT_EQ(info["type"], "uint8");
     EXPECT_EQ(info["file_type"], "uint8");
     EXPECT_EQ(info["format"], "NRRD");
-    EXPECT_EQ(info["spacing"], (json{1.0, 1.0, 1.0}));
+    EXPECT_EQ(info["spacing"], (Json{1.0, 1.0, 1.0}));
     EXPECT_EQ(info["range"]["min"], 0.0);
-    EXPECT_GT(info["range"]["max"], 200.0);
+    EXPECT_GT(info["range"]["max"].get<double>(), 200.0);
     EXPECT_EQ(info["non_finite"], 0);
-    EXPECT_NEAR(info["occupancy"], sphere_class == 1 ? 0.05 : 0.3, 0.01);
+    EXPECT_NEAR(info["occupancy"].get<double>(), sphere_class == 1 ? 0.05 : 0.3, 0.01);
     std::int64_t voxels = 0;
-    for (const json& count : info["histogram"]) voxels += count.get<std::int64_t>();
+    for (const Json& count : info["histogram"]) voxels += count.get<std::int64_t>();
     EXPECT_EQ(voxels, 40 * 40 * 40);
-    EXPECT_NEAR(info["histogram"][0], 64000 * (1 - info["occupancy"].get<double>()), 1);
+    EXPECT_NEAR(info["histogram"][0].get<double>(), 64000 * (1 - info["occupancy"].get<double>()), 1);
   }
 }
 
@@ -51,10 +50,10 @@ TEST_F(VolumeToolsTest, ValueTellsWhatLiesAtPoints) {
   const std::vector<std::string> command = {"value", "s.nrrd", "--local=1", "--at", "9.6,9.6,9.6", "--at", "-0.4,0,0", "--at", "99,0,0"};
   std::vector<std::string> as_json = command;
   as_json.emplace_back("--json");
-  const json values = json::parse(MustRun(as_json).out);
+  const Json values = Json::Parse(MustRun(as_json).out).value();
   ASSERT_EQ(values.size(), 3U);
-  EXPECT_EQ(values[0]["voxel"], (json{10, 10, 10}));
-  EXPECT_GE(values[0]["value"], 128);
+  EXPECT_EQ(values[0]["voxel"], (Json{10, 10, 10}));
+  EXPECT_GE(values[0]["value"].get<double>(), 128);
   EXPECT_EQ(values[1]["value"], 0);
   EXPECT_EQ(values[2]["inside"], false);
   EXPECT_TRUE(values[2]["value"].is_null());
@@ -66,10 +65,10 @@ TEST_F(VolumeToolsTest, ValueTellsWhatLiesAtPoints) {
 
 TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
   MakeSphere("a.nrrd", 1, 33);
-  const json reference = Info("a.nrrd");
+  const Json reference = Info("a.nrrd");
   for (const char* name : {"b.nrrd", "b.mha", "b.mhd"}) {
     MakeSphere(name, 1, 33);
-    const json info = Info(name);
+    const Json info = Info(name);
     for (const char* field : {"size", "type", "range", "histogram", "occupancy"}) EXPECT_EQ(info[field], reference[field]) << name;
   }
 }
@@ -77,7 +76,7 @@ TEST_F(VolumeToolsTest, SpheresAreDeterministicInEveryFormat) {
 TEST_F(VolumeToolsTest, AFullDiskKeepsTheOlderVolume) {
   for (const std::string name : {"s.nrrd", "s.mha", "s.mhd"}) {
     MakeSphere(name, 2, 20);
-    const json before = Info(name);
+    const Json before = Info(name);
     const ProgramResult result = OnFullDisk(100, [&] { return Slabstream({"sphere", "--class", "2", "--size", "30", "-o", name}); });
     EXPECT_EQ(result.exit_status, 1) << name;
     EXPECT_EQ(result.out, "");
@@ -103,22 +102,22 @@ TEST_F(VolumeToolsTest, InfoTellsTheLevelsOfAVolume) {
                            "   1  50 x 50 x 50  2 2 2  0.1 MiB  50 x 50 x 50\n", "values       0 ... 248\n", "#####"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
-  const json info = Info("s.ome.zarr"), whole = Info("s.nrrd");
+  const Json info = Info("s.ome.zarr"), whole = Info("s.nrrd");
   for (const char* field : {"size", "type", "file_type", "spacing", "range", "histogram", "occupancy"})
     EXPECT_EQ(info[field], whole[field]);
   ASSERT_EQ(info["levels"].size(), 2U);
-  EXPECT_EQ(info["levels"][0]["block"], (json{64, 64, 64}));
-  EXPECT_EQ(info["levels"][1]["size"], (json{50, 50, 50}));
-  EXPECT_EQ(info["levels"][1]["spacing"], (json{2.0, 2.0, 2.0}));
+  EXPECT_EQ(info["levels"][0]["block"], (Json{64, 64, 64}));
+  EXPECT_EQ(info["levels"][1]["size"], (Json{50, 50, 50}));
+  EXPECT_EQ(info["levels"][1]["spacing"], (Json{2.0, 2.0, 2.0}));
   EXPECT_EQ(info["levels"][1]["voxel_bytes"], 125000);
-  EXPECT_EQ(info["statistics"], (json{{"level", 0}, {"sample", false}}));
+  EXPECT_EQ(info["statistics"], (Json{{"level", 0}, {"sample", false}}));
   EXPECT_FALSE(whole.contains("levels"));
 }
 
 // Nobody has the time, or the memory, to read all of it.
 TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
-  const auto write = [&](const std::string& name, const json& text) { std::ofstream(Path(name)) << text; };
-  const auto array = [&](const std::string& name, const json& shape, int fill) {
+  const auto write = [&](const std::string& name, const Json& text) { std::ofstream(Path(name)) << text; };
+  const auto array = [&](const std::string& name, const Json& shape, int fill) {
     std::filesystem::create_directories(Path(name));
     write(name + "/.zarray", {{"zarr_format", 2},
                               {"shape", shape},
@@ -129,17 +128,17 @@ TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
                               {"order", "C"},
                               {"filters", nullptr}});
   };
-  const auto scale = [](double step) { return json::array({{{"type", "scale"}, {"scale", {step, step, step}}}}); };
+  const auto scale = [](double step) { return Json::array({{{"type", "scale"}, {"scale", {step, step, step}}}}); };
   array("large.zarr/0", {65535, 4096, 4096}, 0);  // a TiB of which no chunk is there
   array("large.zarr/1", {512, 32, 32}, 7);
   write("large.zarr/.zgroup", {{"zarr_format", 2}});
-  const json axes = {{{"name", "z"}, {"type", "space"}}, {{"name", "y"}, {"type", "space"}}, {{"name", "x"}, {"type", "space"}}};
-  const json datasets = {{{"path", "0"}, {"coordinateTransformations", scale(1)}},
+  const Json axes = {{{"name", "z"}, {"type", "space"}}, {{"name", "y"}, {"type", "space"}}, {{"name", "x"}, {"type", "space"}}};
+  const Json datasets = {{{"path", "0"}, {"coordinateTransformations", scale(1)}},
                          {{"path", "1"}, {"coordinateTransformations", scale(128)}}};
-  const json image = {{"version", "0.4"}, {"axes", axes}, {"datasets", datasets}};
-  write("large.zarr/.zattrs", {{"multiscales", json::array({image})}});
+  const Json image = {{"version", "0.4"}, {"axes", axes}, {"datasets", datasets}};
+  write("large.zarr/.zattrs", {{"multiscales", Json::array({image})}});
   EXPECT_THAT(MustRun({"info", "large.zarr"}).out, HasSubstr("values       7 ... 7 of level 1\n"));
-  EXPECT_EQ(Info("large.zarr")["statistics"], (json{{"level", 1}, {"sample", false}}));
+  EXPECT_EQ(Info("large.zarr")["statistics"], (Json{{"level", 1}, {"sample", false}}));
 
   std::ofstream(Path("large.raw"));
   std::filesystem::resize_file(Path("large.raw"), std::uintmax_t{1024} * 1024 * 1100);
@@ -147,14 +146,14 @@ TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
   std::vector<std::string> command = {"info", "large.raw"};
   command.insert(command.end(), raw.begin(), raw.end());
   EXPECT_THAT(MustRun(command).out, HasSubstr("values       0 ... 0 of a sample of level 0\n"));
-  EXPECT_EQ(Info("large.raw", raw)["statistics"], (json{{"level", 0}, {"sample", true}}));
+  EXPECT_EQ(Info("large.raw", raw)["statistics"], (Json{{"level", 0}, {"sample", true}}));
 }
 
 // It cannot be read in parts.
 TEST_F(VolumeToolsTest, InfoTellsOfTheLuminanceOfAnUncompressedFile) {
   std::ofstream(Path("rgb.nrrd")) << "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\n\n" << std::string(24, 'x');
-  const json info = Info("rgb.nrrd", {"--channel", "luminance"});
-  EXPECT_EQ(info["size"], (json{2, 2, 2}));
+  const Json info = Info("rgb.nrrd", {"--channel", "luminance"});
+  EXPECT_EQ(info["size"], (Json{2, 2, 2}));
   EXPECT_EQ(info["range"]["max"], 120);
 }
 

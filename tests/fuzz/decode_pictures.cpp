@@ -1,9 +1,9 @@
 // Headers of PNG and EXR files, and the records in them.
 //
 // input: u8 kind, a picture's file or a record
-#include "client/image_io/picture_header.h"
+#include "client/pictures/picture_header.h"
 #include "client/request/picture_record.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
 

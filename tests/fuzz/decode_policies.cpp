@@ -35,10 +35,8 @@ bool DecodePolicy(std::span<const std::byte> bytes) {
   CHECK(*received == message);
 
   (void)NeedsOccupancy(request.policy);
-  const Policy settled = SettledPolicy(request, geometry);
-  if (LeavesChoice(settled)) return true;
-  const ResolvedPolicy policy = ResolvePolicy(settled, geometry);
-  CHECK(ResolvePolicy(AskFor(policy), geometry) == policy);
+  const ResolvedPolicy policy = ResolvePolicy(SettledPolicy(request, geometry), geometry);
+  CHECK(policy.decomposition->name == request.policy.decomposition && NameOf(policy.balance_by) == BalanceByOf(request.policy));
   return true;
 }
 
@@ -54,10 +52,9 @@ std::vector<FuzzBytes> PolicySeeds() {
       FuzzSeed seed;
       seed.Put(std::uint8_t(random.Integer(0, 4))).Put(std::uint16_t(random.Integer(0, 9))).Put(std::uint16_t(random.Integer(1, 3)));
       seed.Put(std::string(renderer->name()) + "\n" + parameter);
-      const bool open = i == 0;
-      seed.Put((open ? std::string(kAutomatic) : one_of(Decompositions())) + "\n" + one_of(BalanceByChoices()) + "\n");
-      seed.Put((open ? std::string(kAutomatic) : one_of(Assignments())) + "\n" + one_of(Balances()) + "\n");
-      seeds.push_back(seed.Put(open ? std::string(kAutomatic) : RandomCombining(random)).bytes());
+      seed.Put(one_of(Decompositions()) + "\n" + one_of(BalanceByChoices()) + "\n");
+      seed.Put(one_of(Assignments()) + "\n" + one_of(Balances()) + "\n");
+      seeds.push_back(seed.Put(i == 0 ? std::string() : RandomCombining(random)).bytes());
     }
   }
   return seeds;

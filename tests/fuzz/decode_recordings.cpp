@@ -1,17 +1,15 @@
 // Traces that hold a recording, and so the reader of JSON that recordings and sweeps share.
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "client/cli/recording.h"
+#include "common/json/json.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/laboratory/measure/recorded.h"
 
 namespace slabstream {
 namespace {
 
-std::string TextOf(const std::vector<RecordedFrame>& frames) {
-  return nlohmann::ordered_json{{kRecordingKey, RecordingJson(frames)}}.dump();
-}
+std::string TextOf(const std::vector<RecordedFrame>& frames) { return Json{{kRecordingKey, RecordingJson(frames)}}.dump(); }
 
 // A time is written in microseconds since the first frame, with three digits behind the point.
 void CheckNear(double a, double b) { CHECK_LE(std::abs(a - b), 1e-9 + 1e-12 * std::abs(a)) << a << " against " << b; }

@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "client/service/service_state.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "common/service/key_folder.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"

@@ -59,7 +59,7 @@ std::vector<FuzzBytes> SweepSeeds() {
   "links": ["10gbit", "1gbit:30,1"]
 })"),
           SeedOf(R"({"volumes": [{"sphere": {}}], "workers": [2], "size": 64,
-    "policies": [{"decomposition": "auto", "balance_by": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})")};
+    "policies": [{"groups": "auto"}]})")};
 }
 
 }  // namespace slabstream

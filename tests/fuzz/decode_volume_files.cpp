@@ -3,8 +3,9 @@
 // input: u8 kind (Kinds()), u8 options (OptionsNumber), the file
 #include <algorithm>
 
+#include "data/open/read_volume.h"
 #include "data/volume_io/formats.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
@@ -22,7 +23,7 @@ struct Kind {
 const std::vector<Kind>& Kinds() {
   static const std::vector<Kind> kinds = [] {
     std::vector<Kind> all = {{".png", true}, {".jpg", true}, {".bmp", true}, {".jp2", true}};
-    for (const VolumeFormat& format : VolumeFormats()) {
+    for (const VolumeFormat& format : FileFormats()) {
       for (const std::string_view ending : format.endings) all.push_back({std::string(ending)});
     }
     return all;

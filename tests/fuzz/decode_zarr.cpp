@@ -120,11 +120,11 @@ std::vector<FuzzBytes> ZarrSeeds() {
     seeds.push_back(a.Put(std::string_view(write(two))).bytes());
     seeds.push_back(b.Put(std::string_view(write(three))).bytes());
     for (const ZarrSpec& spec : {two, three}) {
-      ZarrJson axes = ZarrJson::array({{{"name", "z"}, {"unit", "nanometer"}}, {{"name", "y"}, {"type", "space"}}, {{"name", "x"}}});
-      const ZarrJson scale = {{"type", "scale"}, {"scale", {2, 1, 1}}};
-      const ZarrJson level = {{"path", "0"}, {"coordinateTransformations", {scale}}};
-      const ZarrJson image = {{"axes", axes}, {"datasets", {level, level}}, {"coordinateTransformations", ZarrJson::array({scale})}};
-      ZarrJson attributes = {{"multiscales", ZarrJson::array({image})}, {"omero", {{"channels", {{{"label", "a"}}}}}}};
+      Json axes = Json::array({{{"name", "z"}, {"unit", "nanometer"}}, {{"name", "y"}, {"type", "space"}}, {{"name", "x"}}});
+      const Json scale = {{"type", "scale"}, {"scale", {2, 1, 1}}};
+      const Json level = {{"path", "0"}, {"coordinateTransformations", {scale}}};
+      const Json image = {{"axes", axes}, {"datasets", {level, level}}, {"coordinateTransformations", Json::array({scale})}};
+      Json attributes = {{"multiscales", Json::array({image})}, {"omero", {{"channels", {{{"label", "a"}}}}}}};
       if (spec.version == 3) {
         attributes = {{"zarr_format", 3}, {"node_type", "group"}, {"attributes", {{"ome", attributes}}}};
       }

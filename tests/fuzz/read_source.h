@@ -10,7 +10,7 @@
 
 namespace slabstream {
 
-// Of a file or folder that a target writes for each input.
+// The path of a file or folder that a target writes for each input.
 inline std::string PathOfSource(const std::string& name) {
   static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
   return directory / name;

@@ -8,7 +8,7 @@
 #include "common/base/check.h"
 #include "common/volume/sphere.h"
 #include "common/wire/any_message.h"
-#include "coordinator/service.h"
+#include "coordinator/service/service.h"
 
 namespace slabstream {
 namespace {
@@ -89,8 +89,6 @@ std::vector<std::vector<std::byte>> RecordedHeaders() {
   client.Await<PickReply>();
   client.Send(ViewQuery{.nonce = 12, .frame = request});
   client.Await<ViewReply>();
-  client.Send(PrefetchQuery{.nonce = 11, .frame = request});
-  client.Await<PrefetchReply>();
   AddVolume add{.nonce = 8, .name = "sent"};
   add.description.geometry.size = {2, 2, 2};
   client.Send(add);

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/fuzz/fuzz_target.h"
 
 int main(int argc, char** argv) {

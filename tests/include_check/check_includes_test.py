@@ -53,6 +53,13 @@ class CheckIncludes(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertEqual(text, "top/top.cpp:3: base/base.h is of x_base, which x_top does not link\n")
 
+    def test_the_header_of_a_sealed_library_is_for_one_target(self):
+        self.write("json/json.cpp", "#include <nlohmann/json.hpp>\n")
+        self.write("top/top.cpp", "#include <vector>\n#include <nlohmann/json_fwd.hpp>\n")
+        status, text = self.check(("slabstream_json", "json", ["json.cpp"], [], []), ("x_top", "top", ["top.cpp"], [], []))
+        self.assertEqual(status, 1)
+        self.assertEqual(text, "top/top.cpp:2: nlohmann/json_fwd.hpp is for slabstream_json alone\n")
+
     def test_a_header_that_others_include_needs_public_links(self):
         self.write("base/base.h")
         self.write("middle/middle.h", '#include "base/base.h"\n')
@@ -70,6 +77,15 @@ class CheckIncludes(unittest.TestCase):
         self.write("base/inner/only.h")
         self.write("top/top.cpp", '#include "base/inner/only.h"\n')
         self.assertEqual(self.check(("x_base", "base", [], [], []), ("x_top", "top", ["top.cpp"], [], []))[0], 1)
+
+    def test_threads_are_shared_out_by_one_target(self):
+        self.write("loops/loops.h")
+        self.write("loops/loops.cpp", "#include <tbb/parallel_for.h>\n")
+        self.write("top/top.cpp", '#include <oneapi/tbb.h>\n#include "loops/loops.h"\n')
+        status, text = self.check(("slabstream_parallel", "loops", ["loops.cpp"], [], []),
+                                  ("x_top", "top", ["top.cpp"], ["slabstream::parallel"], []))
+        self.assertEqual(status, 1)
+        self.assertEqual(text, "top/top.cpp:1: oneapi/tbb.h is for slabstream_parallel alone\n")
 
     def test_renderers_do_not_link_each_other(self):
         self.write("worker/renderers/fog/fog.cpp")

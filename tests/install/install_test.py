@@ -20,7 +20,7 @@ sys.path.insert(0, str(HERE.parent / "python"))
 from client_support import read_png  # noqa: E402
 
 CMAKE, BUILD, LIB, VERSION = (sys.argv[1:5] + [""] * 4)[:4]
-PROGRAMS = ("slabstream", "slabstream-coordinator", "slabstream-dicom-decoder", "slabstream-gateway", "slabstream-worker")
+PROGRAMS = ("slabstream", "slabstream-coordinator", "slabstream-dicom-decoder", "slabstream-gateway", "slabstream-laboratory", "slabstream-worker")
 EXAMPLES = "share/doc/slabstream/examples"
 CLIENTS = ("cmake", "pkgconfig", "python", "curl")
 

@@ -53,7 +53,8 @@ class Hosts {
   Hosts(std::string prefix, Family family) : prefix_(std::move(prefix)), family_(family) {}
   std::string NameOf(int host) const { return prefix_ + std::to_string(host); }
   std::string bridge() const { return prefix_ + "b"; }
-  static std::string PortOf(int host) { return std::string("p").append(std::to_string(host)); }  // of the bridge
+  // The port of the bridge that leads to the host.
+  static std::string PortOf(int host) { return std::string("p").append(std::to_string(host)); }
   // iproute2 (ip, tc, ss) in a namespace.
   Status Order(const std::string& space, const std::string& order) const;
   Status Drop(const std::string& space, const std::string& device, const std::string& program) const;

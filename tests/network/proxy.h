@@ -26,10 +26,10 @@ class Proxy {
 
   const std::string& endpoint() const { return endpoint_; }
   // From any thread.
-  void SetDelay(Duration delay) { delay_ = delay; }         // of everything that comes from now on, each way
+  void SetDelay(Duration delay) { delay_ = delay; }         // delays everything that comes from now on, each way
   void SetStalled(bool stalled) { stalled_ = stalled; }     // nothing passes; connections stay
   void ResetAll() { ++resets_; }                            // the connections of now
-  std::size_t connections() const { return connections_; }  // that were ever made
+  std::size_t connections() const { return connections_; }  // connections that were ever made
 
  private:
   struct Chunk {

@@ -11,19 +11,16 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "common/volume/box.h"
 #include "common/volume/volume.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json Numbers(const Vec3& v) { return {v.x, v.y, v.z}; }
 Json Numbers(const Index3& v) { return {v.x, v.y, v.z}; }
@@ -84,8 +81,8 @@ Result<Json> ReadLevels(const Json& request) {
 int main() {
   std::string line;
   while (std::getline(std::cin, line)) {
-    const slabstream::Result<slabstream::Json> answer = slabstream::ReadLevels(slabstream::Json::parse(line));
+    const slabstream::Result<slabstream::Json> answer = slabstream::ReadLevels(slabstream::Json::Parse(line).value());
     const slabstream::Json told = answer.ok() ? *answer : slabstream::Json{{"error", answer.status().message()}};
-    std::cout << told.dump(-1, ' ', false, slabstream::Json::error_handler_t::replace) << std::endl;
+    std::cout << told.dump() << std::endl;
   }
 }

@@ -35,7 +35,9 @@ class RequestsTest(unittest.TestCase):
         self.watcher = Watcher()
 
     def submit(self, deadline: float = 60) -> int:
-        return self.requests.submit(schema.FrameRequest(dataset="ball"), deadline, self.watcher, self.now)
+        request = next(self.requests.numbers)
+        self.requests.submit(request, schema.FrameRequest(dataset="ball"), deadline, self.watcher, self.now)
+        return request
 
     def receive(self, payload: bytes | None = None, version: int = schema.WIRE_VERSION, **message) -> None:
         parts = [schema.Envelope(version=version, **message).SerializeToString()]
@@ -151,8 +153,9 @@ class RequestsTest(unittest.TestCase):
     def test_orders_are_answered_by_their_number(self) -> None:
         one: concurrent.futures.Future = concurrent.futures.Future()
         two: concurrent.futures.Future = concurrent.futures.Future()
-        first = self.requests.ask("status_query", schema.StatusQuery(), one)
-        second = self.requests.ask("data_order", schema.DataOrder(action=1), two)
+        first, second = next(self.requests.numbers), next(self.requests.numbers)
+        self.requests.ask(first, "status_query", schema.StatusQuery(), one)
+        self.requests.ask(second, "data_order", schema.DataOrder(action=1), two)
         self.receive(order_refused=schema.OrderRefused(nonce=second, status=schema.Status(code=1, message="not an admin")))
         self.receive(status_reply=schema.StatusReply(nonce=first, pid=7))
         self.assertEqual(one.result(0).pid, 7)
@@ -162,11 +165,11 @@ class RequestsTest(unittest.TestCase):
     def test_a_refused_key_ends_everything_for_good(self) -> None:
         answer: concurrent.futures.Future = concurrent.futures.Future()
         self.submit()
-        self.requests.ask("status_query", schema.StatusQuery(), answer)
+        self.requests.ask(1001, "status_query", schema.StatusQuery(), answer)
         self.requests.fail_all("refuses the key", for_good=True)
         self.submit()
         later: concurrent.futures.Future = concurrent.futures.Future()
-        self.requests.ask("status_query", schema.StatusQuery(), later)
+        self.requests.ask(1002, "status_query", schema.StatusQuery(), later)
         for error in (*self.watcher.told, answer.exception(0), later.exception(0)):
             self.assertIsInstance(error, ss.Unavailable)
 

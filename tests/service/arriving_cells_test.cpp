@@ -1,4 +1,4 @@
-#include "worker/arriving_cells.h"
+#include "worker/service/arriving_cells.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "coordinator/background_actions.h"
+#include "coordinator/service/background_actions.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 #include "common/transport/socket.h"
 #include "common/volume/sphere.h"
-#include "coordinator/voxel_server.h"
+#include "coordinator/service/voxel_server.h"
 #include "tests/data/stores/scripted_server.h"
 
 namespace slabstream {
@@ -23,7 +23,7 @@ TEST(BackgroundActions, VoxelsAreServedWhenTheirEventIsHandledWhateverAnEarlierE
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   Context context;
   const auto voxels = VoxelServer::Start(context, {"inproc://background-actions-test"}, Epoch{7}).value();
-  BackgroundActions background({}, {}, {}, *voxels);
+  BackgroundActions background({}, {}, *voxels);
   for (LoadId load = 1; load <= 2; ++load) {
     LoadDataset action{.name = "ball", .load = load, .source = VolumeLoader([sphere] { return sphere; }), .most_bytes = 1 << 20};
     ASSERT_FALSE(background.Perform(action).has_value());
@@ -51,7 +51,7 @@ TEST(BackgroundActions, AServerThatDoesNotAnswerHoldsUpItsOwnDatasetsAlone) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   Context context;
   const auto voxels = VoxelServer::Start(context, {"inproc://background-actions-silent-test"}, Epoch{8}).value();
-  BackgroundActions background({}, {}, {}, *voxels);
+  BackgroundActions background({}, {}, *voxels);
   const std::size_t far = 2 * kLoadsAtOnce;
   for (std::size_t i = 0; i < far; ++i) {
     LoadDataset action{.name = fmt::format("far{}", i), .load = LoadId(i), .source = {fmt::format("{}/{}", silent.url(), i), ""}};

@@ -18,14 +18,14 @@
 #include "common/volume/sphere.h"
 #include "common/wire/limits.h"
 #include "common/wire/payload.h"
-#include "coordinator/answer_question.h"
-#include "coordinator/box_samples.h"
-#include "coordinator/catalogue.h"
-#include "coordinator/dataset_id.h"
-#include "coordinator/folder_memory.h"
-#include "coordinator/peer_table.h"
-#include "coordinator/voxel_server.h"
-#include "data/volume_io/volume_reader.h"
+#include "coordinator/service/answer_question.h"
+#include "coordinator/service/box_samples.h"
+#include "coordinator/service/dataset_id.h"
+#include "coordinator/service/folder_memory.h"
+#include "coordinator/service/peer_table.h"
+#include "coordinator/service/voxel_server.h"
+#include "data/catalogue/catalogue.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
@@ -38,21 +38,19 @@ using testing::HasSubstr;
 TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   VolumeSummary summary = Summarize(*sphere);
-  Prefetcher prefetcher;
   AnswerQuestion asked{.question = SummaryQuery{.nonce = 7, .dataset = "ball", .transfer = {}}, .dataset = 5};
   const auto answer = [&](const VolumeSummary& of) {
     asked.summary = std::make_shared<const VolumeSummary>(of);
-    return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}, prefetcher).value());
+    return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}).value());
   };
   EXPECT_EQ(answer(summary).labels, std::vector<Label>());
   EXPECT_EQ(answer(summary).nonce, 7U);
   const std::vector<Label> labels = {{3, {1, 0.5F, 0}, "Corner"}, {70, {0, 0, 1}, ""}};
   summary.label_table = std::make_shared<const LabelTable>(LabelTable{labels});
   EXPECT_EQ(answer(summary).labels, labels);
-  EXPECT_EQ(AnswerTo(asked, {}, prefetcher).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
+  EXPECT_EQ(AnswerTo(asked, {}).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
   asked.dataset = 0;
-  EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}, prefetcher).value()).labels, labels)
-      << "it has several levels, and no voxels itself";
+  EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
 }
 
 TEST(PeerTable, TokensAreNeverReused) {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "data/layers/layer_reader.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/service/multi_process_fixture.h"
 
 namespace slabstream {

@@ -1,6 +1,6 @@
 // The executor against orders as the machine gives them: every order that has an answer gets exactly one, also when what came in is
 // damaged.
-#include "worker/executor.h"
+#include "worker/service/executor.h"
 #include "tests/support/renderers.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 #include "worker/renderers/for_each_piece.h"
-#include "worker/stored_box.h"
+#include "worker/service/stored_box.h"
 
 namespace slabstream {
 namespace {

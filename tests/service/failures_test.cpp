@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/service.h"
+#include "coordinator/service/service.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
-#include "worker/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 namespace {
@@ -50,6 +50,7 @@ class FailuresTest : public testing::Test {
     FrameRequest request = TestRequest(Splatting(), 30);
     request.dataset = dataset;
     request.policy.decomposition = decomposition;
+    if (decomposition == "kd-tree") request.policy.balance_by = "occupied";  // which waits for a count
     return client_->Render(request);
   }
   void ExpectFailure(const Result<Picture>& picture, StatusCode code, const std::string& reason) {

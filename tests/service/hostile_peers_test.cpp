@@ -14,14 +14,14 @@
 
 #include "client/client.h"
 #include "common/service/service_file.h"
-#include "coordinator/service.h"
+#include "coordinator/service/service.h"
 #include "tests/common/wire/samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"
 #include "tests/support/raw_peer.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
-#include "worker/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 namespace {

@@ -9,16 +9,15 @@
 #include <optional>
 
 #include "client/embedded/embedded_service.h"
-#include "coordinator/catalogue.h"
-#include "data/open/any_volume.h"
+#include "data/catalogue/catalogue.h"
 #include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/open/unchanged_source.h"
-#include "data/sources/memory_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 #include "data/survey/survey.h"
-#include "data/volume_io/volume_reader.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
@@ -66,7 +65,7 @@ class InPartsTest : public testing::Test {
   }
   static std::shared_ptr<const Volume> Level(const std::string& path, int level) {
     const std::shared_ptr<VolumeSource> source = OpenSource(path, {}, ProcessReadContext()).value();
-    return ReadLevel(*source, level).value().volume;
+    return source->ReadLevel(level).value().volume;
   }
   Result<Picture> Render(const FrameRequest& request) { return client_->Render(request, seconds(60)); }
   void ExpectPictureOf(const FrameRequest& request, const Volume& volume) { Expect(request, RenderDirectly(request, volume), 0); }

@@ -12,13 +12,13 @@
 #include "common/planning/placement.h"
 #include "common/service/service_file.h"
 #include "common/wire/any_message.h"
-#include "coordinator/service.h"
-#include "data/volume_io/volume_reader.h"
+#include "coordinator/service/service.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
-#include "worker/picture_sockets.h"
-#include "worker/service.h"
+#include "worker/service/picture_sockets.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 namespace {

@@ -135,6 +135,7 @@ TEST_F(LeavingAndRestartTest, AFrameOutlivesItsCoordinatorAndNoVoxelsTravelAgain
   Client client = Connect({.silence = seconds(60)});
   AwaitWorkers(client, 3);
   FrameRequest request = TestRequest(ZBuffer(), 120, 3);
+  request.policy.decomposition = "slab";
   request.policy.axis = AxisChoice::kZ;
   const Result<Picture> undisturbed = client.Render(request, seconds(60));
   ASSERT_TRUE(undisturbed.ok()) << undisturbed.status().message();

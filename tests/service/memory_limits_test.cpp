@@ -9,7 +9,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/planning/worker_memory.h"
 #include "common/volume/memory_budget.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/service/child_process.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "client/client.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/service/child_process.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "common/image/run_image.h"
+#include "data/open/read_volume.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/service/multi_process_fixture.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/transport/socket.h"
-#include "worker/executor.h"
+#include "worker/service/executor.h"
 
 namespace slabstream {
 

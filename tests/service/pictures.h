@@ -35,6 +35,7 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
   request.transfer.choice = TransferFunction{.colors = {{0, {0.2F, 0.4F, 1}}, {255, {1, 0.7F, 0.3F}}},
                                              .opacities = {{0, 0, 0.5, 0}, {100, 0, 0.5, 0}, {255, 0.2, 0.5, 0}},
                                              .opacity_distance = 1};
+  request.policy.decomposition = "slab";
   request.policy.groups = groups;
   return request;
 }
@@ -108,7 +109,7 @@ inline double ExpectedAlpha(const FrameRequest& request) {
   return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
 }
 
-// Of a picture that came as floats.
+// The highest alpha of a picture that came as floats.
 inline double HighestAlpha(const PictureImage& picture) {
   const LocalImage& image = *picture.floats();
   float highest = 0;

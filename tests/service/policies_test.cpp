@@ -1,5 +1,5 @@
 // Whatever the policy, the picture is that of one renderer that holds the whole volume: every partition, assignment, way to combine and
-// renderer, for any number of workers, in both projections, with boxes that change from frame to frame; and whatever the service chooses.
+// renderer, for any number of workers, in both projections, with boxes that change from frame to frame.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -30,13 +30,6 @@ std::shared_ptr<const Volume> SparseVolume() {
   return std::make_shared<const Volume>(AsGrid(MakeTestVolume({76, 60, 88}, ScalarType::kUint8, value), 4));
 }
 
-template <class Entries>
-std::vector<std::string_view> WithAutomatic(const Entries& entries) {
-  std::vector<std::string_view> names = {kAutomatic};
-  for (const auto& entry : entries) names.push_back(entry.name);
-  return names;
-}
-
 // A service of GetParam() workers.
 class PoliciesTest : public testing::TestWithParam<int> {
  protected:
@@ -58,7 +51,6 @@ class PoliciesTest : public testing::TestWithParam<int> {
 };
 
 TEST_P(PoliciesTest, NeverChangeThePicture) {
-  constexpr int kMostFirstFrames = 10'000;
   std::size_t frame = 0;
   for (const RendererKind* renderer : Renderers()) {
     for (const Projection projection : renderer->projections()) {
@@ -66,16 +58,16 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
       request.view.projection = projection;
       const LocalImage expected = RenderDirectly(request, *volume_);
       ASSERT_GT(HighestAlpha(expected), ExpectedAlpha(request));
-      for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
-        for (const std::string_view assignment : WithAutomatic(Assignments())) {
+      for (const DecompositionEntry& decomposition : Decompositions()) {
+        for (const AssignmentEntry& assignment : Assignments()) {
           // The other lists in turn, so that all pairs come up over all of it.
           ++frame;
-          request.policy.decomposition = decomposition;
-          request.policy.assignment = assignment;
+          request.policy.decomposition = decomposition.name;
+          request.policy.assignment = assignment.name;
           request.policy.balance_by = BalanceByChoices()[frame % BalanceByChoices().size()].name;
           request.policy.balance = Balances()[frame / 3 % Balances().size()].name;
-          const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
-          request.policy.combine = schemes[frame % schemes.size()];
+          const std::size_t scheme = frame % (CombiningSchemes().size() + 1);
+          request.policy.combine = scheme == 0 ? "" : CombiningSchemes()[scheme - 1].name;
           request.policy.groups = 1 + int(frame % 3);
           SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", projection " << int(projection)
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
@@ -84,24 +76,10 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
           ASSERT_TRUE(picture.ok()) << picture.status().message();
           EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
-          if (decomposition == kAutomatic && assignment == kAutomatic) {  // the choice is made beside the first frames
-            for (int again = 0; again < kMostFirstFrames && !picture->statistics.predicted; ++again) {
-              picture = client_->Render(request, std::chrono::seconds(60));
-              ASSERT_TRUE(picture.ok()) << picture.status().message();
-            }
-            EXPECT_TRUE(picture->statistics.predicted);
-            EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request));
-          }
           const FrameStatistics& done = picture->statistics;
-          EXPECT_TRUE(!done.predicted || LeavesChoice(request.policy));
-          for (const auto& [asked, got] :
-               {std::pair(request.policy.decomposition, done.decomposition), std::pair(request.policy.assignment, done.assignment),
-                std::pair(request.policy.combine, done.combine)}) {
-            EXPECT_NE(got, kAutomatic);
-            if (asked != kAutomatic) {
-              EXPECT_EQ(got, asked);
-            }
-          }
+          EXPECT_EQ(done.decomposition, request.policy.decomposition);
+          EXPECT_EQ(done.assignment, request.policy.assignment);
+          EXPECT_EQ(done.combine, request.policy.combine.empty() ? "fan-in" : request.policy.combine);
           EXPECT_EQ(picture->statistics.balance, request.policy.balance);
           EXPECT_NE(picture->statistics.balance_by, "auto");
         }
@@ -119,11 +97,11 @@ TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
     request.transfer.isosurfaces = {{100, {1, 0.5F, 0.2F}, 0.5}};
     const LocalImage expected = RenderDirectly(request, *volume_);
     ASSERT_GT(HighestAlpha(expected), 0.4F);
-    for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
+    for (const DecompositionEntry& decomposition : Decompositions()) {
       for (const auto& metric : BalanceByChoices()) {
-        request.policy.decomposition = decomposition;
+        request.policy.decomposition = decomposition.name;
         request.policy.balance_by = metric.name;
-        SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", " << decomposition << ", "
+        SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", " << decomposition.name << ", "
                                         << metric.name);
         const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
         ASSERT_TRUE(picture.ok()) << picture.status().message();

@@ -1,7 +1,7 @@
 // A worker whose peer's memory cannot be opened, on either end: the image comes as runs.
 #include <unistd.h>
 
-#include "common/base/shared_arena.h"
+#include "common/memory/shared_arena.h"
 #include "tests/service/worker_and_peer.h"
 
 namespace slabstream {

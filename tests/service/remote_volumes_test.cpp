@@ -5,8 +5,8 @@
 #include <atomic>
 
 #include "client/embedded/embedded_service.h"
-#include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/service/pictures.h"
 #include "tests/support/temporary_directory.h"

@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_image.h"

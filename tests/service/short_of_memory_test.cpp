@@ -9,7 +9,7 @@
 #include <new>
 #include <optional>
 
-#include "coordinator/voxel_server.h"
+#include "coordinator/service/voxel_server.h"
 #include "tests/support/random_volume.h"
 
 namespace {

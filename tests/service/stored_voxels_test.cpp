@@ -1,5 +1,5 @@
 // Voxels that a worker reads itself: where it finds the files, and once it does.
-#include "worker/stored_voxels.h"
+#include "worker/service/stored_voxels.h"
 
 #include <gtest/gtest.h>
 

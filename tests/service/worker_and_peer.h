@@ -11,7 +11,7 @@
 #include "common/wire/payload.h"
 #include "tests/support/random_image.h"
 #include "tests/support/renderers.h"
-#include "worker/service.h"
+#include "worker/service/service.h"
 
 namespace slabstream {
 
@@ -117,11 +117,11 @@ class WorkerAndPeer : public testing::Test {
   Context context_;
   Socket control_, voxels_, images_, to_worker_;
   std::unique_ptr<WorkerService> worker_;
-  std::string identity_;  // of the worker's control connection
+  std::string identity_;  // the identity of the worker's control connection
   std::string worker_images_, peer_images_;
   std::uint64_t memory_scope_ = 0;  // the worker's
   std::uint64_t peer_scope_ = 0;    // the same, unless a test makes it another host's
-  Bytes payload_;                   // of the message that Await returned
+  Bytes payload_;                   // the payload of the message that Await returned
 };
 
 }  // namespace slabstream

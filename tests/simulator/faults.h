@@ -21,7 +21,7 @@ struct Faults {
   double fail_render = 0;  // share of renders, chunks, combines
   double damage_chunk = 0;
   double fail_combine = 0;
-  double fail_load = 0;  // of datasets
+  double fail_load = 0;  // share of loads of datasets
   double slow = 0;       // share of workers that take `slowness` times as long, until the world heals
   double slowness = 1;
   double without_memory = 0;  // share of workers that have no memory for large frames, until the world heals
@@ -35,17 +35,17 @@ struct Faults {
   int coordinator_restarts = 0;
   int worker_pauses = 0, coordinator_pauses = 0;
   int suspensions = 0;  // everybody pauses
-  int clock_jumps = 0;  // of the coordinator's clock, forward
+  int clock_jumps = 0;  // jumps of the coordinator's clock, forward
   double cancel = 0;    // share of requests
   double vanish = 0;    // share of clients
   // ---- stores, of volumes that are read in parts, until the world heals
   double slow_read = 0;   // share of reads that take seconds
-  double lost_read = 0;   // that never end
-  double fail_read = 0;   // that fail; another one may not
+  double lost_read = 0;   // share of reads that never end
+  double fail_read = 0;   // share of reads that fail; another one may not
   double bad_blocks = 0;  // share of blocks that are damaged, for whoever reads them
   // ---- files
-  int file_changes = 0;  // of the volume's
-  int data_orders = 0;   // of a client that is an admin
+  int file_changes = 0;  // changes of the volume's file
+  int data_orders = 0;   // orders of a client that is an admin
   // ---- hostile peers (hostile_peer.h)
   int hostile_clients = 0;
   int strangers = 0;        // have a connection for workers, and are none

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 #include "common/wire/any_message.h"
 #include "tests/simulator/tally.h"
 
@@ -19,7 +19,7 @@ class FrameWitness {
   // Without faults more must hold.
   FrameWitness(bool faultless, Tally& tally) : faultless_(faultless), tally_(tally) {}
 
-  void OnRestart();  // of the coordinator: it knows of no frame
+  void OnRestart();  // the coordinator has restarted: it knows of no frame
   void OnAssignment(const GroupAssignment& assignment, std::size_t workers, int teams);
   void OnPing(const Ping& ping);
   void OnGroupDone(const GroupDone& done);
@@ -34,12 +34,12 @@ class FrameWitness {
     FrameSetup setup;
     std::map<std::uint32_t, std::vector<BoxId>> groups;
     std::map<BoxId, Box> boxes;
-    WorkerId display = 0;                             // of this attempt
+    WorkerId display = 0;                             // the display worker of this attempt
     std::set<std::uint32_t> handed_out;               // groups of this attempt
     std::map<WorkerId, std::uint32_t> done;           // groups that a display worker has said are done: the first so many
     std::set<std::pair<WorkerId, Box>> padded_boxes;  // who needed which voxels
     std::map<BoxId, OcclusionMask> left_out;          // what masks hide of each box, in any attempt
-    std::set<BoxId> outside;                          // of the picture, and so not read
+    std::set<BoxId> outside;                          // boxes outside the picture, which are not read
     bool all_cached = true;                           // when it was handed out, workers held all voxels that it needs
     bool over = false;
     std::size_t unfinished() const {  // handed out, and not done as the display worker sees it
@@ -53,7 +53,7 @@ class FrameWitness {
 
   const bool faultless_;
   Tally& tally_;
-  std::map<FrameId, SeenFrame> frames_;         // of this epoch
+  std::map<FrameId, SeenFrame> frames_;         // the frames of this epoch
   std::map<BoxId, Box> last_boxes_;             // as they were handed out last
   std::set<std::pair<WorkerId, Box>> fetched_;  // voxels that workers hold for sure
 };

@@ -95,8 +95,7 @@ ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
       add.description.geometry.size = Uniform(random_.Integer(1, kMaxVolumeSide));
       return add;
     }
-    case 12: return PrefetchQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
-    case 13: return ViewQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
+    case 12: return ViewQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
     default: return SampleQuery{.nonce = Number(), .dataset = random_.Chance(0.5) ? "volume" : "nonesuch", .points = {{1, 2, 3}}};
   }
 }

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 #include "common/wire/any_message.h"
 #include "tests/support/random.h"
 
@@ -20,7 +20,7 @@ class HostileWords {
   explicit HostileWords(Random& random) : random_(random) {}
 
   struct Speaker {
-    Epoch epoch = 0;  // of the coordinator
+    Epoch epoch = 0;  // the coordinator's epoch
     WorkerId worker = 0;
     Incarnation incarnation = 0;  // 0: it is no worker
     std::uint32_t node = 0;

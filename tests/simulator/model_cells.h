@@ -17,7 +17,7 @@ class ModelCells {
  public:
   explicit ModelCells(std::uint64_t seed) : seed_(seed) {}
 
-  // Of every fourth world the dataset is a grid.
+  // The dataset is a grid in every fourth world.
   bool present() const { return Draw({}) % 4 == 0; }
   // 1 to 3 chunks; always the same of a box of a dataset.
   std::uint64_t BytesOf(DatasetId dataset, const Box& box) const {

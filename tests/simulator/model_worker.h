@@ -13,11 +13,11 @@
 #include "tests/simulator/model_cells.h"
 #include "tests/simulator/tally.h"
 #include "tests/support/symbolic_images.h"
-#include "worker/worker_machine.h"
+#include "worker/machine/worker_machine.h"
 
 namespace slabstream {
 
-inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // of the only volume
+inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // the type of the only volume
 
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds
@@ -42,7 +42,7 @@ class ModelWorker {
   void TakeMemory() { has_memory_ = false; }  // for large frames
   void Heal() { slowness_ = 1, has_memory_ = true; }
 
-  // As in Conditions.
+  // As Conditions::Begin.
   WorkCost Begin(Job& job);
   WorkerEvent Answer(Job& job);
   void Perform(const OpenBox& action);
@@ -63,7 +63,7 @@ class ModelWorker {
   };
   using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
   struct ModelBox {
-    std::map<Box, std::set<std::uint32_t>> chunks;  // of voxels, stored, by box
+    std::map<Box, std::set<std::uint32_t>> chunks;  // stored chunks of voxels, by box
     std::set<std::uint32_t> cell_chunks;            // stored
     std::vector<OpenBox::Copy> copied;
     bool rendered = false;
@@ -101,7 +101,7 @@ class ModelWorker {
   };
   std::map<ImageHandle, Rendering> rendering_;   // begun and not ended, paused or not
   std::map<ImageHandle, OcclusionMask> hidden_;  // found, and not yet told
-  std::map<BoxKey, ModelBox> boxes_;             // that are open
+  std::map<BoxKey, ModelBox> boxes_;             // boxes that are open
   std::map<ChunkName, Outstanding> requested_;   // and not yet stored, as the credit counts
 };
 

@@ -20,7 +20,7 @@ class FaultyNetwork {
   FaultyNetwork(Random& random, const Faults& faults, Duration latency, Tally& tally)
       : random_(random), faults_(faults), latency_(latency), tally_(tally) {}
 
-  // Of a message that leaves now.
+  // When a message that leaves now arrives.
   Arrivals Send(const Link& link, double now) {
     Arrivals arrivals;
     if (!calm_ && random_.Chance(faults_.lose)) {

@@ -79,7 +79,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
     world.policy.balance = one_of(Balances());
   }
   world.policy.combine = RandomCombining(random);
-  if (random.Chance(0.1)) world.policy.decomposition = world.policy.assignment = world.policy.combine = kAutomatic;
+  if (random.Chance(0.1)) world.policy.combine.clear();
   if (random.Chance(0.3)) world.policy.teams = random.Integer(2, 4);
   return world;
 }

@@ -28,7 +28,7 @@ struct SimulatedWorld {
 // `cells`: whether the volume is a grid's.
 SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells);
 
-// Of the world's volume, "volume".
+// A request for the world's volume, "volume".
 SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms);
 
 }  // namespace slabstream

@@ -425,7 +425,6 @@ void Simulation::Perform(const CountDataset& action) {
 // Plans come late, and not always in the order in which they were asked for.
 void Simulation::Perform(const PlanRequest& action) {
   Planned planned{action.plan, planner_->Plan(action)};
-  planner_->Choose(action.client, {});
   if (random_.Chance(current_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
   service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), std::move(planned));
 }

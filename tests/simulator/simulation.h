@@ -9,8 +9,8 @@
 //   where only stores misbehave, errors say which store, and why
 //   no image is left, read after its release or released twice; no padded box is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, but for one of each other client, nor of one frame with masks
-//   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is finished, as long
-//   as a worker is there all the time
+//   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is
+//     finished, as long as a worker is there all the time
 //   where everybody stops at once, or the coordinator's clock jumps, and nothing else: no frame needs a second attempt
 //   where workers only leave with notice, and have the time for it: no box of a frame is rendered twice
 //   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
@@ -28,8 +28,8 @@
 #include <utility>
 #include <vector>
 
-#include "coordinator/dataset_machine.h"
-#include "coordinator/planner.h"
+#include "coordinator/datasets/dataset_machine.h"
+#include "coordinator/planner/planner.h"
 #include "simulator/conditions.h"
 #include "simulator/simulated_service.h"
 #include "tests/simulator/faults.h"
@@ -158,14 +158,14 @@ class Simulation : private Conditions {
   bool workerless_ = false;     // for a moment no worker was running
   const ModelCells cells_;
   const SimulatedWorld world_;
-  int most_teams_ = world_.policy.teams;  // that a client, which may be hostile, has asked for: each has a window of its own
+  int most_teams_ = world_.policy.teams;  // teams that a client, which may be hostile, has asked for: each has a window of its own
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;
-  std::optional<Planner> planner_;          // of the coordinator
-  std::optional<DatasetMachine> datasets_;  // likewise
-  Time datasets_wake_;                      // that was planned last
-  Epoch epoch_ = 0;                         // of the coordinator
+  std::optional<Planner> planner_;          // the coordinator's planner
+  std::optional<DatasetMachine> datasets_;  // the coordinator's second machine
+  Time datasets_wake_;                      // the wake-up that was planned last
+  Epoch epoch_ = 0;                         // the coordinator's epoch
   std::deque<ModelWorker> workers_;         // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
   std::set<Node> told_dead_;                      // workers whose death the sockets notice
@@ -177,7 +177,7 @@ class Simulation : private Conditions {
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const FrameEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
-  DatasetId voxels_ = 1;  // that the volume's file holds now
+  DatasetId voxels_ = 1;  // the voxels that the volume's file holds now
   // The volume that the admin sends, and what the executor has stored of volumes.
   struct Sending {
     std::uint64_t nonce = 0, sent = 0, bytes = 0;
@@ -187,7 +187,7 @@ class Simulation : private Conditions {
   };
   std::map<UploadId, Stored> stored_;
   std::set<DatasetId> published_;  // by the voxel server
-  // Of a volume that is read in parts: who sees which version of its file, and from when on it is open there.
+  // Where a volume that is read in parts is open: who sees which version of its file there, and since when.
   std::map<std::pair<Node, std::uint64_t>, std::optional<double>> places_;
 };
 

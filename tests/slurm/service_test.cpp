@@ -7,11 +7,11 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "common/base/time.h"
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/slurm/cluster.h"
 
@@ -64,7 +64,7 @@ class SlurmTest : public EndToEndTest {
   // -1: the service does not answer.
   int WorkerCount() const {
     const ProgramResult status = cluster_->Run(Command({"status", "--json", "--service", ServiceFile("client")}));
-    return status.exit_status == 0 ? int(nlohmann::json::parse(status.out).at("workers").size()) : -1;
+    return status.exit_status == 0 ? int(Json::Parse(status.out).value().at("workers").size()) : -1;
   }
 
   void ExpectThePicture() const {

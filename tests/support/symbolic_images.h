@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "worker/worker_machine.h"
+#include "worker/machine/worker_machine.h"
 
 namespace slabstream {
 

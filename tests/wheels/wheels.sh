@@ -71,6 +71,7 @@ say "Commands"
 for program in slabstream slabstream-coordinator slabstream-worker slabstream-gateway; do
   [[ "$(in_root whole "$program" --version)" =~ (^| )"$(version)"$ ]] || fail "$program --version: $(in_root whole "$program" --version)"
 done
+in_root whole slabstream bench --list > /dev/null
 if complaint="$(in_root whole slabstream render ball.nrrd --local --size 0 -o none.png 2>&1)" || [[ $? != 2 ]]; then
   fail "slabstream render --size 0: $complaint"
 fi

@@ -1,5 +1,5 @@
 // Runs one group on several workers with symbols for pixels, messages in any order and some of them twice.
-#include "worker/group_run.h"
+#include "worker/machine/group_run.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // When images are packed, and that what is packed comes out again.
-#include "worker/image_packing.h"
+#include "worker/service/image_packing.h"
 
 #include <gtest/gtest.h>
 

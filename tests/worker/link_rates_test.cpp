@@ -1,5 +1,5 @@
 // Rates of links, from sent bytes and answers alone.
-#include "worker/link_rates.h"
+#include "worker/machine/link_rates.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/base/shared_arena.h"
+#include "common/memory/shared_arena.h"
 #include "tests/worker/worker_machine_fixture.h"
 
 namespace slabstream {

@@ -8,7 +8,7 @@
 #include "common/volume/memory_budget.h"
 #include "tests/support/random.h"
 #include "tests/worker/worker_machine_fixture.h"
-#include "worker/render_queue.h"
+#include "worker/machine/render_queue.h"
 
 namespace slabstream {
 namespace {

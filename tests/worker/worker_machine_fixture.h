@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "worker/worker_machine.h"
+#include "worker/machine/worker_machine.h"
 
 namespace slabstream {
 

@@ -2,7 +2,7 @@
 import { toggle } from "./controls";
 import { h } from "./dom";
 import { offered, words } from "./offers";
-import type { Options } from "./options";
+import type { Options } from "./api";
 import type { State } from "./state";
 
 const MOST_TITLE = 120;

@@ -4,15 +4,10 @@ import { project } from "./camera";
 import { put, shown as text, svg } from "./dom";
 import { BOX_EDGES, cornersOfBox } from "./measure";
 import type { DrawnMeasure } from "./measuring";
-import type { Shown } from "./pane";
 import type { Geometry } from "./session";
+import { pageGeometry, type Shown } from "./shown";
 import { AXES, AXIS_NAMES, dot, sub, type Vec3 } from "./vec";
 import { unitName } from "./volume";
-
-// The geometry in pixels of the page.
-export function pageGeometry({ frame: { header }, cssWidth }: Shown): Geometry {
-  return { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / cssWidth };
-}
 
 // Whether dark lines stand out better on it (WCAG 2.2, relative luminance).
 function isLight([r, g, b]: readonly [number, number, number, number]): boolean {
@@ -58,13 +53,13 @@ function axesMarker(geometry: Geometry, height: number): SVGElement {
   }));
 }
 
-// As radiologists name the edges: of oblique views the nearest side first, and those within 10 degrees of a right angle left out.
+// The name of an edge, as radiologists give it: in oblique views the nearest side comes first, and sides within 10 degrees of a right angle are left out.
 function sideName(direction: Vec3): string {
   const sides = ["RL", "AP", "SI"].map((pair, i) => ({ name: pair[(direction[i] as number) > 0 ? 0 : 1] as string, share: Math.abs(direction[i] as number) }));
   return sides.filter(side => side.share > Math.sin(Math.PI / 18)).sort((a, b) => b.share - a.share).slice(0, 2).map(side => side.name).join("");
 }
 
-// Of the left, right, upper and lower edge.
+// The names of the left, right, upper and lower edge.
 function sideNames({ right, up }: Geometry): readonly string[] {
   const opposite = (v: Vec3): Vec3 => [-v[0], -v[1], -v[2]];
   return [opposite(right), right, up, opposite(up)].map(sideName);

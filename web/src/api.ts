@@ -1,7 +1,8 @@
 // Requests to the gateway, relative to the page's address, so that it works below any path.
 import type { BoxStatistics, Profile } from "./measure";
-import type { Options } from "./options";
 import type { Vec3 } from "./vec";
+
+export type Options = Record<string, unknown>; // by the names of the command line
 
 export class ApiError extends Error {
   constructor(readonly status: number, message: string) { super(message); }
@@ -16,7 +17,7 @@ export interface Dataset {
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
 export interface LabelStatistics {
-  unit: string; // of volumes
+  unit: string; // that volumes are counted in
   labels: { value: number; name: string; volume: number; mean: number | null; deviation: number | null; least: number | null; largest: number | null }[];
 }
 export interface LabelName { value: number; name: string; color?: string }

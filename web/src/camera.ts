@@ -1,6 +1,5 @@
 // The view: where one stands, by the definitions of docs/rendering.md, and how gestures move it.
 import type { Geometry } from "./session";
-import type { State } from "./state";
 import { add, clamp, dot, length, rounded, roundedPoint, scale, sub, type Vec3 } from "./vec";
 
 const DEGREE = Math.PI / 180;
@@ -20,15 +19,21 @@ export const OTHER_SIDES: readonly Side[] = [
 ];
 export const sidesOf = (world: string | undefined): readonly Side[] => (world === "patient" ? PATIENT_SIDES : OTHER_SIDES);
 
+export interface Viewpoint {
+  azimuth: number; // degrees
+  elevation: number;
+  roll: number;
+  zoom: number;
+  lookAt: Vec3 | null; // null: the middle of what shows (the service's `fit`)
+}
+
 // Where a view begins: the service's default view (common/view/default_view.h).
-type Start = Pick<State, "azimuth" | "elevation">;
+type Start = Pick<Viewpoint, "azimuth" | "elevation">;
 export const PATIENT_START: Start = { azimuth: 180, elevation: 0 };
 export const startOf = (world: string): Start => (world === "patient" ? PATIENT_START : { azimuth: 30, elevation: 20 });
 
-type View = Pick<State, "azimuth" | "elevation" | "roll" | "zoom" | "lookAt">;
-
 // Directions of the world to the right, upwards and away from the viewer.
-export function axesOf({ azimuth, elevation, roll }: View): { right: Vec3; up: Vec3; forward: Vec3 } {
+export function axesOf({ azimuth, elevation, roll }: Viewpoint): { right: Vec3; up: Vec3; forward: Vec3 } {
   const a = azimuth * DEGREE, e = elevation * DEGREE, r = roll * DEGREE;
   const right: Vec3 = [Math.cos(a), Math.sin(a), 0];
   const up: Vec3 = [-Math.sin(e) * Math.sin(a), Math.sin(e) * Math.cos(a), Math.cos(e)];
@@ -40,27 +45,27 @@ export function axesOf({ azimuth, elevation, roll }: View): { right: Vec3; up: V
 const angle = (degrees: number): number => rounded(180 - ((((180 - degrees) % 360) + 360) % 360), 6);
 
 // Turns by degrees to the right and upwards in the picture, for any roll.
-export function orbited(view: View, rightwards: number, upwards: number): Partial<State> {
+export function orbited(view: Viewpoint, rightwards: number, upwards: number): Partial<Viewpoint> {
   const r = view.roll * DEGREE;
   const across = rightwards * Math.cos(r) - upwards * Math.sin(r), along = rightwards * Math.sin(r) + upwards * Math.cos(r);
   return { azimuth: angle(view.azimuth - across), elevation: rounded(clamp(view.elevation - along, -90, 90)) };
 }
 
 // Moves what is seen by pixels of a picture in which one is `pixelSize` wide.
-export function panned(view: View, x: number, y: number, pixelSize: number): Partial<State> {
+export function panned(view: Viewpoint, x: number, y: number, pixelSize: number): Partial<Viewpoint> {
   if (!view.lookAt) return {};
   const { right, up } = axesOf(view);
   return { lookAt: roundedPoint(add(view.lookAt, add(scale(right, -x * pixelSize), scale(up, y * pixelSize)))) };
 }
 
 // Magnifies about a point, in pixels to the right of and below the picture's centre.
-export function zoomed(view: View, factor: number, x: number, y: number, pixelSize: number): Partial<State> {
+export function zoomed(view: Viewpoint, factor: number, x: number, y: number, pixelSize: number): Partial<Viewpoint> {
   const zoom = rounded(clamp(view.zoom * factor, ZOOM.least, ZOOM.most));
   const moved = 1 - view.zoom / zoom;
   return { zoom, ...panned(view, -x * moved, -y * moved, pixelSize) };
 }
 
-export const rolled = (view: View, degrees: number): Partial<State> => ({ roll: angle(view.roll + degrees) });
+export const rolled = (view: Viewpoint, degrees: number): Partial<Viewpoint> => ({ roll: angle(view.roll + degrees) });
 
 // The zoom of a view with `look-at` that shows the same as a picture made with `fit`.
 export function zoomOf(geometry: Geometry, width: number, height: number, extent: Vec3): number {

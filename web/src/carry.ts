@@ -9,7 +9,7 @@ import type { Volume } from "./volume";
 const inside = (p: Vec3, { low, high }: Volume): boolean => p.every((c, i) => c >= (low[i] as number) && c <= (high[i] as number));
 const overlap = ([a, b]: readonly [number, number], [c, d]: readonly [number, number]): boolean => a <= d && c <= b;
 
-// Of the state that a volume was seen with, what has to change for another one.
+// What has to change in the state that a volume was seen with, for another volume.
 export function carried(state: State, from: Volume, to: Volume): Partial<State> {
   const patch: Partial<State> = {};
   const sameWorld = from.world === to.world && from.unit === to.unit;

@@ -1,9 +1,8 @@
 // The clip box in the picture: its edges, and a handle on each face that moves it.
-import { pageGeometry } from "./annotations";
 import { project } from "./camera";
 import { put, svg } from "./dom";
 import { BOX_EDGES } from "./measure";
-import type { Shown } from "./pane";
+import { pageGeometry, type Shown } from "./shown";
 import type { Bounds, ClipBox } from "./state";
 import { AXES, type Axis, AXIS_NAMES, clamp, rounded, scale, add, type Vec3, withAxis } from "./vec";
 import type { Volume } from "./volume";
@@ -31,7 +30,7 @@ export class ClipHandles {
   private readonly edges = svg("path", { class: "clip-edges" });
   private readonly handles: SVGCircleElement[] = [];
   private readonly reaches: SVGCircleElement[] = [];
-  private last: readonly [number, number] = [0, 0]; // of the pointer that drags
+  private last: readonly [number, number] = [0, 0]; // where the pointer that drags was
   private shown: Shown | null = null;
   private box: ClipBox | null = null;
   private volume: Volume | null = null;
@@ -40,7 +39,7 @@ export class ClipHandles {
     this.element.append(this.edges);
     for (const axis of AXES) for (const end of [0, 1] as const) {
       const handle = svg("circle", { r: 7, class: `handle axis-${AXIS_NAMES[axis]}`, tabindex: 0, role: "slider", "aria-label": `Clip ${AXIS_NAMES[axis]} ${end === 0 ? "from" : "to"}` });
-      const reach = svg("circle", { r: 22, class: "reach" }); // of a finger
+      const reach = svg("circle", { r: 22, class: "reach" }); // where a finger counts
       for (const part of [reach, handle]) {
         part.addEventListener("pointerdown", event => { part.setPointerCapture(event.pointerId); this.last = [event.clientX, event.clientY]; event.preventDefault(); });
         part.addEventListener("pointermove", event => {

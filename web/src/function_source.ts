@@ -12,7 +12,7 @@ export class FunctionSource {
 
   constructor(private readonly context: Context, private readonly changed: () => void) {}
 
-  // As the service draws it, in data values.
+  // The function as the service draws it, in data values.
   current(): ColorMap {
     const { range } = this.context.store.state, map = this.unstretched();
     return range ? stretched(map, range) : map;

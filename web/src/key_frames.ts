@@ -5,7 +5,7 @@ import { download, h, shown } from "./dom";
 import { projectionOf } from "./options";
 import { type KeyFrame, MOST_KEY_FRAMES, type State } from "./state";
 
-// As `slabstream turntable --path` reads it.
+// The path as `slabstream turntable --path` reads it.
 export const pathOf = (state: State): object[] =>
   state.path.map(({ azimuth, elevation, roll, zoom, lookAt }) => ({ projection: projectionOf(state), azimuth, elevation, roll, zoom, "look-at": lookAt.join(",") }));
 

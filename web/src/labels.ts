@@ -27,7 +27,7 @@ export const isListed = (list: string, { value, name }: LabelName): boolean => l
 // The list of these of all labels, both in ascending order, with ranges where labels follow one another.
 export function listOf(shown: readonly LabelName[], all: readonly LabelName[]): string {
   const parts: [number, number][] = [];
-  let before = -2; // of the last one, its place among all
+  let before = -2; // the last one's place among all
   for (const label of shown) {
     const place = all.indexOf(label), last = parts[parts.length - 1];
     if (last && place === before + 1) last[1] = label.value; else parts.push([label.value, label.value]);
@@ -61,7 +61,7 @@ export class Labels {
     return isListed(labelsShown, label) && labelOpacities[label.value] !== 0;
   }
 
-  // Of the picture, if it is wanted.
+  // The legend of the picture, if it is wanted.
   legend(): readonly LegendEntry[] {
     const { legend, labels, renderer } = this.context.store.state;
     if (!legend || labels === "off" || !can("labels", renderer)) return [];

@@ -63,7 +63,7 @@ export function layersSection(context: Context, labels: Labels): HTMLElement {
     const [low, high] = given;
     store.update({ overlayRange: low !== null && high !== null && low !== undefined && high !== undefined && low < high ? [low, high] : null }, "overlay range");
   }));
-  let typed: (number | null)[] = [null, null]; // of a range, both count
+  let typed: (number | null)[] = [null, null]; // the ends of a range; both count
   const rangeRow = row("Values", h("span", { class: "pair" }, ...ends.map(end => end.input)));
   const weight = slider("Weight", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ overlayWeight: value }, "weight"));
   const hint = h("p", { class: "hint" });

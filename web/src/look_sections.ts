@@ -10,7 +10,7 @@ import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
-// Those that draw cells come before the others, and only for datasets that have cells.
+// Renderers that draw cells come before the others, and only for datasets that have cells.
 function rendererChoices(cells: boolean): (readonly [string, string])[] {
   const [drawCells, others] = [true, false].map(draws => renderers().filter(each => each.abilities.includes("cells") === draws));
   const named = [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);

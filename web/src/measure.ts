@@ -35,10 +35,10 @@ export function cornersOfBox({ points }: Measure): Vec3[] {
   return [0, 1, 2, 3, 4, 5, 6, 7].map(i => [i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]] as const);
 }
 
-// Of corners whose numbers have a bit for each axis.
+// Edges between corners, whose numbers have a bit for each axis.
 export const BOX_EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]] as const;
 
-// As the gateway's `statistics` takes it.
+// The box as the gateway's `statistics` takes it.
 export function boxRange({ points }: Measure): string {
   const [low, high] = points as readonly [Vec3, Vec3];
   return [0, 1, 2].map(i => `${low[i] as number}:${high[i] as number}`).join(",");

@@ -10,7 +10,7 @@ type Answer = { profile: Profile } | { statistics: BoxStatistics } | { error: st
 
 export class Measuring {
   tool: MeasureKind | null = null;
-  points: readonly Vec3[] = []; // of the measurement that has begun
+  points: readonly Vec3[] = []; // points of the measurement that has begun
   private ahead: Vec3 | null = null; // below the pointer: where the next point would be
   private readonly answers = new Map<string, Answer | null>(); // null: it is asked
   private readonly listeners: (() => void)[] = [];

@@ -1,11 +1,11 @@
 // The window for a movie of one turn, which the gateway makes while the page reads it.
-import { type Api, ApiError } from "./api";
+import { type Api, ApiError, type Options } from "./api";
 import { annotationFields } from "./annotation_fields";
 import { button, row, segmented } from "./controls";
 import { dialog } from "./dialogs";
 import { bytes, copyText, download, h } from "./dom";
 import { pathOf } from "./key_frames";
-import { type Options, renderOptions } from "./options";
+import { renderOptions } from "./options";
 import type { State } from "./state";
 
 const FRAMES = { usual: 120, most: 1000 } as const, FPS = { usual: 25, most: 120 } as const;
@@ -16,7 +16,7 @@ const even = (side: number): number => Math.max(16, Math.round(side / 2) * 2);
 // Counts the frames of an MP4 stream, in which each has a box "moof" of its own.
 class FrameCounter {
   frames = 0;
-  private head: number[] = []; // of the next box: 4 bytes of size, 4 of type
+  private head: number[] = []; // the next box's first bytes: 4 of size, 4 of type
   private skip = 0; // bytes of the box that are still to come
 
   add(part: Uint8Array): void {

@@ -18,8 +18,8 @@ export class Notices {
   private service: ServiceStatus | null = null;
   private error = "";
   private phase = "";
-  private done = 0; // of the phase, as a share
-  private parts = ""; // of the picture: how many are drawn
+  private done = 0; // how much of the phase is done, as a share
+  private parts = ""; // how many parts of the picture are drawn
   private slow = 0; // the timer of a phase; it shows once it has lasted
   private lasts = false;
 

@@ -22,7 +22,7 @@ export const offered = (group: string): readonly Offer[] => ofPictures.filter(ea
 export const renderers = (): readonly Renderer[] => offers.get("renderer")?.renderers ?? [];
 export const titleOf = ({ title }: Renderer): string => title.charAt(0).toUpperCase() + title.slice(1);
 
-// Of an option that is a number.
+// The limits of an option that is a number.
 export function limitsOf(name: string): readonly [number, number] {
   const offer = offers.get(name);
   return [offer?.above ?? offer?.min ?? -Infinity, offer?.max ?? Infinity];
@@ -75,7 +75,7 @@ export function parametersOf(renderer: string): readonly Offer[] {
   return Object.entries(own).flatMap(([parameter, standard]) => { const offer = offers.get(parameter); return offer ? [{ ...offer, default: standard }] : []; });
 }
 const allParameters = (): ReadonlySet<string> => new Set(renderers().flatMap(each => Object.keys(each.parameters)));
-// Those among the texts that `given` has under their names, if the service takes them.
+// Texts of parameters that `given` has under their names, if the service takes them.
 export function parametersIn(given: { get(name: string): string | null }): Record<string, string> {
   const isTaken = (name: string, value: string): boolean => {
     const [low, high] = limitsOf(name), choices = choicesOf(name), number = Number(value);

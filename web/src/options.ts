@@ -1,11 +1,10 @@
 // The state as options of the gateway, which are those of the command line.
+import type { Options } from "./api";
 import { boxText, slopeText } from "./link";
 import { can, fitting, hasLayer, hasRegions, parametersOf } from "./offers";
 import { ONE_COLOR, type State } from "./state";
 import { rampTo, toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
-
-export type Options = Record<string, unknown>;
 
 const WHOLE_RANGE = "0%:99.9%"; // a few bright voxels darken nothing
 
@@ -40,10 +39,10 @@ function overlayOptions(state: State): Options {
   return options;
 }
 
-// That the renderer draws.
+// The projection that the renderer draws.
 export const projectionOf = ({ projection, renderer }: State): State["projection"] => (can("perspective", fitting(renderer)) ? projection : "orthographic");
 
-// Of the picture, without its size.
+// The options of the picture, without its size.
 export function renderOptions(state: State): Options {
   const renderer = fitting(state.renderer);
   const options: Options = {

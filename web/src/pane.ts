@@ -3,8 +3,7 @@ import { Drawing } from "./annotations";
 import { h, put } from "./dom";
 import { LevelBadge } from "./level_badge";
 import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
-
-export interface Shown { frame: Frame; cssWidth: number; cssHeight: number } // cssWidth: what the picture's width is on the page
+import type { Shown } from "./shown";
 
 export interface PaneEvents {
   drawn?(shown: Shown): void;

@@ -3,7 +3,7 @@ import { ApiError, type LabelName, type Value } from "./api";
 import type { Context } from "./context";
 import { h, shown } from "./dom";
 import { renderOptions } from "./options";
-import type { Shown } from "./pane";
+import type { Shown } from "./shown";
 import { rounded, type Vec3 } from "./vec";
 import { unitName } from "./volume";
 

@@ -182,7 +182,7 @@ export class RegionEditor {
     if (this.region) this.change({ corners: this.region.corners.map((old, i) => (i === corner ? { ...old, ...to } : old)) }, `corner ${corner}`);
   }
 
-  // As it looks in the plot: `up` is a share of its height. No corner goes below 0.
+  // Moves a region in the plot: `up` is a share of the plot's height. No corner goes below 0.
   private moveRegion(corners: readonly Corner[], right: number, up: number): void {
     const scale = this.scale(), rise = Math.max(up, -scale.share(boundsOf(corners).least));
     this.change({ corners: corners.map(({ value, slope }) => ({ value: rounded(value + right), slope: scale.slope(scale.share(slope) + rise) })) }, "moves");

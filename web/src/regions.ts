@@ -5,7 +5,7 @@ export interface Corner { value: number; slope: number } // slopes are data valu
 export interface Region { corners: readonly Corner[]; r: number; g: number; b: number; opacity: number; softness: number } // all but corners from 0 to 1
 export const MOST_REGIONS = 16, MOST_CORNERS = 32, FEWEST_CORNERS = 3;
 
-export interface Bounds { low: number; high: number; least: number; most: number } // of values, of slopes
+export interface Bounds { low: number; high: number; least: number; most: number } // low and high of values, least and most of slopes
 export function boundsOf(corners: readonly Corner[]): Bounds {
   const values = corners.map(corner => corner.value), slopes = corners.map(corner => corner.slope);
   return { low: Math.min(...values), high: Math.max(...values), least: Math.min(...slopes), most: Math.max(...slopes) };

@@ -1,6 +1,5 @@
 // One stream of pictures: a WebSocket of docs/http.md with one view that changes. It connects again by itself.
-import type { Dataset } from "./api";
-import type { Options } from "./options";
+import type { Dataset, Options } from "./api";
 import type { Vec3 } from "./vec";
 
 export interface Geometry {

@@ -1,12 +1,12 @@
 // Three slices beside the 3-D picture. Their cross-hair is one point of the world.
-import { pageGeometry } from "./annotations";
 import { unproject } from "./camera";
 import type { Context } from "./context";
 import { h } from "./dom";
 import type { Measuring } from "./measuring";
 import { sliceOptions } from "./options";
-import { Pane, type Shown } from "./pane";
+import { Pane } from "./pane";
 import type { Part } from "./saving";
+import { pageGeometry, type Shown } from "./shown";
 import { add, clamp, dot, rounded, roundedPoint, scale, type Vec3 } from "./vec";
 import type { Volume } from "./volume";
 

@@ -1,5 +1,5 @@
 // What the page shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
-import { PATIENT_START } from "./camera";
+import { PATIENT_START, type Viewpoint } from "./camera";
 import type { Measure } from "./measure";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -10,24 +10,18 @@ export type Bounds = readonly [number | null, number | null]; // null: not clipp
 export type ClipBox = readonly [Bounds, Bounds, Bounds];
 export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
 
-export interface KeyFrame { azimuth: number; elevation: number; roll: number; zoom: number; lookAt: Vec3 }
+export interface KeyFrame extends Viewpoint { lookAt: Vec3 }
 
 export const MOST_KEY_FRAMES = 100;
 
 export const ONE_COLOR = "one-color"; // instead of a preset: from clear to this colour
 
-export interface State {
+export interface State extends Viewpoint {
   dataset: string;
-  // The view
-  azimuth: number; // degrees
-  elevation: number;
-  roll: number;
-  zoom: number;
-  lookAt: Vec3 | null; // null: the middle of what shows (the service's `fit`)
   projection: "orthographic" | "perspective";
   // The look
   renderer: string;
-  parameters: Readonly<Record<string, string>>; // of renderers, by their names; those that are missing have their standard values
+  parameters: Readonly<Record<string, string>>; // parameters of renderers, by their names; those that are missing have their standard values
   shading: string;
   lights: readonly Vec3[]; // none: a light at the eye, or with shadows beside it
   shadows: number; // strengths
@@ -58,9 +52,9 @@ export interface State {
   window: number | null;
   level: number | null;
   measures: readonly Measure[];
-  path: readonly KeyFrame[]; // of a movie
+  path: readonly KeyFrame[]; // key frames of a movie
   // The page
-  legend: boolean; // of labels
+  legend: boolean; // the legend of labels
   marker: boolean;
   scaleBar: boolean;
   colorBar: boolean;

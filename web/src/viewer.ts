@@ -1,5 +1,4 @@
 // The 3-D picture: its view follows the state, gestures move it, the page's drawing lies over it.
-import { pageGeometry } from "./annotations";
 import { zoomOf } from "./camera";
 import { ClipHandles } from "./clip_handles";
 import type { Context } from "./context";
@@ -9,9 +8,10 @@ import type { Labels } from "./labels";
 import type { Measuring } from "./measuring";
 import { can } from "./offers";
 import { projectionOf, renderOptions } from "./options";
-import { Pane, type PaneEvents, type Shown } from "./pane";
+import { Pane, type PaneEvents } from "./pane";
 import type { Pointed } from "./pointed";
 import type { Part } from "./saving";
+import { pageGeometry, type Shown } from "./shown";
 import type { State } from "./state";
 import { visibleRangeOf } from "./transfer";
 import { rounded, roundedPoint, type Vec3 } from "./vec";

@@ -40,5 +40,5 @@ export function steepestOf(volume: Volume | null): number {
 export const STEEP = 0.25; // share of it that is steep: there plots of slopes end, unless it is known better
 export const slopeUnit = (volume: Volume | null): string => `data values per ${volume ? unitName(volume.unit).replace(/s$/, "") : "unit"}`;
 
-// As it stands behind a number: "mm", "µm", or if the file states none, "voxels" or "units".
+// A unit as it stands behind a number: "mm", "µm", or if the file states none, "voxels" or "units".
 export const unitName = (unit: string): string => (unit === "voxel" ? "voxels" : unit === "unknown" || unit === "" ? "units" : unit);

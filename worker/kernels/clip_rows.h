@@ -17,7 +17,7 @@ struct LinearInRow {
 // Values g that grow with the depth along a ray: the depth, or with perspective -1 / depth.
 struct RegionRow {
   bool perspective = false;
-  double start = 0, end = 0;                      // of depths 0 and kNeverMet
+  double start = 0, end = 0;                      // g at the depths 0 and kNeverMet
   std::vector<LinearInRow> entered, left, never;  // g of the sides that rays enter and leave; rays where a `never` is negative miss it
 };
 

@@ -52,7 +52,7 @@ struct FaceProjection {
   // Perspective: the vector from the eye to the centre of the first face, and the change of a ray's direction per pixel, along the normal
   // axis a, u and v.
   int a = 0, u = 1, v = 2;
-  float sign = 1;  // of the side: faces are seen where sign * (centre - eye) < 0 along a
+  float sign = 1;  // the side's sign: faces are seen where sign * (centre - eye) < 0 along a
   float eye_a = 0, eye_u = 0, eye_v = 0;
   float ray_x_a = 0, ray_x_u = 0, ray_x_v = 0, ray_y_a = 0, ray_y_u = 0, ray_y_v = 0;
 };

@@ -13,12 +13,12 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 
 namespace slabstream {
 
 inline constexpr int kPhaseBits = 7, kPhases = 1 << kPhaseBits;
-inline constexpr std::int32_t kLeastPaddedTaps = 4;  // of four channels: 16 floats, the widest vector
+inline constexpr std::int32_t kLeastPaddedTaps = 4;  // taps of four channels, 16 floats: the widest vector
 
 struct FootprintTable {
   double radius = 0;             // voxels

@@ -13,7 +13,7 @@
 namespace slabstream {
 
 inline constexpr int kNormalGrid = 181;
-inline constexpr std::uint16_t kNoGradient = kNormalGrid * kNormalGrid;  // of voxels whose gradient is zero or not finite
+inline constexpr std::uint16_t kNoGradient = kNormalGrid * kNormalGrid;  // the code of voxels whose gradient is zero or not finite
 inline constexpr int kNormalCodes = kNoGradient + 1;
 
 // Code of the line along (x, y, z), of any length. Without branches: it runs over whole rows.

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <span>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/kernels/phong_table.h"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/kernels/phong_table.h"
 #include "worker/kernels/voxel_record.h"
 
@@ -33,11 +33,11 @@ struct OctetShares {
 
 // An octet with at least one occupied voxel.
 struct OctetWork {
-  const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
+  const VoxelRecord* records = nullptr;  // its occupied voxels, in order
   float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 for empty voxels
   std::uint32_t occupied = 0;            // bit i: voxel i
   float slope = 0, across = 1;           // s of voxel 0, and 1 + t^2. One level: not read
-  const OctetShares* shares = nullptr;   // of all octets of a call, or of none
+  const OctetShares* shares = nullptr;   // its shares; either all octets of a call have some, or none
 };
 
 // slope_step: from voxel to voxel.

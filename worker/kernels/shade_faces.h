@@ -37,7 +37,7 @@ struct FaceShading {
 
   const FrameLight::View* frame_light = nullptr;  // shadows and ambient occlusion; null: there are none
 
-  std::uint32_t bricks_x = 0, bricks_y = 0;  // of the whole volume, for FaceIndex
+  std::uint32_t bricks_x = 0, bricks_y = 0;  // bricks of the whole volume, for FaceIndex
 };
 
 FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const Index3& volume_size);

@@ -15,8 +15,9 @@ namespace slabstream {
 
 // out[i] = sum over n < padded_taps of weight(phase(i), n) * voxels[first(i) + n], for the samples i of the segments in `wanted`; RGBA.
 struct BeamWork {
-  const float* voxels = nullptr;        // of voxel 0 of the volume's beam; only voxels that taps reach are read; they must be finite
-  float* out = nullptr;                 // of the row's first pixel, 64-byte aligned
+  // Points to voxel 0 of the volume's beam; only voxels that taps reach are read; they must be finite.
+  const float* voxels = nullptr;
+  float* out = nullptr;                 // points to the row's first pixel, 64-byte aligned
   const SegmentWord* wanted = nullptr;  // `words` words
   std::int32_t words = 0;
   std::int32_t first_sample = 0;  // the sample of the row's first pixel
@@ -32,7 +33,7 @@ struct RowWork {
   const float* weights = nullptr;
   const float* const* beams = nullptr;         // [taps]: filtered beams, of the row's first pixel, 64-byte aligned
   const SegmentWord* const* filled = nullptr;  // [taps][words]: segments of the beam that hold something; others are not read
-  float* accumulated = nullptr;                // of the row's first pixel, 64-byte aligned
+  float* accumulated = nullptr;                // points to the row's first pixel, 64-byte aligned
   SegmentWord* open = nullptr;                 // [words]
   std::int32_t words = 0;
   const float* opaque_alpha = nullptr;  // [words * kWordSegments]; above 1: never

@@ -9,10 +9,10 @@
 
 namespace slabstream {
 
-inline constexpr int kSides = 6;              // of a cell: 2 * axis + (1: towards higher indices)
+inline constexpr int kSides = 6;              // sides of a cell: 2 * axis + (1: towards higher indices)
 inline constexpr int kFaceBrick = 16;         // kBrick (volume.h), which FaceIndex spells in bits
-inline constexpr int kBinBits = 12;           // of FaceSite::bin_and_side
-inline constexpr int kNormalBits = 10;        // of a component of a packed normal
+inline constexpr int kBinBits = 12;           // the bin's bits in FaceSite::bin_and_side
+inline constexpr int kNormalBits = 10;        // bits of one component of a packed normal
 inline constexpr float kNormalUnit = 511.0F;  // length of a packed unit normal
 
 struct FaceSite {

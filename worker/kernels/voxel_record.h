@@ -6,7 +6,7 @@
 namespace slabstream {
 
 struct VoxelRecord {
-  std::uint16_t bin;     // of the classification table
+  std::uint16_t bin;     // the bin in the classification table
   std::uint16_t normal;  // normal_code.h
 };
 

@@ -5,8 +5,6 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,8 +13,9 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/classification/region_table.h"
+#include "common/memory/aligned_buffer.h"
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 
 #ifndef SLABSTREAM_WORKER_LIGHT_EXTINCTION_CPP_  // shared by all instruction sets
@@ -221,7 +220,7 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
   Extinction extinction{.size = size, .spacing = light.spacing, .each = UnwrittenVector<float>(CountIn(size))};
   VisitScalarType(values.type, [&]<class T>(const T*) {
     const T* const samples = values.samples<T>();
-    tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+    ParallelFor(0, size.z, [&](std::int32_t z) {
       const auto row_room = std::size_t(size.x + 2 * kRowMargin);
       std::vector<float> room(5 * row_room), found(row_room);
       const auto load = [&](std::size_t number, std::int32_t row_y, std::int32_t row_z) {

@@ -11,8 +11,8 @@
 // opacity without regions.
 #pragma once
 
-#include "common/base/unwritten_vector.h"
 #include "common/frame/frame_setup.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 

@@ -1,15 +1,14 @@
 #include "worker/light/frame_light.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-#include <list>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
 
+#include "common/base/lru_map.h"
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
 #include "worker/light/extinction.h"
@@ -48,10 +47,6 @@ struct Lit {
 // Of one volume under one transfer function. One thread at a time makes something of it.
 class Matter {
  public:
-  explicit Matter(MatterKey key) : key_(std::move(key)) {}
-
-  const MatterKey& key() const { return key_; }
-
   std::shared_ptr<const FrameLight> Of(const std::function<VoxelBlock()>& values, const FrameSetup& setup) {
     const std::lock_guard lock(mutex_);
     if (!extinction_) extinction_ = ExtinctionOf(values(), setup);
@@ -59,11 +54,7 @@ class Matter {
     const Lit lit = {shading.shadows > 0 ? Phong(shading, setup.camera.view_direction).lights() : std::vector<Vec3>{Vec3{}},
                      shading.shadows, shading.ambient_occlusion, shading.occlusion_radius,
                      !setup.sheets.empty() && setup.camera.traversal_axis == Axis::kX ? 1 : 0};
-    for (auto made = made_.begin(); made != made_.end(); ++made) {
-      if (made->first != lit) continue;
-      made_.splice(made_.begin(), made_, made);
-      return made_.front().second;
-    }
+    if (const auto* made = made_.Find(lit)) return *made;
     auto light = std::make_shared<FrameLight>();
     light->size = extinction_->size;
     light->lights = int(lit.lights.size());
@@ -87,8 +78,8 @@ class Matter {
       }
       Pack(reached, i, *light);
     }
-    made_.emplace_front(lit, light);
-    if (made_.size() > kMostMade) made_.pop_back();
+    made_.Put(lit, light);
+    made_.DropBeyond(kMostMade);
     return light;
   }
 
@@ -118,7 +109,7 @@ class Matter {
     const Index3& size = light.size;
     const Bytes255 all(std::size_t(size.x), 255);
     const auto row_of = [&](const Bytes255& shares, std::size_t voxel) { return shares.empty() ? all.data() : shares.data() + voxel; };
-    tbb::parallel_for(std::int32_t{0}, size.z + 1, [&](std::int32_t z) {
+    ParallelFor(0, size.z + 1, [&](std::int32_t z) {
       std::uint8_t* const slice = light.shares.data() + number * std::size_t(light.light) + std::ptrdiff_t{z} * light.stride[2];
       for (std::int32_t y = 0; y <= size.y; ++y) {
         const std::size_t row = NumberIn(size, {0, std::min(y, size.y - 1), std::min(z, size.z - 1)});
@@ -147,8 +138,8 @@ class Matter {
   std::optional<Extinction> extinction_;
   TurnedExtinction turned_;
   std::optional<std::pair<float, float>> open_of_;
-  Bytes255 open_;                                                      // empty: all is open
-  std::list<std::pair<Lit, std::shared_ptr<const FrameLight>>> made_;  // the latest first
+  Bytes255 open_;  // empty: all is open
+  LruMap<Lit, std::shared_ptr<const FrameLight>> made_;
 };
 
 // The latest looks. The oldest one goes.
@@ -158,19 +149,16 @@ class LightCache {
     constexpr std::size_t kMostLooks = 2;  // LightBytes counts as many
     MatterKey key = KeyOf(setup);
     const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find_if(looks_, [&](const auto& matter) { return matter->key() == key; });
-    if (found != looks_.end()) {
-      looks_.splice(looks_.begin(), looks_, found);
-    } else {
-      looks_.push_front(std::make_shared<Matter>(std::move(key)));
-      if (looks_.size() > kMostLooks) looks_.pop_back();
-    }
-    return looks_.front();
+    if (const auto* found = looks_.Find(key)) return *found;
+    const auto matter = std::make_shared<Matter>();
+    looks_.Put(std::move(key), matter);
+    looks_.DropBeyond(kMostLooks);
+    return matter;
   }
 
  private:
   std::mutex mutex_;
-  std::list<std::shared_ptr<Matter>> looks_;
+  LruMap<MatterKey, std::shared_ptr<Matter>> looks_;
 };
 
 }  // namespace

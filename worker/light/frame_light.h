@@ -7,8 +7,8 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/unwritten_vector.h"
 #include "common/frame/frame_setup.h"
+#include "common/memory/pooled_vector.h"
 #include "common/volume/grid_map.h"
 
 namespace slabstream {
@@ -16,7 +16,7 @@ namespace slabstream {
 // Two shares in 1/255 for each voxel of the light volume and each light: of the ambient light, and all light that surfaces scatter
 // (openness); and of this light (transmittance). There is one more voxel than the light volume has along each axis, like the one before.
 struct FrameLight {
-  Index3 size;  // of the light volume
+  Index3 size;  // the size of the light volume
   int lights = 0;
   // p, in voxels of the frame's volume, lies at scale * p + offset, clamped to [0, size - 1].
   std::array<float, 3> scale{}, offset{};

@@ -5,15 +5,14 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
+#include "common/parallel/parallel.h"
 #include "worker/light/exponential-inl.h"
 
 #ifndef SLABSTREAM_WORKER_LIGHT_OCCLUSION_CPP_  // shared by all instruction sets
@@ -128,7 +127,7 @@ Extinction Halved(const Extinction& fine, const Index3& halved) {
   Extinction coarse{.size = (fine.size + block - Uniform(1)) / block, .spacing = fine.spacing * ToVec3(block), .each = {}};
   coarse.each.resize(CountIn(coarse.size));
   const double length = std::cbrt(coarse.spacing.x * coarse.spacing.y * coarse.spacing.z);
-  tbb::parallel_for(std::int32_t{0}, coarse.size.z, [&](std::int32_t z) {
+  ParallelFor(0, coarse.size.z, [&](std::int32_t z) {
     AlignedVector<float> sums(std::size_t(fine.size.x + kRegister));
     float* out = coarse.each.data() + NumberIn(coarse.size, {0, 0, z});
     for (std::int32_t y = 0; y < coarse.size.y; ++y) {
@@ -233,14 +232,14 @@ void FindOpenness(const Extinction& extinction, double radius, const TakeOpennes
   const Index3& size = used->size;
   AlignedVector<float> open(CountIn(size) + std::size_t(kRegister));
   const std::size_t slice = std::size_t(size.x) * std::size_t(size.y);
-  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+  ParallelFor(0, size.z, [&](std::int32_t z) {
     AlignedVector<float> of_slice(slice + std::size_t(kRegister));
     HWY_DYNAMIC_DISPATCH(OpennessOfSlice)(padded, ways, z, of_slice.data());
     std::copy_n(of_slice.data(), slice, open.data() + std::size_t(z) * slice);
   });
 
   const std::array<Places, 3> places = PlacesOf(extinction.size, map, size);
-  tbb::parallel_for(std::int32_t{0}, extinction.size.z, [&](std::int32_t z) {
+  ParallelFor(0, extinction.size.z, [&](std::int32_t z) {
     AlignedVector<float> room(std::size_t(size.x + kRegister)), row(std::size_t(extinction.size.x + kRegister));
     const std::int32_t below_z = places[2].below[std::size_t(z)];
     for (std::int32_t y = 0; y < extinction.size.y; ++y) {

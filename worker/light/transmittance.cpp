@@ -5,14 +5,13 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
+#include "common/parallel/parallel.h"
 #include "worker/light/exponential-inl.h"
 
 #ifndef SLABSTREAM_WORKER_LIGHT_TRANSMITTANCE_CPP_  // shared by all instruction sets
@@ -141,7 +140,7 @@ void Run(const Sweep& sweep) {
   const double last = -(sweep.planes - 1) * sweep.shift_v;
   const std::int32_t begin = std::min(0, Floor(last)), end = std::max(0, Floor(last)) + sweep.nv;
   const std::int32_t bands = (end - begin + kBandRays - 1) / kBandRays;
-  tbb::parallel_for(std::int32_t{0}, bands, [&](std::int32_t band) {
+  ParallelFor(0, bands, [&](std::int32_t band) {
     HWY_DYNAMIC_DISPATCH(FollowBand)(sweep, begin + band * kBandRays, std::min(begin + (band + 1) * kBandRays, end));
   });
 }
@@ -150,7 +149,7 @@ void Run(const Sweep& sweep) {
 void TurnBack(const UnwrittenVector<std::uint8_t>& turned, const Index3& size, std::uint8_t* out) {
   constexpr std::int32_t kSquare = 32;
   const std::ptrdiff_t from_x = std::ptrdiff_t{size.y} * size.z;
-  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+  ParallelFor(0, size.z, [&](std::int32_t z) {
     const std::uint8_t* const from = turned.data() + std::ptrdiff_t{z} * size.y;
     std::uint8_t* const to = out + std::ptrdiff_t{z} * size.y * size.x;
     for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
@@ -179,7 +178,7 @@ bool SweepsAlongX(const Extinction& extinction, const Vec3& to_light) { return S
 TurnedExtinction Turned(const Extinction& extinction) {
   const Index3& size = extinction.size;
   TurnedExtinction turned{.axes = {1, 2, 0}, .each = UnwrittenVector<float>(extinction.each.size())};
-  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+  ParallelFor(0, size.z, [&](std::int32_t z) {
     constexpr std::int32_t kSquare = 16;
     for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
       for (std::int32_t x = 0; x < size.x; ++x) {

@@ -1,10 +1,9 @@
 #include "worker/rays/macrocell_ranges.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <type_traits>
 
+#include "common/parallel/parallel.h"
 #include "common/volume/column_ranges.h"
 
 namespace slabstream {
@@ -20,7 +19,7 @@ MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels) {
   VisitScalarType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const T* const first = reinterpret_cast<const T*>(voxels.samples.get()) + voxels.slice + voxels.row + 1;
-    tbb::parallel_for(0, cells.counts.z, [&](std::int32_t cell_z) {
+    ParallelFor(0, cells.counts.z, [&](std::int32_t cell_z) {
       ColumnRanges<T> columns(std::size_t(size.x) + 2);
       for (std::int32_t cell_y = 0; cell_y < cells.counts.y; ++cell_y) {
         columns.Clear();

@@ -20,7 +20,7 @@ struct MacrocellRange {
 };
 
 struct MacrocellRanges {
-  Index3 counts;  // of macrocells, which cover the padded voxels; x fastest
+  Index3 counts;  // numbers of macrocells, which cover the padded voxels; x fastest
   std::vector<MacrocellRange> ranges;
 
   std::size_t bytes() const { return ranges.capacity() * sizeof(MacrocellRange); }

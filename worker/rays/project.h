@@ -23,7 +23,7 @@ inline constexpr int kBlockShift = 4;
 inline constexpr std::int32_t kBlockSide = 1 << kBlockShift;
 struct SampleBounds {
   std::vector<float> cells, blocks;  // lowest float: no finite sample
-  float most = 0;                    // of all
+  float most = 0;                    // the bound for all samples
   Index3 block_counts;
 
   std::size_t bytes() const { return (cells.capacity() + blocks.capacity()) * sizeof(float); }
@@ -34,7 +34,7 @@ SampleBounds BoundSamples(const MacrocellRanges& cells, float sign);
 struct ValueScale {
   float low = 0, scale = 1;
 };
-// Of data values, so that `least` becomes 0 and `largest` 1; all 0 unless least < largest.
+// The scale for data values that makes `least` 0 and `largest` 1; all values are 0 unless least < largest.
 inline ValueScale MakeValueScale(double least, double largest, const ValueMapping& mapping) {
   if (mapping.scale == 0 || !(least < largest)) return {0, 0};
   return {float((least - mapping.offset) / mapping.scale), float(mapping.scale / (largest - least))};

@@ -10,14 +10,14 @@ namespace slabstream {
 
 struct RayBox {
   ScalarType type = ScalarType::kUint8;
-  const std::byte* samples = nullptr;  // of voxel origin - 1: PaddedVoxels::samples
-  Index3 origin;                       // of the voxels' box, less 1: no sample has a floor below
+  const std::byte* samples = nullptr;  // points to voxel origin - 1: PaddedVoxels::samples
+  Index3 origin;                       // the origin of the voxels' box, less 1: no sample has a floor below
   Index3 padded;                       // voxels that have samples, along each axis
   std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
   Index3 cells;                        // MacrocellRanges::counts
   Float3 low{}, high{};                // the box owns the positions p of the frame with low <= p < high on every axis
   Float3 scale{1, 1, 1}, offset{};     // p lies at scale * p + offset among the voxels
-  RayReach reach;                      // of the positions that may matter
+  RayReach reach;                      // the reach of the positions that may matter
   bool at_border = false;              // the box touches the volume's border
 };
 

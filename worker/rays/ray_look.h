@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/classification/region_table.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/view/camera.h"
 #include "common/view/shading.h"
 #include "worker/rays/view_rays.h"

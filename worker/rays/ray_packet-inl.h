@@ -15,7 +15,7 @@
 #define SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_
 #endif
 
-// Of lambdas that must be part of the loop that calls them: where there are many calls, g++ keeps them apart.
+// Marks lambdas that must be part of the loop that calls them: where there are many calls, g++ keeps them apart.
 #undef SLABSTREAM_INLINED
 #define SLABSTREAM_INLINED HWY_ATTR __attribute__((always_inline))
 

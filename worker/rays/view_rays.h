@@ -42,7 +42,7 @@ struct RayClip {
 
 struct ViewRays {
   bool perspective = false;
-  float centre_x = 0, centre_y = 0;  // of the image, in pixels, minus half a pixel
+  float centre_x = 0, centre_y = 0;  // the image's centre in pixels, minus half a pixel
   // Data space. `right` and `down`: a pixel's offset from the image's centre along x and y. `forward`: the movement of the central ray per
   // unit of physical distance. `start`: the first sample of the central ray.
   Float3 right{}, down{}, forward{}, start{};

@@ -18,7 +18,7 @@ static_assert(kMaxBins < kNotSelected);
 
 // Determines each sample's bin and whether the bin counts. Equal selections select the same voxels with the same bins.
 struct BinSelection {
-  double scale = 1, origin = 0;        // of ClassificationTable
+  double scale = 1, origin = 0;        // ClassificationTable's scale and origin
   std::vector<std::uint8_t> selected;  // by bin: 0 or 1
   friend bool operator==(const BinSelection&, const BinSelection&) = default;
 };

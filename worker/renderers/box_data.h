@@ -70,7 +70,7 @@ class BoxData {
 
  private:
   const std::shared_ptr<BoxVoxels> voxels_;
-  mutable BoxVoxels::Samples samples_;  // of voxels_; empty between renders
+  mutable BoxVoxels::Samples samples_;  // the samples of voxels_; empty between renders
   std::optional<BrickRanges> ranges_;
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;

@@ -2,11 +2,10 @@
 // skipped without reading voxels.
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include <cstdint>
 #include <vector>
 
+#include "common/parallel/parallel.h"
 #include "common/volume/bricks.h"
 
 namespace slabstream {
@@ -14,7 +13,7 @@ namespace slabstream {
 // Calls function(first brick) for each row of bricks along x. Parallel.
 template <class Function>
 void ForEachRowOfBricks(const BrickGrid& grid, Function&& function) {
-  tbb::parallel_for(0, grid.counts.y * grid.counts.z, [&](std::int32_t row) {
+  ParallelFor(0, grid.counts.y * grid.counts.z, [&](std::int32_t row) {
     function(Index3{grid.first.x, grid.first.y + row % grid.counts.y, grid.first.z + row / grid.counts.y});
   });
 }
@@ -24,7 +23,7 @@ class BrickRanges {
   explicit BrickRanges(const VoxelBricks& voxels);
 
   struct Range {
-    float min, max;  // of finite samples; min > max: there is none
+    float min, max;  // the range of finite samples; min > max: there is none
   };
   const Range& Of(const Index3& brick) const { return ranges_[grid_.Number(brick)]; }
   std::size_t bytes() const { return ranges_.capacity() * sizeof(Range); }

@@ -1,7 +1,5 @@
 #include "worker/renderers/padded_voxels.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -9,6 +7,7 @@
 #include <type_traits>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -47,7 +46,7 @@ void FillBox(const PaddedVoxels& voxels, const Box& box, float sample) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const T value = T(std::clamp(sample, float(std::numeric_limits<T>::lowest()), float(std::numeric_limits<T>::max())));
     if (value == 0) return;
-    tbb::parallel_for(box.begin.z, box.end.z, [&](std::int32_t z) {
+    ParallelFor(box.begin.z, box.end.z, [&](std::int32_t z) {
       for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
         std::fill_n(reinterpret_cast<T*>(voxels.At({box.begin.x, y, z})), box.size().x, value);
       }
@@ -61,7 +60,7 @@ void FillPadding(const PaddedVoxels& voxels) {
     const Box& box = voxels.box;
     const std::int32_t width = box.size().x;
     const auto row_of = [&](std::int32_t y, std::int32_t z) { return reinterpret_cast<T*>(voxels.At({box.begin.x - kPad, y, z})); };
-    tbb::parallel_for(box.begin.z, box.end.z, [&](std::int32_t z) {
+    ParallelFor(box.begin.z, box.end.z, [&](std::int32_t z) {
       for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
         T* const row = row_of(y, z);
         if (row[kPad] != 0) std::fill_n(row, kPad, row[kPad]);
@@ -72,7 +71,7 @@ void FillPadding(const PaddedVoxels& voxels) {
         RepeatRow(row_of(box.end.y - 1, z), voxels.row, row_of(box.end.y - 1 + i, z));
       }
     });
-    tbb::parallel_for(box.begin.y - kPad, box.end.y + kPad, [&](std::int32_t y) {
+    ParallelFor(box.begin.y - kPad, box.end.y + kPad, [&](std::int32_t y) {
       for (std::int32_t i = 1; i <= kPad; ++i) {
         RepeatRow(row_of(y, box.begin.z), voxels.row, row_of(y, box.begin.z - i));
         RepeatRow(row_of(y, box.end.z - 1), voxels.row, row_of(y, box.end.z - 1 + i));
@@ -91,7 +90,7 @@ PaddedVoxels Pad(const VoxelBricks& voxels, const Box& box) {
     const auto row_of = [&](std::int32_t y, std::int32_t z) {
       return samples + (z - (box.begin.z - kPad)) * padded.slice + std::ptrdiff_t{y - (box.begin.y - kPad)} * padded.row;
     };
-    tbb::parallel_for(box.begin.z - kPad, box.end.z + kPad, [&](std::int32_t z) {
+    ParallelFor(box.begin.z - kPad, box.end.z + kPad, [&](std::int32_t z) {
       const std::int32_t from_z = std::clamp(z, inside.begin.z, inside.end.z - 1);
       for (std::int32_t y = inside.begin.y; y < inside.end.y; ++y) {
         FillRow(voxels, inside, y, from_z, inside.begin.x - (box.begin.x - kPad), padded.row, row_of(y, z));

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/base/large_array.h"
+#include "common/memory/large_array.h"
 #include "common/volume/bricks.h"
 
 namespace slabstream {
@@ -16,7 +16,7 @@ inline constexpr std::int32_t kPad = 2;
 
 // Copies share their samples.
 struct PaddedVoxels {
-  Box box;  // of the volume, without the padding
+  Box box;  // the box in the volume, without the padding
   ScalarType type = ScalarType::kUint8;
   std::int32_t row = 0;                  // samples from a voxel to the next along y
   std::int64_t slice = 0;                // along z

@@ -26,7 +26,7 @@ class Renderer {
   // has Ability::kLevels. Pixels that `hidden` hides may be left
   // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads, without pauses. If it is cancelled
   // it stops soon and returns Cancelled; it pauses between pieces (`control`). Called within the task arena of the worker's render threads:
-  // parallel algorithms of oneTBB use as many threads as the worker has.
+  // parallel loops (common/parallel) use as many threads as the worker has.
   virtual Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                                     const RenderControl& control, RankReport& report) = 0;
 };

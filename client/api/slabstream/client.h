@@ -69,7 +69,7 @@ struct Progress {
   int queue_position = 0;                // kQueued: frames before this one
   int read_percent = 0;                  // kLoading: of the dataset, [0, 100]
   int groups_done = 0, group_count = 0;  // kRunning: parts of the picture; 0 of 0: not known yet
-  int workers = 0;                       // that share the frame
+  int workers = 0;                       // workers that share the frame
 };
 
 // A picture, immutable. Copies share the pixels. Any thread.
@@ -90,7 +90,8 @@ class SLABSTREAM_API Image {
 
   // The bytes of a PNG file, over the background and under the annotations that options ask for: those of `slabstream render`.
   std::vector<std::byte> Png() const;
-  // Likewise of a JPEG file, over black as far as the picture is transparent. `quality` in [1, 100], else InvalidArgument.
+  // The bytes of a JPEG file, made like that PNG file; where the picture is transparent, it lies over black. `quality`
+  // in [1, 100], else InvalidArgument.
   std::vector<std::byte> Jpeg(int quality = 90) const;
   // Writes a .png, .jpg, .webp, .tif, .exr (with the floats and depths), .pdf or .svg file. It appears whole or not at all.
   // InvalidArgument: another ending. Unavailable: it cannot be written, or libslabstream-pictures.so is missing, which writes the last

@@ -1,8 +1,9 @@
 // The planning half of radiographs: pixels sum up the attenuation of their samples, and a window of these sums becomes grey.
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 
+#include "common/parallel/parallel.h"
+#include "common/parallel/per_thread.h"
 #include "common/renderers/projection_kind.h"
 #include "common/renderers/sampling_rate.h"
 #include "common/renderers/xray/attenuation.h"
@@ -13,12 +14,16 @@ namespace {
 // The largest sum of values of a frame's pixels.
 double LargestSum(const LocalImage& frame) {
   constexpr std::size_t kGrain = 4096;  // pixels
-  const tbb::blocked_range<std::size_t> all(0, frame.rgba.size() / 4, kGrain);
-  const auto largest = [&](const auto& pixels, double sum) {
-    for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) sum = std::max(sum, SumOfValues(&frame.rgba[4 * i]));
-    return sum;
-  };
-  return tbb::parallel_reduce(all, 0.0, largest, [](double a, double b) { return std::max(a, b); });
+  PerThread<double> parts;
+  ParallelForRanges(0, frame.rgba.size() / 4, kGrain, [&](std::size_t begin, std::size_t end) {
+    double largest = 0;
+    for (std::size_t i = begin; i < end; ++i) largest = std::max(largest, SumOfValues(&frame.rgba[4 * i]));
+    double& part = parts.Mine();
+    part = std::max(part, largest);
+  });
+  double largest = 0;
+  parts.ForEach([&](double part) { largest = std::max(largest, part); });
+  return largest;
 }
 
 class XrayKind : public ProjectionKind {

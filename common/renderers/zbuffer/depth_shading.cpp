@@ -1,11 +1,9 @@
 #include "common/renderers/zbuffer/depth_shading.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
 
@@ -80,8 +78,8 @@ LocalImage ShadeByDepth(const LocalImage& frame, const FrameSetup& setup) {
   const Vec3& spacing = setup.camera.spacing;
   const double least = Least(spacing);
   constexpr std::int32_t kRows = 8;
-  tbb::parallel_for(tbb::blocked_range<std::int32_t>(frame.bounds.y_begin, frame.bounds.y_end, kRows), [&](const auto& rows) {
-    for (std::int32_t y = rows.begin(); y < rows.end(); ++y) {
+  ParallelForRanges(frame.bounds.y_begin, frame.bounds.y_end, kRows, [&](std::int32_t begin, std::int32_t end) {
+    for (std::int32_t y = begin; y < end; ++y) {
       for (std::int32_t x = frame.bounds.x_begin; x < frame.bounds.x_end; ++x) {
         const Seen pixel{x, y, points.DepthAt(x, y)};
         if (!std::isfinite(pixel.depth)) continue;

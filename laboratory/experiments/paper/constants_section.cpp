@@ -1,9 +1,9 @@
 // Our own model of the stages (laboratory/measure/cost_model.h), fitted to every slab of every N and p; the cost of combining a pixel, and
 // a clock cycle.
-#include <tbb/task_arena.h>
 
 #include <cmath>
 
+#include "common/parallel/task_arena.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/combining_costs.h"
 #include "laboratory/measure/cost_fit.h"
@@ -30,8 +30,8 @@ std::vector<CostSample> SlabsOf(const PaperSetup& setup, const RendererKind* ren
 // To find a pixel of a partial image, copy it into a message and combine it with another one.
 Trial CombiningTrial(const RendererKind* renderer) {
   const auto run = [renderer]() -> Json {
-    tbb::task_arena one_thread(1);
-    const CombiningCosts costs = one_thread.execute([renderer] { return MeasureCombining(Transfer::kMessage, renderer->format()); });
+    TaskArena one_thread(1);
+    const CombiningCosts costs = one_thread.Run([renderer] { return MeasureCombining(Transfer::kMessage, renderer->format()); });
     return {{"seconds", costs.scan_pixel + costs.encode_pixel + costs.combine_pixel}};
   };
   return {{{"what", "combining pixel"}, {"renderer", renderer->name()}}, run, 5};

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "laboratory/experiments/paper/setup.h"
+#include "laboratory/experiments/policies.h"
 
 namespace slabstream {
 namespace {
@@ -68,7 +69,7 @@ void Add(const PaperSetup& setup, const Asked& asked, const std::vector<MachineM
   of.update(ColumnsOf(frame));
   const Origin origin = frame.workers > 1 ? Origin::kSimulated : Origin::kMeasured;
   for (const auto& [metric, values] : figures) results.Add(of, metric, values, origin);
-  if (images != Images::kWhole || frame.policy.combine != FrameCase().policy.combine) return;  // the rest is that of any images and scheme
+  if (images != Images::kWhole || frame.policy.combine != EqualSlabs().policy.combine) return;  // the rest is that of any images and scheme
   for (const auto& [stage, values] : stages) {
     of["stage"] = stage;
     results.Add(of, "stage_time", values, Origin::kMeasured);

@@ -7,17 +7,17 @@
 
 namespace slabstream {
 
-void DeclarePaper(CLI::App& app, OwnOptions& options) {
+void DeclarePaper(const Command& app, OwnOptions& options) {
   AddParsedList(
       app, "--footprints", options.footprints,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kLeastDiameter, kMostDiameter); },
       fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kLeastDiameter, kMostDiameter))
-      ->default_str("3,5,9,13,17,25");
+      .Default("3,5,9,13,17,25");
   AddService(app, options.service)
-      ->description(
+      .Description(
           "Measure the frames of tables 2, 5 and 6 and figures 9 to 11 at the service at this endpoint, with its workers and its "
           "datasets class1-N; nothing else (bench/cluster --paper does so for all p)")
-      ->default_str("none: boxes are rendered alone on this machine");
+      .Default("none: boxes are rendered alone on this machine");
 }
 
 void RunPaper(ExperimentContext& context, Results& results) {

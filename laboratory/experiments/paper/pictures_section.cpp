@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "laboratory/experiments/paper/render_alone.h"
 #include "laboratory/experiments/paper/setup.h"
 

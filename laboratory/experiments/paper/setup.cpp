@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "laboratory/bench/bench_machine.h"
+#include "laboratory/experiments/policies.h"
 
 namespace slabstream {
 namespace {
@@ -46,8 +47,8 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   frame.view.azimuth_degrees = kAzimuth;
   frame.view.elevation_degrees = kElevation;
   frame.view.zoom = std::numbers::sqrt3;  // at 1 the cube's diagonal fills the picture
+  frame.policy = EqualSlabs().policy;
   frame.policy.axis = AxisChoice::kView;
-  frame.policy.groups = 1;
   frame.workers = workers;
   return frame;
 }

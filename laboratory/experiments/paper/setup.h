@@ -10,7 +10,7 @@
 
 namespace slabstream {
 
-inline constexpr int kRunsOfALoop = 3;  // of which the median is taken
+inline constexpr int kRunsOfALoop = 3;  // the median of so many runs is taken
 
 // Images are sent whole, as in the paper, or without their empty pixels, as in Slabstream.
 enum class Images { kWhole, kWithoutEmpty };

@@ -1,4 +1,4 @@
-"""Ways to divide sparse volumes, for one view, and what `auto` takes."""
+"""Ways to divide sparse volumes and to combine their images, for one view."""
 from __future__ import annotations
 
 import statistics
@@ -28,9 +28,8 @@ def page(run: Run) -> Page:
         "Where most voxels are empty, boxes of equal size take unequal times, and a frame waits for the slowest worker. How much does that "
         "cost for one view, and which way to divide a volume avoids it? The experiment `balance` compares what happens while views move.",
         [
+            _recommended(run, subjects),
             _efficiency(run, subjects),
-            _automatic(run, subjects),
-            _prediction(run, subjects),
             _assignments(run, subjects),
         ],
     )
@@ -107,11 +106,11 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
                 )
             if p == shared[-1]:
                 most[volume, renderer] = columns["imbalance"]
-        for split in ("voxels", "occupied"):
+        for split, equal in (("voxels", "voxels"), ("bricks", "work, by bricks"), ("occupied", "work, by counted voxels")):
             blocks.append(
                 plots.lines(
                     f"imbalance-{name}-{split}",
-                    f"{volume}, {renderer}: imbalance, boxes of equal {'voxels' if split == 'voxels' else 'occupied voxels'}",
+                    f"{volume}, {renderer}: imbalance, boxes of equal {equal}",
                     {q: list(by_p.items()) for q, by_p in imbalances.items() if q.endswith(split)},
                     "workers",
                     "longest / mean render time",
@@ -136,7 +135,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         )
         for partition, decomposition in (("slab by voxels", "slab"), ("kd-tree by occupied", "kd-tree")):
             boxes = run.attached(f"boxes-{volume}-{renderer}-{decomposition}")
-            title = f"{volume}, {renderer}: {partition}, p = {_workers_of(run, 'box')}"
+            title = f"{volume}, {renderer}: {partition}, p = {_workers_of(run, 'assignment')}"
             caption = "Render time of every box that the cut meets."
             blocks.append(plots.cuts(f"boxes-{name}-{partition.replace(' ', '-')}", title, boxes, caption))
     view = run.distinct("view", part="partition")[0]
@@ -161,82 +160,41 @@ def _least_imbalance(what: str, cases: dict[tuple[str, str], dict[str, Value]]) 
     return f"{what}: " + "; ".join(f"{volume} ({renderer}): {found.sentence()}" for (volume, renderer), found in ranked.items()) + "."
 
 
-def _automatic(run: Run, subjects: list[Subject]) -> Section:
+def _recommended(run: Run, subjects: list[Subject]) -> Section:
     rows, ratios = [], []
     for volume, renderer in subjects:
-        for p in _shared(run, "auto", (volume, renderer)):
-            for link in run.distinct("link", part="auto"):
+        for p in _shared(run, "default", (volume, renderer)):
+            for link in run.distinct("link", part="default"):
                 of = {"volume": volume, "renderer": renderer, "workers": p, "link": link}
-                chosen = run.select(part="auto", metric="latency", **of).iloc[0]
+                usual = value_of(run.select(part="default", metric="latency", **of).iloc[0])
                 tried = _by(run.select(part="policy", metric="latency", **of), _policy)
                 best = min(tried, key=lambda name: tried[name].value)
-                own = tried[best].value >= chosen["value"]
-                least = value_of(chosen) if own else tried[best]
-                ratio = value_of(chosen).over(least)
+                own = tried[best].value >= usual.value
+                ratio = usual.over(usual if own else tried[best])
                 ratios.append(ratio.value)
-                rows.append([volume, renderer, p, link, _policy(chosen), value_of(chosen), "its own" if own else best, least, ratio])
+                rows.append([volume, renderer, p, link, "the default" if own else best, usual if own else tried[best], usual, ratio])
     answer = ""
     if rows:
         median, worst = statistics.median(ratios), max(range(len(ratios)), key=ratios.__getitem__)
         answer = (
-            f"By the simulation, the latency of auto is {number_text(median, 3)} times that of the best policy in the median of "
-            f"{len(ratios)} cases: {'within' if median <= 1.1 else 'not within'} 10 %. It is {number_text(ratios[worst], 3)} times in the worst case: "
+            f"By the simulation, the latency of the default is {number_text(median, 3)} times that of the best policy in the median of "
+            f"{len(ratios)} cases. It is {number_text(ratios[worst], 3)} times in the worst case: "
             f"{rows[worst][0]}, {rows[worst][1]}, p = {rows[worst][2]}, {rows[worst][3]}."
         )
     return Section(
-        "How good auto is",
-        "How far is the policy that auto takes from the best one?",
-        "The policy auto chooses before it has seen a frame, by simulating estimated boxes on a machine with standard constants. Its "
-        "choice and all policies of the lists are then simulated with measured boxes, as above: all partitions, 1 and 2 groups, cyclic, "
-        f"{', '.join(run.distinct('combine', part='policy'))}. It may also take a policy outside these lists. "
-        "If its own is the best of all, the ratio is 1. The ratio is found repeat by repeat.",
+        "Which policy is best",
+        "Which policy makes a frame of these volumes soonest, and what is lost without asking for one?",
+        "All policies of these lists are simulated with measured boxes: all partitions, 1 and 2 groups, cyclic, "
+        f"{', '.join(run.distinct('combine', part='policy'))}; and what the service does if a request names nothing. "
+        "The ratio is found repeat by repeat.",
         answer,
-        [
-            Table(
-                "auto and the best policy",
-                ["volume", "renderer", "p", "link", "auto takes", "auto", "the best", "best", "auto / best"],
-                rows,
-            )
-        ],
+        [Table("The best policy and the default", "volume,renderer,p,link,the best,best,default,default / best".split(","), rows)],
     )
 
 
 def _policy(row: pandas.Series) -> str:
     groups = int(row["groups"])
     return f"{_partition(row)}, {groups} group{'' if groups == 1 else 's'}, {row['assignment']}, {row['combine']}"
-
-
-def _prediction(run: Run, subjects: list[Subject]) -> Section:
-    rows, medians = [], []
-    for volume, renderer in subjects:
-        found = run.select(part="box", volume=volume, renderer=renderer)
-        for partition, boxes in found.groupby(found.apply(_partition, axis=1), sort=False):
-            times = boxes.pivot(index="box", columns="metric", values="value")
-            times = times[times["box_time"] > 0]
-            errors = (times["estimated_box_time"] / times["box_time"] - 1).abs()
-            if errors.empty:
-                continue
-            total = times["estimated_box_time"].sum() / times["box_time"].sum()
-            shares = ((times["estimated_box_time"] / total) / times["box_time"] - 1).abs()
-            medians.append(float(errors.median()))
-            found_errors = (errors.median(), errors.quantile(0.9), shares.median(), shares.quantile(0.9))
-            percent = [Value.exact(float(x) * 100, "%") for x in found_errors]
-            rows.append([volume, renderer, int(boxes["workers"].iloc[0]), partition, len(errors), Value.exact(float(total)), *percent])
-    answer = ""
-    if medians:
-        least, most = f"{min(medians) * 100:.0f}", f"{max(medians) * 100:.0f}"
-        answer = f"The median error of a partition's boxes is {least if least == most else f'from {least} to {most}'} %."
-    columns = ["volume", "renderer", "p", "partition", "boxes", "sum expected / measured"]
-    columns += ["median error", "90 % error", "median error of shares", "90 % error of shares"]
-    return Section(
-        "Expected and measured times of boxes",
-        "How well does the planner know what a box will take, before it has seen a frame?",
-        "The same boxes as under partitions. The error of a box is expected over measured time, less one, without its sign; nine of ten "
-        "boxes have at most the 90 % error. A common factor does not change a partition: the last columns give the errors once the "
-        "expected times are scaled to the measured sum.",
-        answer,
-        [Table("Errors", columns, rows)],
-    )
 
 
 def _assignments(run: Run, subjects: list[Subject]) -> Section:

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
@@ -24,16 +23,15 @@ using testing::Not;
 class Completion : public testing::Test {
  protected:
   Completion() {
-    slabstream::SetUp(program_, "slabstream 1.0");
-    CLI::App* const render = program_.add_subcommand("render", "Render one picture");
-    render->add_option("-o,--output", frame_.stats_path, "The picture")->type_name("FILE");
-    AddFrameOptions(*render, frame_);
-    CLI::App* const data = program_.add_subcommand("data", "Datasets");
-    data->require_subcommand(1);
-    data->add_subcommand("list", "List them");
-    data->add_subcommand("remove", "Remove some");
-    program_.add_subcommand("secret", "Not for users")->group("");
-    program_.add_subcommand("help", "Explain")->add_option("COMMAND", words_, "Which");
+    const Command render = program_.AddCommand("render", "Render one picture");
+    render.AddText("-o,--output", frame_.stats_path, "The picture").TypeName("FILE");
+    AddFrameOptions(render, frame_);
+    const Command data = program_.AddCommand("data", "Datasets");
+    data.TakeCommand(true);
+    data.AddCommand("list", "List them");
+    data.AddCommand("remove", "Remove some");
+    program_.AddCommand("secret", "Not for users").Group("");
+    program_.AddCommand("help", "Explain").AddTexts("COMMAND", words_, "Which");
   }
 
   std::vector<std::string> Words(const std::vector<std::string>& typed) {
@@ -47,7 +45,7 @@ class Completion : public testing::Test {
     return words;
   }
 
-  CLI::App program_{"Slabstream renders.", "slabstream"};
+  const Program program_{"Slabstream renders.", "slabstream", "slabstream 1.0"};
   FrameOptions frame_;
   std::vector<std::string> words_, asked_;
 };
@@ -79,9 +77,9 @@ TEST_F(Completion, AsksTheNamedServiceForDatasets) {
 }
 
 TEST_F(Completion, ManualPagesEscapeWhatRoffWouldTake) {
-  CLI::App app("Slabstream worker: renders.", "slabstream-worker");
+  const Program app("Slabstream worker: renders.", "slabstream-worker", "1.0");
   std::string value;
-  app.add_option("--at-once", value, ".begins with a dot, and \\ in it\n  on: always")->default_str("half of this machine's memory: 3 MiB");
+  app.AddText("--at-once", value, ".begins with a dot, and \\ in it\n  on: always").Default("half of this machine's memory: 3 MiB");
   EXPECT_THAT(
       ManPage(app, "slabstream-worker"),
       AllOf(HasSubstr("slabstream\\-worker \\- renders\n"), HasSubstr(".B \\-\\-at\\-once"),

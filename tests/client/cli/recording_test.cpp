@@ -1,10 +1,10 @@
 #include "client/cli/recording.h"
+#include "common/json/json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <nlohmann/json.hpp>
 
 #include "tests/laboratory/measure/recorded.h"
 
@@ -12,7 +12,6 @@ namespace slabstream {
 namespace {
 
 using ::testing::HasSubstr;
-using Json = nlohmann::ordered_json;
 
 Json TraceOf(const std::vector<RecordedFrame>& frames) { return {{"traceEvents", Json::array()}, {kRecordingKey, RecordingJson(frames)}}; }
 
@@ -116,7 +115,7 @@ TEST(Recording, AnErrorIsOneLineHoweverTheFileIsMade) {
   // Values that nest as deep as the file is long: neither reading them nor writing them out may use up the stack.
   constexpr std::size_t kDepth = 1'000'000;
   const std::string deep = error_of("[" + std::string(kDepth, '[') + std::string(kDepth, ']') + "]");
-  EXPECT_THAT(deep, HasSubstr("values nest 1000003 deep, at most 64 are allowed"));
+  EXPECT_THAT(deep, HasSubstr("values nest more than 64 deep"));
   const std::string text = error_of("[\"" + std::string(100, '[') + "\\\"[\"]");
   EXPECT_THAT(text, HasSubstr("frames[0]: \"[[[")) << "brackets in a text are none";
   const std::string broken = error_of(R"([{"renderer": "splat", "grid": [4, 4], "workers": 1, "display": 1, "combine": "a\nb"}])");

@@ -1,10 +1,10 @@
 // Whole numbers are told to the last digit, as people and programs read them.
 #include "client/report/volume_text.h"
+#include "common/json/json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -15,7 +15,6 @@ namespace {
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
-using Json = nlohmann::ordered_json;
 
 TEST(VolumeText, TellsWholeNumbersToTheLastDigit) {
   const auto texts = [](double value, std::int64_t rest = 0) {
@@ -56,12 +55,13 @@ StatisticsReply TwoLabels(const Orientation& orientation) {
 TEST(LabelStatistics, HaveVolumesInMillilitresWhereTheUnitIsKnown) {
   const Json patient = LabelStatisticsJson(TwoLabels({.world = World::kPatient}));
   EXPECT_EQ(patient["unit"], "ml");
-  EXPECT_DOUBLE_EQ(patient["labels"][0]["volume"], 10 * 2 * 2 * 0.5 / 1000) << "those that are not finite are of the label, too";
+  EXPECT_DOUBLE_EQ(patient["labels"][0]["volume"].get<double>(), 10 * 2 * 2 * 0.5 / 1000)
+      << "those that are not finite are of the label, too";
   EXPECT_EQ(patient["labels"][0]["color"], "#ff8000");
   EXPECT_TRUE(patient["labels"][1]["mean"].is_null());
   const Json small = LabelStatisticsJson(TwoLabels({.world = World::kScene, .unit = LengthUnit::kMicrometre}));
   EXPECT_EQ(small["unit"], "\u00b5m^3");
-  EXPECT_DOUBLE_EQ(small["labels"][0]["volume"], 20);
+  EXPECT_DOUBLE_EQ(small["labels"][0]["volume"].get<double>(), 20);
 }
 
 TEST(LabelStatistics, AreATableWithQuotedNames) {

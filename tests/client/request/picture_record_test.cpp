@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "client/cli/option_groups.h"
+#include "tests/support/json_at.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -21,13 +22,12 @@ using testing::Not;
 // What `slabstream` makes of the arguments of render.
 FrameOptions Parse(std::vector<std::string> arguments) {
   FrameOptions options;
-  CLI::App app;
+  const Program app;
   std::string output;
-  app.add_option("-o,--output", output)->required();
+  app.AddText("-o,--output", output).Required();
   AddFrameOptions(app, options);
-  app.add_flag("--previews", options.request.previews);
-  std::reverse(arguments.begin(), arguments.end());
-  app.parse(arguments);
+  app.AddFlag("--previews", options.request.previews);
+  EXPECT_EQ(app.Parse(std::move(arguments)).message, "");
   return options;
 }
 
@@ -94,7 +94,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--background", "0.2,0.4,0.6"},
     {"--background", "0,0,0,0.1", "--depth", "16"},
     {"--termination", "0"},
-    {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "auto", "--balance", "dynamic"},
+    {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "greedy", "--balance", "dynamic"},
     {"--groups", "3", "--teams", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
     {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
     {"--title=-x"},
@@ -183,11 +183,11 @@ TEST(PictureRecordTest, CoarseLevelsAreNamed) {
 
 TEST(PictureRecordTest, BadRecordsAreNamed) {
   const FrameOptions options = Parse({"-o", "a.png", "brain"});
-  const Json good = Json::parse(RecordText("brain", options.request, options.format, SomeGeometry()));
+  const Json good = Json::Parse(RecordText("brain", options.request, options.format, SomeGeometry())).value();
   EXPECT_TRUE(ParseRecord(good.dump()).ok());
   const auto with = [&](const char* pointer, const Json& value) {
     Json bad = good;
-    bad[Json::json_pointer(pointer)] = value;
+    JsonAt(bad, pointer) = value;
     return bad.dump();
   };
   const auto without = [&](const char* field) {

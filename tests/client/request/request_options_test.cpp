@@ -16,10 +16,11 @@
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_choice.h"
 #include "common/view/default_view.h"
-#include "common/wire/about.h"
-#include "common/wire/request_fields.h"
+#include "common/wire/checker.h"
+#include "common/wire/codecs.h"
 #include "common/wire/request_json.h"
 #include "common/wire/validate_request.h"
+#include "slabstream/v1/frame.pb.h"
 
 namespace slabstream {
 namespace {
@@ -81,7 +82,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"overlay-transfer", {"gray-ramp", {}}},
     {"overlay-range", {"-1:2", {}}},
     {"overlay-weight", {"0.5", {}}},
-    {"decomposition", {"kd-tree", {}}},
+    {"decomposition", {"octree", {}}},
     {"axis", {"view", {}}},
     {"balance-by", {"voxels", {}}},
     {"assignment", {"greedy", {}}},
@@ -108,7 +109,7 @@ FrameRequest Asked(const RequestOption& option, bool with_option = true) {
 void ExpectDescribed(const Descriptor& message, const std::string& place, bool inside, std::set<std::string>& names) {
   for (int i = 0; i < message.field_count(); ++i) {
     const FieldDescriptor& field = *message.field(i);
-    const v1::About& about = AboutOf(field);
+    const v1::About& about = field.options().GetExtension(v1::about);
     const std::string path = place + field.name();
     if (!about.name().empty()) {
       EXPECT_FALSE(about.help().empty()) << path;
@@ -137,7 +138,7 @@ TEST(RequestOptionsTest, EveryFieldOfTheSchemaIsAnOptionOrSaysWhyNot) {
 }
 
 TEST(RequestOptionsTest, EveryOptionIsOneOfTheCommandLineAndAQuery) {
-  CLI::App app;
+  const Program app;
   FrameOptions options;
   AddFrameOptions(app, options);
   const Json queries = RenderFields();
@@ -148,10 +149,10 @@ TEST(RequestOptionsTest, EveryOptionIsOneOfTheCommandLineAndAQuery) {
     ASSERT_NE(query, queries.end());
     EXPECT_EQ((*query)["path"], option.path);
     if (option.name == "dataset") continue;  // SOURCE on the command line
-    const CLI::Option* const typed = app.get_option_no_throw("--" + option.name);
-    ASSERT_NE(typed, nullptr);
-    EXPECT_EQ(typed->get_description(), option.help);
-    EXPECT_EQ(typed->get_group(), option.group);
+    const Option typed = app.FindOption("--" + option.name);
+    ASSERT_TRUE(typed);
+    EXPECT_EQ(typed.description(), option.help);
+    EXPECT_EQ(typed.group(), option.group);
   }
 }
 
@@ -287,13 +288,13 @@ TEST(RequestOptionsTest, StandardTextsOfTheSchemaAreThoseOfTheStruct) {
 TEST(RequestOptionsTest, ValuesOfFilesMayBeNumbersListsAndTexts) {
   FrameRequest request = Standard();
   std::optional<std::string> mistake;
-  const Json json = Json::parse(R"({"look_at": [1, 2.5, -3], "zoom": 0.1, "projection": "perspective"})");
+  const Json json = Json::Parse(R"({"look_at": [1, 2.5, -3], "zoom": 0.1, "projection": "perspective"})").value();
   JsonValue(json, "view", mistake).Fields(OptionFields(request, {"view."}));
   EXPECT_EQ(mistake, std::nullopt);
   EXPECT_EQ(request.view.look_at, (Vec3{1, 2.5, -3}));
   EXPECT_EQ(request.view.zoom, 0.1);
   EXPECT_EQ(OptionsJson(request, "view.").dump(), R"({"projection":"perspective","look-at":"1,2.5,-3","zoom":0.1})");
-  const Json bad = Json::parse(R"({"zoom": 0})");
+  const Json bad = Json::Parse(R"({"zoom": 0})").value();
   JsonValue(bad, "view", mistake).Fields(OptionFields(request, {"view."}));
   EXPECT_EQ(mistake, "view.zoom: zoom 0 is out of range [0.001, 10000]");
 }

@@ -135,7 +135,7 @@ TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
       {R"({"Regions": [{"Values": [1, 1], "Slopes": [0, 1], "Color": [1, 1, 1]}]})", "all corners of region 0 have the value 1"},
       {R"({"Regions": [{"Shape": 1}]})", "Regions[0] has the field \"Shape\", must be one of: Corners, Values"},
       {R"({"Regions": [], "RGBPoints": [0, 0, 0, 0]})", "one of both must go"},
-      {std::string(100000, '['), "not JSON"},
+      {std::string(100000, '['), "values nest more than 64 deep"},
   };
   for (const auto& [json, named] : wrong) {
     const Status status = ParseParaViewColorMap(json, "map.json").status();

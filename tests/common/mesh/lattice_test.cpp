@@ -1,7 +1,7 @@
 #include "common/mesh/lattice.h"
+#include "common/parallel/task_arena.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -279,7 +279,7 @@ TEST(Lattice, ResultsAreTheSameForAnyNumberOfThreads) {
     return std::tuple(std::move(mesh.tetrahedra), std::move(volume.block), std::move(summary));
   };
   const auto [tetrahedra, block, summary] = make();
-  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  const ThreadLimit one_thread(1);
   const auto [tetrahedra_of_one, block_of_one, summary_of_one] = make();
   EXPECT_EQ(tetrahedra, tetrahedra_of_one);
   EXPECT_TRUE(SameBytes(block, block_of_one));

@@ -1,15 +1,12 @@
 #include "common/otlp/otlp_json.h"
+#include "common/json/json.h"
 
 #include <gtest/gtest.h>
-
-#include <nlohmann/json.hpp>
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
-
-json Attribute(const char* key, const json& value) { return {{"key", key}, {"value", value}}; }
+Json Attribute(const char* key, const Json& value) { return {{"key", key}, {"value", value}}; }
 
 TEST(OtlpJsonTest, IsAnExportRequestInOtlpsJson) {
   TraceSpan root;
@@ -30,46 +27,46 @@ TEST(OtlpJsonTest, IsAnExportRequestInOtlpsJson) {
   child.begin_ns = child.end_ns = root.begin_ns;
 
   const std::vector<TraceSpan> spans = {root, child};
-  const json traces = json::parse(OtlpTraces({.program = "slabstream-gateway", .version = "1.2.3", .instance = "here"}, spans));
-  const json expected_root = {{"traceId", "4bf92f3577b34da6a3ce929d0e0e4736"},
+  const Json traces = Json::Parse(OtlpTraces({.program = "slabstream-gateway", .version = "1.2.3", .instance = "here"}, spans)).value();
+  const Json expected_root = {{"traceId", "4bf92f3577b34da6a3ce929d0e0e4736"},
                               {"spanId", "00f067aa0ba902b7"},
                               {"name", "GET /api/v1/render.png"},
                               {"kind", 2},
                               {"startTimeUnixNano", "1700000000123456789"},
                               {"endTimeUnixNano", "1700000001000000000"},
-                              {"attributes", json::array({Attribute("http.route", {{"stringValue", "/a"}}),
+                              {"attributes", Json::array({Attribute("http.route", {{"stringValue", "/a"}}),
                                                           Attribute("http.response.status_code", {{"intValue", "503"}}),
                                                           Attribute("truth", {{"boolValue", true}})})},
                               {"status", {{"code", 2}, {"message", "no worker"}}}};
-  const json expected_child = {{"traceId", "4bf92f3577b34da6a3ce929d0e0e4736"},
+  const Json expected_child = {{"traceId", "4bf92f3577b34da6a3ce929d0e0e4736"},
                                {"spanId", "0102030405060708"},
                                {"parentSpanId", "00f067aa0ba902b7"},
                                {"name", "frame"},
                                {"kind", 3},
                                {"startTimeUnixNano", "1700000000123456789"},
                                {"endTimeUnixNano", "1700000000123456789"},
-                               {"attributes", json::array()}};
-  const json resource = {{"attributes", json::array({Attribute("service.name", {{"stringValue", "slabstream"}}),
+                               {"attributes", Json::array()}};
+  const Json resource = {{"attributes", Json::array({Attribute("service.name", {{"stringValue", "slabstream"}}),
                                                      Attribute("service.version", {{"stringValue", "1.2.3"}}),
                                                      Attribute("service.instance.id", {{"stringValue", "here"}}),
                                                      Attribute("process.executable.name", {{"stringValue", "slabstream-gateway"}})})}};
-  const json scope_spans = {{"scope", {{"name", "slabstream-gateway"}, {"version", "1.2.3"}}},
-                            {"spans", json::array({expected_root, expected_child})}};
-  const json resource_spans = {{"resource", resource}, {"scopeSpans", json::array({scope_spans})}};
-  EXPECT_EQ(traces, json({{"resourceSpans", json::array({resource_spans})}}));
+  const Json scope_spans = {{"scope", {{"name", "slabstream-gateway"}, {"version", "1.2.3"}}},
+                            {"spans", Json::array({expected_root, expected_child})}};
+  const Json resource_spans = {{"resource", resource}, {"scopeSpans", Json::array({scope_spans})}};
+  EXPECT_EQ(traces, Json({{"resourceSpans", Json::array({resource_spans})}}));
 }
 
 TEST(OtlpJsonTest, OneSpanAndNoneAreListsToo) {
-  const json one = json::parse(OtlpTraces({}, std::vector<TraceSpan>(1)));
+  const Json one = Json::Parse(OtlpTraces({}, std::vector<TraceSpan>(1))).value();
   EXPECT_EQ(one["resourceSpans"][0]["scopeSpans"][0]["spans"].size(), 1U);
-  const json none = json::parse(OtlpTraces({}, {}));
-  EXPECT_EQ(none["resourceSpans"][0]["scopeSpans"][0]["spans"], json::array());
+  const Json none = Json::Parse(OtlpTraces({}, {})).value();
+  EXPECT_EQ(none["resourceSpans"][0]["scopeSpans"][0]["spans"], Json::array());
 }
 
 TEST(OtlpJsonTest, TextThatIsNotUtf8DoesNotBreakIt) {
   std::vector<TraceSpan> spans(1);
   spans[0].name = "\xff\xfe";
-  EXPECT_FALSE(json::parse(OtlpTraces({}, spans)).is_discarded());
+  EXPECT_TRUE(Json::Parse(OtlpTraces({}, spans)).ok());
 }
 
 TEST(OtlpJsonTest, EachProcessHasAnInstanceThatIsAUuid) {

@@ -1,4 +1,5 @@
 #include "common/otlp/trace_sender.h"
+#include "common/json/json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +11,6 @@
 #include <cstdlib>
 #include <functional>
 #include <future>
-#include <nlohmann/json.hpp>
 
 #include "common/http/http.h"
 
@@ -18,7 +18,6 @@ namespace slabstream {
 namespace {
 
 namespace asio = boost::asio;
-using nlohmann::json;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -82,7 +81,9 @@ HttpUrl NobodyListens() { return SilentCollector().url(); }
 
 std::vector<TraceSpan> Trace(std::size_t spans) { return std::vector<TraceSpan>(spans); }
 
-std::size_t SpansIn(const HttpRequest& request) { return json::parse(request.body)["resourceSpans"][0]["scopeSpans"][0]["spans"].size(); }
+std::size_t SpansIn(const HttpRequest& request) {
+  return Json::Parse(request.body).value()["resourceSpans"][0]["scopeSpans"][0]["spans"].size();
+}
 
 void WaitFor(const TraceSender& sender, const std::function<bool(TraceSender::Counts)>& condition) {
   while (!condition(sender.counts())) std::this_thread::yield();

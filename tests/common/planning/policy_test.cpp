@@ -34,7 +34,27 @@ TEST(PlanFrame, UsesEveryNameOfAPolicy) {
   }
 }
 
-TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
+TEST(PlanFrame, WithoutAPolicyIsAKdTreeByBricksAndCombinesByWorkersAndPixels) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  FrameRequest request = SomeRequest();
+  request.policy = {};
+  EXPECT_FALSE(NeedsOccupancy(request.policy)) << "its frame would wait";
+  EXPECT_EQ(BalanceByOf(request.policy), "bricks");
+  EXPECT_EQ(BalanceByOf({.balance = std::string(kDynamicBalance)}), "occupied");
+  EXPECT_EQ(BalanceByOf({.assignment = "greedy"}), "occupied");
+  EXPECT_EQ(BalanceByOf({.decomposition = "slab"}), "voxels");
+  request.size = {1024, 1024};
+  EXPECT_EQ(Plan(request, summary, FullRoster(7)).combine, "fan-in");
+  EXPECT_EQ(Plan(request, summary, FullRoster(8)).combine, "direct-send");
+  request.size = {1023, 1024};
+  EXPECT_EQ(Plan(request, summary, FullRoster(8)).combine, "fan-in");
+  EXPECT_EQ(Plan(request, summary, FullRoster(63)).combine, "fan-in");
+  EXPECT_EQ(Plan(request, summary, FullRoster(64)).combine, "radix-k");
+  request.policy.combine = "chain";
+  EXPECT_EQ(Plan(request, summary, FullRoster(8)).combine, "chain");
+}
+
+TEST(ResolvePolicy, FindsWhatIsNamed) {
   const VolumeGeometry geometry = FullSummary({40, 200, 42}).description.geometry;
   FrameRequest request = SomeRequest();
   for (const DecompositionEntry& decomposition : Decompositions()) {
@@ -49,9 +69,8 @@ TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
           const ResolvedPolicy resolved = ResolvePolicy(SettledPolicy(request, geometry), geometry);
           EXPECT_EQ(resolved.decomposition, &decomposition);
           EXPECT_EQ(resolved.assignment, &assignment);
-          const Policy asked = AskFor(resolved);
-          EXPECT_EQ(NeedsOccupancy(asked), NeedsOccupancy(request.policy));
-          EXPECT_EQ(ResolvePolicy(asked, geometry), resolved);
+          EXPECT_EQ(NameOf(resolved.balance_by), BalanceByOf(request.policy));
+          EXPECT_TRUE(NeedsOccupancy(request.policy)) << "it is dynamic";
         }
       }
     }
@@ -76,22 +95,22 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
     change(request);
     return PlanFrame(request, 7, summary, roster).status();
   };
-  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));
+  EXPECT_EQ(
+      status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
+      Status::InvalidArgument("policy.decomposition is 'cake', but must be left out or one of: slab, beam, subcube, octree, kd-tree"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance_by = "hairs"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.balance_by is 'hairs', but must be one of: auto, voxels, occupied, cost"));
-  EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
-            Status::InvalidArgument(
-                "policy.assignment is 'lots', but must be one of: auto, cyclic, zigzag, alternating, contiguous, random, greedy"));
+            Status::InvalidArgument("policy.balance_by is 'hairs', but must be left out or one of: auto, voxels, bricks, occupied, cost"));
+  EXPECT_EQ(
+      status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
+      Status::InvalidArgument("policy.assignment is 'lots', but must be left out or one of: cyclic, alternating, contiguous, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic, planes, handover"));
+            Status::InvalidArgument("policy.balance is 'act', but must be left out or one of: static, dynamic"));
   EXPECT_EQ(
       status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
       Status::InvalidArgument("policy.combine 'mix' is not one of fan-in, centralized, chain, tree, radix-k, binary-swap, direct-send"));
-  const Status open = Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
-  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = kAutomatic; }, FullRoster(1)), open);
-  EXPECT_EQ(status([](auto& r) { r.policy.assignment = kAutomatic; }, FullRoster(1)), open);
-  EXPECT_EQ(status([](auto& r) { r.policy.combine = kAutomatic; }, FullRoster(1)), open);
+  for (std::string Policy::*field : {&Policy::decomposition, &Policy::assignment, &Policy::balance, &Policy::combine}) {
+    EXPECT_EQ(status([field](auto& r) { r.policy.*field = kAutomatic; }, FullRoster(1)).code(), StatusCode::kInvalidArgument);
+  }
   EXPECT_EQ(status([](auto& r) { r.transfer.choice = "no-such-preset"; }, FullRoster(1)).code(), StatusCode::kNotFound);
   for (const Roster& nobody : {Roster{}, Roster{{0}}, Roster{{0, 0, 0}}}) {
     EXPECT_EQ(status([](auto&) {}, nobody).code(), StatusCode::kUnavailable);

@@ -59,46 +59,6 @@ TEST(ShownZones, EveryVoxelThatThePictureShowsLiesInOne) {
   EXPECT_LT(shown, zones / 2);
 }
 
-TEST(ShownBlocks, HoldEveryVoxelThatThePictureShows) {
-  Random random(84);
-  SCOPED_TRACE(random.trace());
-  int shown = 0;
-  for (int round = 0; round < 100; ++round) {
-    const Index3 size = {random.Integer(50, 600), random.Integer(50, 600), random.Integer(50, 600)};
-    const Index3 side = {random.Integer(20, 100), random.Integer(20, 100), random.Integer(20, 100)};
-    FrameRequest request = SomeRequest();
-    request.view = RandomView(random);
-    request.view.zoom = random.Real(1, 12);
-    const FrameSetup setup = SetupOf(request, UnreadLevel(size, side));
-    const std::vector<Box> blocks = ShownBlocks(setup, 1 << 20);
-    for (int i = 0; i < 500; ++i) {
-      const Index3 voxel = {random.Integer(0, size.x - 1), random.Integer(0, size.y - 1), random.Integer(0, size.z - 1)};
-      if (!IsInPicture({double(voxel.x), double(voxel.y), double(voxel.z)}, setup.camera)) continue;
-      const Index3 begin = voxel / side * side;
-      EXPECT_EQ(std::ranges::count(blocks, Intersection({begin, begin + side}, {{0, 0, 0}, size})), 1) << "round " << round;
-      ++shown;
-    }
-    const std::size_t most = random.Integer<std::size_t>(0, blocks.size());
-    EXPECT_EQ(ShownBlocks(setup, most), std::vector<Box>(blocks.begin(), blocks.begin() + std::ptrdiff_t(most)));
-  }
-  EXPECT_GT(shown, 1000);
-}
-
-TEST(ShownBlocks, NearOnesComeFirstAndOfTheseTheMiddleOfThePicture) {
-  FrameRequest request = SomeRequest();
-  request.view = {};  // looks along +y
-  request.size = {256, 256};
-  const FrameSetup setup = SetupOf(request, UnreadLevel({256, 256, 256}, Uniform(64)));
-  const std::vector<Box> blocks = ShownBlocks(setup, 64);
-  ASSERT_EQ(blocks.size(), 64U);
-  // Zones are blocks here. A zone brings its neighbours with it, for the halo.
-  for (std::size_t i = 0; i < 12; ++i) {
-    EXPECT_LE(blocks[i].begin.y, 64) << "block " << i;
-    EXPECT_TRUE(blocks[i].begin.x <= 128 && blocks[i].begin.z <= 128) << "block " << i;
-  }
-  EXPECT_EQ(blocks.back().begin.y, 192);
-}
-
 TEST(ShownZones, OfWhatIsHeldOrShownAsAWholeThereIsNone) {
   FrameRequest request = SomeRequest();
   EXPECT_EQ(ShownZones(SetupOf(request, UnreadLevel({512, 512, 512}, Uniform(64)))), nullptr);
@@ -124,11 +84,11 @@ TEST(ShownZones, BoxesOfATerabyteAreThoseOfThePicture) {
     const Roster roster = FullRoster(2);
     const auto layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                                    .volume = &resolved.volume,
-                                                                   .policy = &*resolved.policy,
+                                                                   .policy = &resolved.policy,
                                                                    .slots = 2,
                                                                    .box_bytes_target = kTarget,
                                                                    .map = map.get()}));
-    const FramePlan plan = PlanFrame(setup, *resolved.policy, roster, layout).value();
+    const FramePlan plan = PlanFrame(setup, resolved.policy, roster, layout).value();
     ExpectSound(plan, roster);
     std::int64_t voxels = 0;
     for (const Placement& placement : PlacementsOf(plan)) {

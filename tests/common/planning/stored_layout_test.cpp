@@ -187,7 +187,7 @@ TEST(IndexedLayout, BoxesOfEachLevelOfAPictureAreLeftOut) {
     const std::vector<CoarserVolume> levels = {{2, std::make_shared<const VolumeSummary>(coarser)}};
     return MakeLayout({.summary = &finer,
                        .volume = &resolved.volume,
-                       .policy = &*resolved.policy,
+                       .policy = &resolved.policy,
                        .slots = 2,
                        .box_bytes_target = 48 << 10,
                        .map = &map,

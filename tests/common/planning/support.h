@@ -46,6 +46,8 @@ inline FrameRequest SomeRequest() {
   transfer.colors = {{0, {1, 1, 1}}};
   transfer.opacities = {{100, 0}, {200, 1}};
   request.transfer.choice = transfer;
+  request.policy.decomposition = "slab";
+  request.policy.combine = "fan-in";
   return request;
 }
 

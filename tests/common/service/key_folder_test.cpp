@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <string>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {

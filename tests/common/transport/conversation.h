@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/socket.h"
 
 namespace slabstream {

@@ -27,7 +27,7 @@ inline VolumeGeometry RandomGeometry(Random& random, World world = World::kPatie
   return geometry;
 }
 
-// Of the centre of any volume.
+// Looks at the centre of any volume.
 inline ViewParameters RandomView(Random& random) {
   ViewParameters view;
   view.projection = random.Chance(0.5) ? Projection::kOrthographic : Projection::kPerspective;

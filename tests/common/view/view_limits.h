@@ -5,6 +5,6 @@
 
 namespace slabstream {
 
-inline constexpr double kMaxAngleDegrees = 1e6;  // of azimuth, elevation and roll, either sign
+inline constexpr double kMaxAngleDegrees = 1e6;  // the limit of azimuth, elevation and roll, either sign
 
 }  // namespace slabstream

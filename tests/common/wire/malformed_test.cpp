@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "common/volume/filled_box.h"
-#include "common/wire/about.h"
 #include "common/wire/any_message.h"
 #include "common/wire/limits.h"
+#include "slabstream/v1/about.pb.h"
 #include "slabstream/v1/envelope.pb.h"
 #include "tests/common/wire/decode_any_input.h"
 #include "tests/common/wire/error_of.h"
@@ -138,7 +138,7 @@ TEST(Malformed, NoEnumMayHaveAnUnknownValue) {
           // Replies and plans state everything.
           const bool of_request = place.path.find("FrameSetup") == std::string::npos && !place.path.starts_with("GroupAssignment") &&
                                   !place.path.starts_with("FrameReply") && !place.path.starts_with("ViewReply");
-          const bool has_standard = of_request && !AboutOf(*place.field).standard().empty();
+          const bool has_standard = of_request && !place.field->options().GetExtension(v1::about).standard().empty();
           const bool of_world = place.field->containing_type() == v1::Orientation::descriptor() && place.field->name() == "unit";
           if (bad == 0 && (has_standard || of_world)) {
             EXPECT_EQ(error, "") << place.path << " has a standard value, or a file states none";
@@ -260,6 +260,42 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
   EXPECT_EQ(seen.size(), limits.size() + 14)
       << "reports are in four messages, parameters and labels in three; datasets, keys, isosurfaces, "
          "gradients, opacities, levels and traffic in two";
+}
+
+TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {
+  const std::map<std::string, double> limits = {
+      {"AddVolume.name", kMaxNameBytes},
+      {"Chunk.raw_bytes", kChunkBytes},
+      {"DataOrder.items", kMaxDataItemBytes},
+      {"FrameStatistics.lowered", kMaxTextBytes},
+      {"GroupKey.group", kMaxGroups - 1},
+      {"Index3.x", kMaxVolumeSide},
+      {"Label.name", kMaxLabelNameBytes},
+      {"Label.value", kMaxLabelValue},
+      {"PackedRuns.bytes", double(kMaxRunsBytes - 1)},
+      {"PartialImage.interval_end", kMaxRanks},
+      {"PartialImage.step", kMaxSteps},
+      {"PicturesDoor.key", kKeyTextBytes},
+      {"PixelRange.end", double(kMaxFramePixels)},
+      {"Placement.level", kMaxLevels - 1},
+      {"Register.images_endpoint", kMaxEndpointBytes},
+      {"Register.threads", kMaxThreads},
+      {"SentFile.bytes", double(kMaxSentFileBytes)},
+      {"SentPicture.bytes", double(kMaxRunsBytes)},
+      {"SharedBlock.offset", double(kArenaBytes)},
+      {"SharedBlock.slot", kArenaSlots - 1},
+      {"SharedImage.stride", kMaxFrameSide},
+      {"SheetGrid.height", kMaxGridSide},
+      {"StoredAt.source", kMaxSourceBytes},
+      {"VolumePart.bytes", kMaxVolumePartBytes},
+  };
+  const auto* const schema = v1::Envelope::descriptor()->file()->pool();
+  for (const auto& [name, limit] : limits) {
+    const FieldDescriptor* const field = schema->FindFieldByName("slabstream.v1." + name);
+    ASSERT_NE(field, nullptr) << name;
+    const v1::Wire& wire = field->options().GetExtension(v1::wire);
+    EXPECT_EQ(wire.has_most() ? wire.most() : 256, limit) << name;
+  }
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

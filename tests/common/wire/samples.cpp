@@ -387,11 +387,10 @@ template <>
 std::vector<FrameReply> SamplesOf() {
   const FrameStatistics statistics{kMax32,    kMax32,  kMax32,    "shear",   "slab",   "occupied", "x",
                                    kLongName, kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
-  FrameStatistics predicted = statistics;
-  predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
-  predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
-  predicted.lowered = kUmlaut;
-  predicted.view = Request().view;
+  FrameStatistics whole = statistics;
+  whole.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
+  whole.lowered = kUmlaut;
+  whole.view = Request().view;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
@@ -408,8 +407,8 @@ std::vector<FrameReply> SamplesOf() {
   return {{1, {1, 1}, 0, 1, {{NoRuns()}}, {}, {}},
           {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}}, statistics, of_patient},
           {kMax64, {30, 40}, 1024, 1024, {{StraightRuns()}}, statistics, of_patient},
-          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}, {SomeRuns(), true}}, predicted, behind_the_eye_plane},
-          {kMax64, {30, 40}, 1024, 1024, std::vector<PictureShare>(kMaxShares, {SomeRuns(), true}), predicted, in_metres}};
+          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}, {SomeRuns(), true}}, whole, behind_the_eye_plane},
+          {kMax64, {30, 40}, 1024, 1024, std::vector<PictureShare>(kMaxShares, {SomeRuns(), true}), whole, in_metres}};
 }
 
 template <>
@@ -581,16 +580,6 @@ std::vector<ViewQuery> SamplesOf() {
 template <>
 std::vector<ViewReply> SamplesOf() {
   return {{}, {kMax64, Request().view, Ball{{1, 2, 3}, 4}}, {.view = kUnstatedView}};
-}
-
-template <>
-std::vector<PrefetchQuery> SamplesOf() {
-  return {{.frame = Request()}, {kMax64, Request()}};
-}
-
-template <>
-std::vector<PrefetchReply> SamplesOf() {
-  return {{}, {kMax64, true}};
 }
 
 template <>

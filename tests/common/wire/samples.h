@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-// Of every member, in the order of AnyMessage. Each encodes to less than 8 KiB.
+// A sample of every member, in the order of AnyMessage. Each encodes to less than 8 KiB.
 std::vector<AnyMessage> AllSamples();
 
 template <class Message>

@@ -12,10 +12,9 @@
 #include <thread>
 #include <vector>
 
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/survey/survey.h"
-#include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/support/full_disk.h"
@@ -53,11 +52,11 @@ class BrickStoreTest : public testing::Test {
     ASSERT_TRUE(whole.ok()) << whole.status().message();
     const SourceInfo& info = stored.source->info();
     ASSERT_EQ(info.levels.size(), 1U) << "as in memory";
-    EXPECT_EQ(info.levels[0].description, whole->info.description);
+    EXPECT_EQ(info.levels[0].description, whole->info.finest());
     EXPECT_EQ(info.format, whole->info.format);
     EXPECT_EQ(info.file_type, whole->info.file_type);
     EXPECT_EQ(info.labels, whole->info.labels);
-    const auto read = ReadLevel(*stored.source, 0);
+    const auto read = stored.source->ReadLevel(0);
     ASSERT_TRUE(read.ok()) << read.status().message();
     EXPECT_TRUE(read->volume->block.bytes == whole->volume->block.bytes);
   }
@@ -287,19 +286,6 @@ TEST_F(BrickStoreTest, AStoreThatGrowsBeyondTheBudgetIsGivenUp) {
   EXPECT_EQ(refused.code(), StatusCode::kUnavailable);
   EXPECT_THAT(refused.message(), HasSubstr("cannot hold the voxels of"));
   EXPECT_TRUE(Stores().empty());
-}
-
-TEST(DescribeStreamTest, KnowsStreamsAlone) {
-  const TemporaryDirectory directory;
-  const FileSpec spec{.size = {4, 3, 2}};
-  const FileBytes plain = NiftiHeader(spec) + FileBytes(24, 'x');
-  WriteFile(directory / "v.nii", plain);
-  WriteFile(directory / "v.nii.gz", Gzip(plain));
-  EXPECT_FALSE(DescribeStream(directory / "v.nii", {}).value().has_value());
-  EXPECT_FALSE(DescribeStream(directory / "none.nii.gz", {}).value().has_value());
-  const std::optional<SourceInfo> found = DescribeStream(directory / "v.nii.gz", {}).value();
-  ASSERT_TRUE(found.has_value());
-  EXPECT_EQ(found->levels[0].description.geometry.size, spec.size);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ std::string PackBlosc(const std::string& inner, int shuffle, std::size_t element
 // A frame that does not say how many bytes it holds.
 std::string PackZstdStream(const std::string& bytes);
 
-// Of elements of so many bytes.
+// Shuffles elements of so many bytes.
 std::string ShuffledBytes(const std::string& bytes, std::size_t element_bytes);
 // Bit by bit, in blocks of so many elements, a multiple of 8.
 std::string BitshuffledBytes(const std::string& bytes, std::size_t element_bytes, std::size_t block_elements);

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/hdf5/hdf5_array.h"
 #include "tests/data/sources/read_array.h"
 #include "tests/support/temporary_directory.h"

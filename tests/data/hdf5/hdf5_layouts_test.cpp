@@ -5,7 +5,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"
@@ -130,7 +130,7 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesShowTheFirstChannelAndAskForATime) {
   ExpectRefused(path, {.channel = 0}, "cells.ims: holds 2 volumes, of which --time takes one: 0 to 1");
   ExpectRefused(path, {.time = TimeRange{2, 2}, .channel = 0}, "time is 2, must be in [0, 1]");
   ExpectRefused(path, {.time = TimeRange{0, 0}, .channel = 2}, "cells.ims: has 2 channels, so channel must be 0 to 1 (0: DAPI, 1: GFP)");
-  ExpectRefused(path, {.spacing = Vec3{1, 1, 1}}, "takes no option spacing");
+  ExpectRefused(path, {.spacing = Vec3{1, 1, 1}}, "spacing is no option of HDF5");
 }
 
 TEST_F(Hdf5LayoutsTest, BigDataViewerFilesHaveSetupsAndUnsignedSamples) {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/hdf5/hdf5_file.h"
 #include "data/open/open_source.h"
 #include "tests/data/codecs/packed_bytes.h"

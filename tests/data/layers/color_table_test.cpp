@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -123,7 +123,7 @@ TEST(ColorTable, BadOnesEndInOneLineThatNamesWhatIsWrong) {
       {R"({"IndexedColors": [1, 0, 0], "Annotations": ["1", 2]})", "Annotations[1] is not a text"},
       {R"({"IndexedColors": [1, 0, 0], "Annotations": ["1", "a", "1", "b"]})", "label 1 is given before"},
       {long_sequence + "]}", "1 to 65536 colours"},
-      {std::string(100000, '['), "not JSON"},
+      {std::string(100000, '['), "values nest more than 64 deep"},
   };
   for (const auto& [file, why] : bad) {
     const Result<ColorTable> table = ParseColorTable(file, "a/table");

@@ -8,9 +8,10 @@
 #include <filesystem>
 #include <span>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/layers/color_table.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -156,7 +157,7 @@ TEST_F(LayerReader, LayersLieInTheSameWorld) {
   const std::string path = Write("scene.mha", {1, 2}, World::kVoxels);
   const Result<LoadedVolume> read = ReadVolume(path);
   ASSERT_TRUE(read.ok());
-  const World other = read->info.description.geometry.orientation.world == World::kPatient ? World::kVoxels : World::kPatient;
+  const World other = read->info.finest().geometry.orientation.world == World::kPatient ? World::kVoxels : World::kPatient;
   EXPECT_THAT(ErrorOf({.labels = path}, Grid(2, other)), HasSubstr("cannot be laid over each other"));
   EXPECT_THAT(ErrorOf({.overlay = path}, Grid(2, other)), HasSubstr("overlay "));
 }

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/n5/n5_array.h"
 #include "data/n5/n5_pyramid.h"
 #include "data/open/open_source.h"
@@ -109,7 +109,7 @@ class N5Test : public testing::Test {
  protected:
   Result<std::shared_ptr<ChunkedArray>> OpenArray() {
     const auto store = FolderStore(root_);
-    const Result<std::optional<metadata::Json>> json = metadata::ReadJson(*store, "attributes.json");
+    const Result<std::optional<Json>> json = metadata::ReadJson(*store, "attributes.json");
     if (!json.ok()) return json.status();
     return n5::OpenArray(store, "", metadata::Field("attributes.json", **json), context_);
   }
@@ -255,7 +255,7 @@ TEST_F(N5Test, GroupsOfLevels) {
   ExpectRefused({.array = "../other"}, "");
   WriteDataset(root_ + "/more", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
   ExpectRefused({}, "scan.n5: holds 2 volumes, of which ?array= takes one: more, raw");
-  ExpectRefused({.dataset = "/raw"}, "takes no option dataset");
+  ExpectRefused({.dataset = "/raw"}, "dataset is no option of N5");
 }
 
 // COSEM's lists are in the order of `axes`, whatever that is.

@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/open/open_source.h"
-#include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/support/random_volume.h"
@@ -149,7 +149,7 @@ TEST_F(RemoteSourceTest, TheQueryOfAnAddressGoesWithEachRequestAndIsNotShown) {
   EXPECT_EQ(AllOf(*remote, 0), AllOf(*Opened(Open(path)), 0));
   EXPECT_THAT(remote->info().notes, testing::Contains("each request has the query of the address: sv, sig"));
   EXPECT_THAT(Open(server.url() + "/scan.zarr", {.query = "sig=secret"}).status().message(), testing::Not(HasSubstr("secret")));
-  EXPECT_THAT(Open(path, {.headers = {"A:b"}}).status().message(), HasSubstr("takes no option header"));
+  EXPECT_THAT(Open(path, {.headers = {"A:b"}}).status().message(), HasSubstr("header is no option of Zarr"));
 }
 
 TEST_F(RemoteSourceTest, AStoreThatComesBackIsReadAgain) {

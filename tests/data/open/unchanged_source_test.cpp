@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "data/open/open_source.h"
-#include "data/sources/memory_source.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/support/temporary_directory.h"
 

@@ -1,4 +1,4 @@
-// Boxes that are read by position are those of the volume that ReadVolume reads.
+// Boxes that are read by position are those of the volume that is decoded as a whole.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <limits>
 #include <vector>
 
-#include "data/positional/positional_source.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/positional/file_source.h"
+#include "tests/data/positional/read_decoded.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/stored_object.h"
@@ -26,7 +26,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
-  return UncompressedFile().open(path, options, TestReadContext());
+  return OpenFile(*FindFormat(path, options), path, options, TestReadContext());
 }
 
 std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) { return Opened(Open(path, options)); }
@@ -52,13 +52,13 @@ void ExpectExact(VolumeSource& source, const Box& box, const LoadedVolume& whole
 
 void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random& random, int boxes = 12) {
   SCOPED_TRACE(path);
-  const Result<LoadedVolume> whole = ReadVolume(path, options);
+  const Result<LoadedVolume> whole = ReadDecoded(path, options);
   ASSERT_TRUE(whole.ok()) << whole.status().message();
   const auto source = Open(path, options);
   ASSERT_TRUE(source.ok()) << source.status().message();
   const SourceInfo& info = (*source)->info();
   ASSERT_EQ(info.levels.size(), 1U);
-  const VolumeDescription &description = info.levels[0].description, &wanted = whole->info.description;
+  const VolumeDescription &description = info.levels[0].description, &wanted = whole->info.finest();
   EXPECT_EQ(description.geometry, wanted.geometry);
   EXPECT_EQ(info.format, whole->info.format);
   EXPECT_EQ(info.file_type, whole->info.file_type);
@@ -190,7 +190,7 @@ TEST(Positional, TakesOneOfSeveralTimesAndComponents) {
     EXPECT_THAT(Open(directory / "v.nrrd").status().message(), HasSubstr("components a voxel, of which --channel takes one"));
   }
   WriteFile(directory / "v.nrrd", "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\n\n" + std::string(24, 'x'));
-  EXPECT_THAT(Open(directory / "v.nrrd", {.channel = kLuminance}).status().message(), HasSubstr("luminance"));
+  EXPECT_TRUE(Opened(directory / "v.nrrd", {.channel = kLuminance})->info().whole);
 }
 
 // Larger than what one part of a read takes, by slices, by rows, and by columns.
@@ -236,18 +236,20 @@ TEST(Positional, ReadsOnlyWhatABoxNeeds) {
   EXPECT_EQ(source->info().levels[0].block, (Index3{100, 1, 1})) << "a row lies together";
 }
 
-TEST(Positional, KnowsWhatItReads) {
+TEST(Positional, KnowsHowEachFileIsRead) {
   const TemporaryDirectory directory;
   for (const SampleFile& file : OneOfEachFormat()) {
-    SCOPED_TRACE(file.file);
     WriteFile(directory / file.file, file.bytes);
-    const bool plain = UncompressedFile().recognises(directory / file.file, {});
     const auto source = Open(directory / file.file);
-    EXPECT_EQ(source.ok(), plain) << source.status().message();
-    EXPECT_EQ(source.status().code(), plain ? StatusCode::kOk : StatusCode::kInvalidArgument) << source.status().message();
+    ASSERT_TRUE(source.ok()) << source.status().message();
+    const SourceInfo& info = (*source)->info();
+    EXPECT_EQ(info.in_parts() + info.slices.has_value() + info.whole, 1) << file.file;
+    // However it is read, each box is that of the whole.
+    Random random(38);
+    ExpectLikeWhole(directory / file.file, {}, random, 3);
   }
-  EXPECT_TRUE(UncompressedFile().recognises(directory / "v.nii", {}));
-  EXPECT_FALSE(UncompressedFile().recognises(directory / "v.nii.gz", {}));
+  EXPECT_TRUE(Opened(directory / "v.nii")->info().in_parts());
+  EXPECT_TRUE(Opened(directory / "v.nii.gz")->info().slices.has_value());
 }
 
 TEST(Positional, HalfFloatsAreReadInParts) {
@@ -259,23 +261,20 @@ TEST(Positional, HalfFloatsAreReadInParts) {
   ExpectLikeWhole(directory / "v.npy", {}, random);
 }
 
-TEST(Positional, SaysWhyAFileIsNotReadByPosition) {
+TEST(Positional, WhatDoesNotLieInOnePieceIsDecodedAsAWhole) {
   const TemporaryDirectory directory;
-  const auto refusal = [&](const std::string& name, const FileBytes& bytes) {
+  const auto is_whole = [&](const std::string& name, const FileBytes& bytes) {
     WriteFile(directory / name, bytes);
-    EXPECT_FALSE(UncompressedFile().recognises(directory / name, {}));
-    const Status status = Open(directory / name).status();
-    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
-    return status.message();
+    Random random(39);
+    ExpectLikeWhole(directory / name, {}, random, 3);
+    return Opened(directory / name)->info().whole;
   };
   const FileSpec spec;
-  EXPECT_THAT(refusal("v.nii.gz", Gzip(NiftiHeader(spec) + std::string(24, 'x'))), AllOf(HasSubstr("v.nii.gz"), HasSubstr("compressed")));
-  EXPECT_THAT(refusal("v.nrrd",
-                      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspace: RAS\n"
-                      "space directions: (1,0,0) (0,1,0) (0,0.3,1)\n\n12345678"),
-              HasSubstr("not at right angles"));
-  EXPECT_THAT(refusal("v.vti", VtiFile(spec, std::string(24, 'x'), {.encoding = "base64"})), HasSubstr("text, base64 or compressed"));
-  EXPECT_THAT(refusal("v.vtk", VtkFile(spec, std::string(24, 'x'), true)), HasSubstr("it is VTK"));
+  EXPECT_TRUE(is_whole("v.nrrd",
+                       "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspace: RAS\n"
+                       "space directions: (1,0,0) (0,1,0) (0,0.3,1)\n\n12345678"));
+  EXPECT_TRUE(is_whole("v.vti", VtiFile(spec, std::string(24, 'x'), {.encoding = "base64"})));
+  EXPECT_TRUE(is_whole("v.vtk", VtkFile(spec, std::string(24, 'x'), true)));
 }
 
 TEST(Positional, NamesAFileThatIsOrBecomesTooShort) {
@@ -323,7 +322,7 @@ TEST(Positional, BearsDamagedFiles) {
       if (random.Chance(0.2)) bytes.resize(random.Integer<std::size_t>(0, bytes.size()));
       WriteFile(directory / file.file, bytes);
       const auto source = Open(directory / file.file);
-      if (!source.ok()) continue;
+      if (!source.ok() || !(*source)->info().in_parts()) continue;
       SCOPED_TRACE(fmt::format("{}, {}", file.file, i));
       ASSERT_LT((*source)->info().levels[0].description.geometry.bounds().voxel_count(), 10000);
       ExpectLikeWhole(directory / file.file, {}, random, 3);

@@ -1,4 +1,4 @@
-// Slices of compressed streams make the volume that ReadVolume reads.
+// Slices of compressed streams make the volume that is decoded as a whole.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/volume/box_assembly.h"
-#include "data/positional/slice_stream.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/positional/file_source.h"
+#include "tests/data/positional/read_decoded.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/support/random.h"
@@ -19,25 +19,25 @@ namespace {
 
 using testing::HasSubstr;
 
-std::shared_ptr<SliceStream> OpenedStream(const std::string& path, const ReadOptions& options = {}) {
+std::shared_ptr<VolumeSource> OpenedStream(const std::string& path, const ReadOptions& options = {}) {
   static const SourceContext kContext = std::make_shared<ReadContext>(ReadContext::Limits{});
-  Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(path, options, kContext);
-  CHECK(stream.ok()) << stream.status().message();
+  Result<std::shared_ptr<VolumeSource>> stream = OpenFile(*FindFormat(path, options), path, options, kContext);
+  CHECK(stream.ok() && (*stream)->info().slices) << stream.status().message();
   return *std::move(stream);
 }
 
 // Boxes of `slices` slices, in the order of the file.
-std::vector<Box> InOrder(const SliceStream& stream, std::int32_t slices) {
+std::vector<Box> InOrder(const VolumeSource& stream, std::int32_t slices) {
   const Box bounds = stream.info().levels[0].description.geometry.bounds();
   Index3 step = bounds.end;
-  step[stream.along()] = slices;
+  step[stream.info().slices->along] = slices;
   std::vector<Box> boxes = CutAtBlocks(bounds, step);
-  if (stream.from_end()) std::ranges::reverse(boxes);
+  if (stream.info().slices->from_end) std::ranges::reverse(boxes);
   return boxes;
 }
 
 // All boxes put together.
-VoxelBlock Collect(SliceStream& stream, const std::vector<Box>& boxes) {
+VoxelBlock Collect(VolumeSource& stream, const std::vector<Box>& boxes) {
   const VolumeDescription& description = stream.info().levels[0].description;
   VoxelBlock all = MakeVoxelBlock(description.geometry.bounds(), description.type);
   for (const Box& box : boxes) {
@@ -56,14 +56,13 @@ VoxelBlock Collect(SliceStream& stream, const std::vector<Box>& boxes) {
 }
 
 void ExpectStreamLikeWhole(const std::string& path, const ReadOptions& options = {}) {
-  const Result<LoadedVolume> whole = ReadVolume(path, options);
+  const Result<LoadedVolume> whole = ReadDecoded(path, options);
   ASSERT_TRUE(whole.ok()) << whole.status().message();
-  EXPECT_TRUE(SliceStream::Recognises(path, options));
   for (const std::int32_t slices : {1, 2, 3, 64}) {
-    const std::shared_ptr<SliceStream> stream = OpenedStream(path, options);
-    EXPECT_EQ(stream->info().levels[0].description, whole->info.description);
+    const std::shared_ptr<VolumeSource> stream = OpenedStream(path, options);
+    EXPECT_EQ(stream->info().levels[0].description, whole->info.finest());
     EXPECT_TRUE(Collect(*stream, InOrder(*stream, slices)).bytes == whole->volume->block.bytes) << slices;
-    EXPECT_EQ(stream->counts().stored_bytes % std::size_t(whole->info.description.geometry.bounds().voxel_count()), 0U);
+    EXPECT_EQ(stream->counts().stored_bytes % std::size_t(whole->info.finest().geometry.bounds().voxel_count()), 0U);
   }
 }
 
@@ -138,10 +137,10 @@ TEST(SliceStream, ReadsInOrderOnceAndAnyBoxFromTheBeginning) {
   Random random(53);
   for (std::size_t i = 0; i < kSlice * 20; ++i) samples += char(random.Integer(0, 255));
   WriteFile(path, Gzip(NiftiHeader({.size = {40, 30, 20}}) + samples));
-  const VoxelBlock whole = ReadVolume(path)->volume->block;
+  const VoxelBlock whole = ReadDecoded(path)->volume->block;
   std::vector<int> percents;
   ReadProgress progress([&](const ReadShare& read) { percents.push_back(read.percent); });
-  const std::shared_ptr<SliceStream> stream = OpenedStream(path, {.progress = &progress});
+  const std::shared_ptr<VolumeSource> stream = OpenedStream(path, {.progress = &progress});
   EXPECT_EQ(stream->info().levels[0].block, (Index3{40, 30, 1}));
   EXPECT_TRUE(Collect(*stream, InOrder(*stream, 6)).bytes == whole.bytes);
   EXPECT_EQ(stream->counts().stored_bytes, kSlice * 20);
@@ -166,7 +165,7 @@ TEST(SliceStream, EndsWithWhatIsWrong) {
   int boxes = 0;
   const auto read = [&](const FileBytes& file, std::stop_token stop = {}) {
     WriteFile(path, file);
-    const std::shared_ptr<SliceStream> stream = OpenedStream(path);
+    const std::shared_ptr<VolumeSource> stream = OpenedStream(path);
     Status status;
     for (const Box& box : InOrder(*stream, 4)) {
       VoxelBlock part = MakeVoxelBlock(box, ScalarType::kUint8);
@@ -186,9 +185,6 @@ TEST(SliceStream, EndsWithWhatIsWrong) {
   std::stop_source stop;
   stop.request_stop();
   EXPECT_EQ(read(bytes, stop.get_token()).code(), StatusCode::kCancelled);
-  WriteFile(directory / "v.nii", NiftiHeader(spec) + samples);
-  EXPECT_FALSE(SliceStream::Recognises(directory / "v.nii"));
-  EXPECT_THAT(SliceStream::Open(directory / "v.nii", {}, nullptr).status().message(), HasSubstr("not compressed"));
 }
 
 }  // namespace

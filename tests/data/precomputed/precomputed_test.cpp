@@ -426,7 +426,7 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   ASSERT_TRUE(outside.ok()) << outside.status().message();
   EXPECT_FALSE(SamplesOf<std::uint8_t>(**outside).ok()) << "chunks lie in the folder";
   WriteText(root_ + "/info", good);
-  ExpectRefused({.time = TimeRange{0, 0}}, "takes no option time");
+  ExpectRefused({.time = TimeRange{0, 0}}, "time is no option of Neuroglancer precomputed");
 }
 
 TEST_F(PrecomputedTest, OneLineTellsThatNoChunkIsThere) {

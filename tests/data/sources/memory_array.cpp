@@ -4,7 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 

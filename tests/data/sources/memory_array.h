@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 
 namespace slabstream {
 
@@ -28,9 +28,9 @@ class MemoryArray : public ChunkedArray {
   const ArrayShape& shape() const override { return shape_; }
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override;
 
-  std::uint64_t chunk_count() const;  // of the array
+  std::uint64_t chunk_count() const;  // chunks of the array
   const std::byte* element(std::span<const std::uint64_t> at) const;
-  std::uint64_t NumberOf(std::span<const std::uint64_t> index) const;  // of a chunk
+  std::uint64_t NumberOf(std::span<const std::uint64_t> index) const;  // the number of a chunk
 
   std::size_t held_chunks() const;
   bool LetGo(std::size_t which);             // the chunk asked for at this place among the held ones arrives; false: there are fewer

@@ -1,4 +1,4 @@
-#include "data/sources/memory_source.h"
+#include "tests/data/sources/memory_source.h"
 
 #include <gtest/gtest.h>
 

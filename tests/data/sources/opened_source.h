@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "common/base/check.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
 
@@ -60,7 +61,7 @@ inline AlignedVector<std::byte> ReadBoxApart(VolumeSource& source, int level, co
   return bytes;
 }
 
-// Of a whole level.
+// The samples of a whole level.
 template <class T>
 Result<std::vector<T>> SamplesOf(VolumeSource& source, int level = 0) {
   const VolumeDescription& description = source.info().levels[std::size_t(level)].description;

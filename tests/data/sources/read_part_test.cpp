@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "data/sources/memory_source.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/random_box.h"
 #include "tests/support/random_volume.h"
 

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <future>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/store.h"
 #include "tests/data/stores/scripted_server.h"

@@ -196,26 +196,6 @@ TEST_F(ObjectCacheTest, WithoutAStrongETagNothingIsKept) {
   }
 }
 
-TEST_F(ObjectCacheTest, AStoreMayTakeWhatIsKeptWithoutAskingForIt) {
-  std::atomic<int> asked = 0;
-  ScriptedServer server([&](const ServerRequest&) {
-    ++asked;
-    return AnswerText("200 OK", "served", "ETag: \"v2\"\r\n");
-  });
-  ObjectCache cache = Open();
-  cache.Keep(server.url() + "/volume/old", {"\"v1\"", 4, BytesOf("kept")});
-  HttpTransfers transfers({});
-  const std::shared_ptr<Store> checks = HttpStore(server.url() + "/volume", transfers, &cache).value(),
-                               takes =
-                                   HttpStore(server.url() + "/volume", transfers, &cache, {.kept = WebOptions::Kept::kAreTaken}).value();
-  EXPECT_EQ(TextOf(ReadNow(*takes, "old").value()), "kept");
-  EXPECT_EQ(asked, 0);
-  EXPECT_EQ(TextOf(ReadNow(*takes, "new").value()), "served");
-  EXPECT_EQ(asked, 1);
-  EXPECT_EQ(TextOf(ReadNow(*checks, "old").value()), "served");
-  EXPECT_EQ(asked, 2);
-}
-
 TEST_F(ObjectCacheTest, WhatTheServerHasJustSaidIsNotAskedAgain) {
   std::atomic<int> asked = 0;
   ScriptedServer server([&](const ServerRequest& request) {

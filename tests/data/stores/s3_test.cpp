@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <future>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/store.h"
 #include "data/stores/transfer.h"

@@ -13,7 +13,7 @@
 #include <set>
 #include <thread>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/data/stores/zip_files.h"
 #include "tests/support/temporary_directory.h"
 

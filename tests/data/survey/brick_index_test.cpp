@@ -11,10 +11,10 @@
 #include <limits>
 #include <thread>
 
-#include "common/base/file_descriptor.h"
-#include "data/sources/memory_source.h"
+#include "common/files/file_descriptor.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
 

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "data/sources/memory_source.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/random_volume.h"
 
 namespace slabstream {
@@ -152,7 +152,7 @@ TEST(ReadLevelTest, IsTheVolume) {
   SCOPED_TRACE(random.trace());
   for (const ScalarType type : kTypes) {
     const std::shared_ptr<const Volume> volume = SomeVolume(random, {33, 70, 130}, type);
-    const Result<LevelInMemory> read = ReadLevel(*MakeMemorySource(volume, {}), 0);
+    const Result<LevelInMemory> read = MakeMemorySource(volume, {})->ReadLevel(0);
     ASSERT_TRUE(read.ok()) << read.status().message();
     EXPECT_EQ(read->volume->description, volume->description);
     EXPECT_EQ(read->volume->block.box, volume->block.box);
@@ -169,22 +169,22 @@ TEST(ReadLevelTest, KeepsWholeNumbersThatAreRounded) {
   const std::size_t count = CountIn(volume->description.geometry.size);
   std::vector<std::uint64_t> ids(count);
   for (std::size_t i = 0; i < count; ++i) ids[i] = i * 3;
-  const auto read = [&](ExactWanted wanted) {
+  const auto read = [&](bool all) {
     const auto exact = std::make_shared<ExactSamples>(ExactSamples{{SampleType::kUint64}, {}});
     exact->bytes.resize(count * sizeof(std::uint64_t));
     std::memcpy(exact->bytes.data(), ids.data(), exact->bytes.size());
     std::ranges::copy(ids, volume->block.samples<float>());
-    Result<LevelInMemory> level = ReadLevel(*MakeMemorySource(volume, {}, exact), 0, nullptr, wanted);
+    Result<LevelInMemory> level = MakeMemorySource(volume, {}, exact)->ReadLevel(0, nullptr, {.all_exact = all});
     EXPECT_TRUE(level.ok()) << level.status().message();
     EXPECT_EQ(level->volume->block.bytes, volume->block.bytes);
     EXPECT_TRUE(level->exact == nullptr || level->exact->bytes == exact->bytes);
     return level->exact != nullptr;
   };
   for (std::uint64_t& id : ids) id &= 0xffffff;  // all of these are exact as float32
-  EXPECT_FALSE(read(ExactWanted::kLabels));
-  EXPECT_TRUE(read(ExactWanted::kAll));
+  EXPECT_FALSE(read(false));
+  EXPECT_TRUE(read(true));
   ids.back() = 12857642017;
-  EXPECT_TRUE(read(ExactWanted::kLabels));
+  EXPECT_TRUE(read(false));
 }
 
 }  // namespace

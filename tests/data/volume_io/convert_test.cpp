@@ -8,8 +8,9 @@
 #include <numbers>
 #include <optional>
 
+#include "data/open/read_volume.h"
 #include "data/volume_io/formats.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
@@ -29,7 +30,7 @@ struct Target {
 
 std::vector<Target> Targets() {
   std::vector<Target> targets;
-  for (const VolumeFormat& format : VolumeFormats()) {
+  for (const VolumeFormat& format : FileFormats()) {
     for (const std::string_view ending : format.written_endings) targets.push_back({&format, "v" + std::string(ending)});
   }
   return targets;
@@ -75,7 +76,7 @@ Volume RandomScan(Random& random) {
 std::shared_ptr<const Volume> ThroughFile(const Volume& before, const Target& target, const std::string& path) {
   const Status status = WriteVolume(before, path);
   EXPECT_TRUE(status.ok()) << status.message();
-  const Result<LoadedVolume> loaded = ReadVolume(path);
+  const Result<LoadedVolume> loaded = ReadVolume(path, {}, true);
   if (!loaded.ok()) {
     ADD_FAILURE() << loaded.status().message();
     return nullptr;
@@ -83,7 +84,7 @@ std::shared_ptr<const Volume> ThroughFile(const Volume& before, const Target& ta
   const VolumeGeometry &was = before.description.geometry, &is = loaded->volume->description.geometry;
   const KeptGeometry& keeps = target.format->keeps;
   EXPECT_EQ(loaded->info.format, target.format->name);
-  EXPECT_FALSE(loaded->info.straightened);
+  EXPECT_FALSE(loaded->info.stored->slanted);
   EXPECT_EQ(is.size, was.size);
   if (keeps.spacing) ExpectNear(is.spacing, was.spacing, 1e-6 * Length(was.spacing));
   if (keeps.axes) {

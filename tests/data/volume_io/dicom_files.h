@@ -36,7 +36,7 @@ std::string Lps(const std::vector<Vec3>& ras);
 
 struct DicomGroups {
   DicomTag sequence;
-  DicomValues values;  // of its only item
+  DicomValues values;  // the values of its only item
 };
 
 struct DicomSpec {

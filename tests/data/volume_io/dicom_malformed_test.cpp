@@ -6,7 +6,8 @@
 #include <algorithm>
 #include <string_view>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/dicom_files.h"
 #include "tests/support/random.h"
 
@@ -74,7 +75,7 @@ TEST(DicomMalformed, AlteredBytesNeverDoHarm) {
       WriteFile(directory / "0", bytes);
       const Result<LoadedVolume> loaded = ReadVolume(directory.path());
       if (loaded.ok()) {
-        EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.description.voxel_bytes());
+        EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.finest().voxel_bytes());
       } else {
         ExpectRefusal(loaded.status(), directory.path());
       }

@@ -7,7 +7,8 @@
 
 #include <filesystem>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/dicom_files.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/support/expect_near.h"
@@ -116,7 +117,7 @@ TEST(DicomObjects, OneOfEachCopyIsEnough) {
       WriteDicom(directory / "copy/" + std::to_string(z), spec);
     }
     const LoadedVolume loaded = MustRead(directory.path());
-    EXPECT_EQ(loaded.info.description.geometry.size.z, 3);
+    EXPECT_EQ(loaded.info.finest().geometry.size.z, 3);
     EXPECT_EQ(DataValues(*loaded.volume).back(), 2);
     EXPECT_THAT(loaded.info.notes, ElementsAre(HasSubstr("3 copies")));
   }
@@ -161,7 +162,7 @@ TEST(DicomObjects, ReconstructedNuclearMedicineLiesAsItsDetectorSays) {
   for (const double spacing : {3.0, -3.0}) {
     WriteDicom(directory / "nm", Nuclear(4, {{kSpacingBetweenSlices, fmt::format("{}", spacing)}}));
     const LoadedVolume loaded = MustRead(directory / "nm");
-    const VolumeGeometry& geometry = loaded.info.description.geometry;
+    const VolumeGeometry& geometry = loaded.info.finest().geometry;
     EXPECT_EQ(geometry.spacing, (Vec3{2, 2, 3}));
     EXPECT_EQ(geometry.orientation.origin, (Vec3{-10, 20, spacing > 0 ? 30.0 : 21.0}));
     EXPECT_EQ(DataValues(*loaded.volume).front(), spacing > 0 ? 0 : 3);
@@ -177,7 +178,7 @@ TEST(DicomObjects, GatedNuclearMedicineIsDividedByItsVectors) {
   EXPECT_THAT(WhyNot(directory / "nm"), AllOf(HasSubstr("TimeSlotVector 1, 2"), HasSubstr("--time")));
   const LoadedVolume loaded = MustRead(directory / "nm", AtTimeOf(1));
   EXPECT_EQ(DataValues(*loaded.volume).front(), 5) << "slice 1 is the last frame";
-  EXPECT_EQ(loaded.info.description.geometry.orientation.origin.z, 30);
+  EXPECT_EQ(loaded.info.finest().geometry.orientation.origin.z, 30);
 }
 
 TEST(DicomObjects, NuclearMedicineWithoutSlicesIsNamed) {
@@ -238,9 +239,9 @@ TEST(DicomObjects, SegmentsBecomeLabels) {
                Segmentation({{second, 6, right}, {1, 6, left}, {1, 0, left}, {second, 2, right}}, {{second, "Lesion"}, {1, "Liver"}}));
     const LoadedVolume loaded = MustRead(directory / "seg");
     EXPECT_TRUE(loaded.info.labels);
-    EXPECT_EQ(loaded.info.description.type, second == 2 ? ScalarType::kUint8 : ScalarType::kUint16);
-    EXPECT_EQ(loaded.info.description.geometry.size, (Index3{4, 3, 4}));
-    EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{1, 1, 2}));
+    EXPECT_EQ(loaded.info.finest().type, second == 2 ? ScalarType::kUint8 : ScalarType::kUint16);
+    EXPECT_EQ(loaded.info.finest().geometry.size, (Index3{4, 3, 4}));
+    EXPECT_EQ(loaded.info.finest().geometry.spacing, (Vec3{1, 1, 2}));
     std::vector<double> expected(48, 0);
     for (std::size_t i = 0; i < 12; ++i) {
       expected[i] = left[i];

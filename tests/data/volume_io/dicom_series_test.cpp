@@ -5,8 +5,8 @@
 
 #include <functional>
 
+#include "data/open/read_volume.h"
 #include "data/volume_io/dicom_series.h"
-#include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/dicom_files.h"
 
 namespace slabstream {
@@ -70,11 +70,11 @@ TEST(DicomSeries, TheOnlyVolumeIsChosenAmongOtherThings) {
 
   const Result<LoadedVolume> loaded = ReadVolume(directory.path());
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_EQ(loaded->info.description.geometry.size, (Index3{4, 3, 3}));
+  EXPECT_EQ(loaded->info.finest().geometry.size, (Index3{4, 3, 3}));
   // A localizer is a volume if one asks for it.
   const Result<LoadedVolume> asked = ReadVolume(directory.path(), {.series = "2"});
   ASSERT_TRUE(asked.ok()) << asked.status().message();
-  EXPECT_EQ(asked->info.description.geometry.spacing.z, 7);
+  EXPECT_EQ(asked->info.finest().geometry.spacing.z, 7);
 
   const Result<std::vector<DicomSeries>> all = ListDicomSeries(directory.path());
   ASSERT_TRUE(all.ok()) << all.status().message();
@@ -95,7 +95,7 @@ TEST(DicomSeries, AmongSeveralVolumesNoneIsChosenInSilence) {
                                        HasSubstr("2 (CT, 2 images, \"LUNG\")")));
   const auto spacing = [&](const std::string& series) {
     const Result<LoadedVolume> loaded = ReadVolume(directory.path(), {.series = series});
-    return loaded.ok() ? loaded->info.description.geometry.spacing.z : 0;
+    return loaded.ok() ? loaded->info.finest().geometry.spacing.z : 0;
   };
   EXPECT_EQ(spacing("1"), 2);
   EXPECT_EQ(spacing("1.2.4"), 3);
@@ -189,7 +189,7 @@ TEST(DicomSeries, MayBeRoundedAsScannersRound) {
   WriteSlices(directory, "s", slices);
   const Result<LoadedVolume> loaded = ReadVolume(directory.path());
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_NEAR(loaded->info.description.geometry.spacing.z, 0.625, 0.002);
+  EXPECT_NEAR(loaded->info.finest().geometry.spacing.z, 0.625, 0.002);
 }
 
 }  // namespace

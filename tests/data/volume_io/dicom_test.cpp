@@ -10,8 +10,9 @@
 #include <numbers>
 #include <sstream>
 
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/volume_io/compressed_frame.h"
-#include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/dicom_files.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
@@ -63,9 +64,9 @@ TEST(Dicom, InAnyOfThe48AcquisitionsIsTheVolumeThatNrrdHas) {
       WriteSeries(directory.path(), StoredAs(object, storage));
       ASSERT_TRUE(LooksLikeVolume(directory.path()));
       const LoadedVolume loaded = ReadDicomVolume(directory.path());
-      ExpectSamePlace(loaded.info.description.geometry, expected.info.description.geometry);
+      ExpectSamePlace(loaded.info.finest().geometry, expected.info.finest().geometry);
       EXPECT_TRUE(std::ranges::equal(loaded.volume->block.bytes, expected.volume->block.bytes));
-      EXPECT_FALSE(loaded.info.straightened);
+      EXPECT_FALSE(loaded.info.stored->slanted);
     }
   }
 }
@@ -81,8 +82,8 @@ TEST(Dicom, OfATiltedGantryIsStraightenedLikeNrrd) {
     const TemporaryDirectory directory, other;
     WriteSeries(directory.path(), stored);
     const LoadedVolume loaded = ReadDicomVolume(directory.path()), expected = ReadAsNrrd(other, stored);
-    EXPECT_TRUE(loaded.info.straightened);
-    ExpectSamePlace(loaded.info.description.geometry, expected.info.description.geometry);
+    EXPECT_TRUE(loaded.info.stored->slanted);
+    ExpectSamePlace(loaded.info.finest().geometry, expected.info.finest().geometry);
     const std::vector<double> values = DataValues(*loaded.volume), wanted = DataValues(*expected.volume);
     ASSERT_EQ(values.size(), wanted.size());
     for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(values[i], wanted[i], 1) << i;  // numbers in text are rounded
@@ -178,8 +179,8 @@ TEST(Dicom, KeepsStoredIntegersUnderOneRescaling) {
     WriteSeries(directory.path(), StackOf(SampleType::kInt16, raw), SampleType::kInt16,
                 {{kTagSlope, "0.5"}, {kTagIntercept, "-1024"}, {kTagPhotometric, photometric}});
     const LoadedVolume loaded = ReadDicomVolume(directory.path());
-    EXPECT_EQ(loaded.info.description.type, ScalarType::kUint16);
-    EXPECT_EQ(loaded.info.description.mapping.scale, 0.5);
+    EXPECT_EQ(loaded.info.finest().type, ScalarType::kUint16);
+    EXPECT_EQ(loaded.info.finest().mapping.scale, 0.5);
     EXPECT_EQ(DataValues(*loaded.volume), values);
   }
 }
@@ -205,7 +206,7 @@ TEST(Dicom, GivesRightValuesWhereEachSliceHasItsOwnRescaling) {
     WriteDicom(directory / std::to_string(z), spec);
   }
   const LoadedVolume loaded = ReadDicomVolume(directory.path());
-  EXPECT_EQ(loaded.info.description.type, ScalarType::kFloat32);
+  EXPECT_EQ(loaded.info.finest().type, ScalarType::kFloat32);
   EXPECT_EQ(DataValues(*loaded.volume), values);
 }
 
@@ -239,8 +240,8 @@ TEST(Dicom, OfSeveralFramesInAFileIsReadInTheOrderOfTheirPositions) {
     for (const std::string& path : {directory.path(), directory / "enhanced"}) {
       const LoadedVolume loaded = ReadDicomVolume(path);
       EXPECT_EQ(DataValues(*loaded.volume), values);
-      EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.5, 0.75, 2.5}));
-      EXPECT_EQ(loaded.info.description.geometry.orientation.origin, (Vec3{-4, -5, 0}));
+      EXPECT_EQ(loaded.info.finest().geometry.spacing, (Vec3{0.5, 0.75, 2.5}));
+      EXPECT_EQ(loaded.info.finest().geometry.orientation.origin, (Vec3{-4, -5, 0}));
     }
   }
 }
@@ -264,8 +265,8 @@ TEST(Dicom, OfARadiationDoseLiesByItsOffsets) {
   WriteDicom(directory / "dose", spec);
   const LoadedVolume loaded = ReadDicomVolume(directory / "dose");
   EXPECT_EQ(DataValues(*loaded.volume), values);
-  EXPECT_EQ(loaded.info.description.geometry.spacing.z, 2.5);
-  EXPECT_EQ(loaded.info.description.geometry.orientation.origin, (Vec3{-1, -2, 30}));
+  EXPECT_EQ(loaded.info.finest().geometry.spacing.z, 2.5);
+  EXPECT_EQ(loaded.info.finest().geometry.orientation.origin, (Vec3{-1, -2, 30}));
 }
 
 TEST(Dicom, IsFoundByItsBytesInAllSubFolders) {

@@ -11,8 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "data/open/read_volume.h"
 #include "data/volume_io/formats.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
 
@@ -46,7 +47,7 @@ std::string TextOf(const AlignedVector<std::byte>& bytes) { return {reinterpret_
 
 std::vector<std::string> WrittenFiles() {
   std::vector<std::string> files;
-  for (const VolumeFormat& format : VolumeFormats()) {
+  for (const VolumeFormat& format : FileFormats()) {
     for (const std::string_view ending : format.written_endings) files.push_back("out" + std::string(ending));
   }
   return files;
@@ -60,15 +61,15 @@ TEST(ExactSamples, EveryReaderHasThemAndEveryWriterWritesThem) {
     const FileSpec spec{.size = {5, 4, 3}, .type = type};
     const std::string samples = RandomSamples(type, CountIn(spec.size), random);
     WriteFile(directory / "in.nrrd", NrrdHeader(spec, "raw") + samples);
-    const LoadedVolume first = ReadVolume(directory / "in.nrrd").value();
+    const LoadedVolume first = ReadVolume(directory / "in.nrrd", {}, true).value();
     for (const std::string& file : WrittenFiles()) {
       SCOPED_TRACE(std::string(ToString(type)) + " " + file);
       ASSERT_TRUE(WriteVolume(*first.volume, directory / file, {.type = {}, .progress = {}, .exact = first.exact.get()}).ok());
-      const Result<LoadedVolume> read = ReadVolume(directory / file);
+      const Result<LoadedVolume> read = ReadVolume(directory / file, {}, true);
       ASSERT_TRUE(read.ok()) << read.status().message();
       EXPECT_EQ(read->info.file_type, ToString(type));
       ASSERT_NE(read->exact, nullptr);
-      EXPECT_TRUE(read->rounded);
+      EXPECT_TRUE(!read->rounding.empty());
       EXPECT_EQ(read->exact->of.type, type);
       EXPECT_EQ(TextOf(read->exact->bytes), samples);
     }
@@ -85,7 +86,7 @@ TEST(ExactSamples, AreTurnedAsTheVolumeIs) {
   const std::size_t spacings = header.find("spacings");
   if (spacings != std::string::npos) header.erase(spacings, header.find('\n', spacings) + 1 - spacings);
   WriteFile(directory / "v.nrrd", header + BytesOf(std::vector<std::uint64_t>{id, id + 1, id + 2, id + 3}));
-  const Result<LoadedVolume> read = ReadVolume(directory / "v.nrrd");
+  const Result<LoadedVolume> read = ReadVolume(directory / "v.nrrd", {}, true);
   ASSERT_TRUE(read.ok()) << read.status().message();
   EXPECT_EQ(TextOf(read->exact->bytes), BytesOf(std::vector<std::uint64_t>{id + 1, id, id + 3, id + 2}));
 }
@@ -95,7 +96,7 @@ TEST(ExactSamples, OfOtherTypesAreThoseOfTheVolume) {
   for (const SampleType type : {SampleType::kInt8, SampleType::kUint8, SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32}) {
     const FileSpec spec{.size = {2, 1, 1}, .type = type};
     WriteFile(directory / "v.nrrd", NrrdHeader(spec, "raw") + EncodeSamples(type, {1, 2}));
-    EXPECT_EQ(ReadVolume(directory / "v.nrrd").value().exact, nullptr);
+    EXPECT_EQ(ReadVolume(directory / "v.nrrd", {}, true).value().exact, nullptr);
   }
 }
 
@@ -117,9 +118,9 @@ TEST(ExactSamples, AreRoundedOnlyWhereTheVolumeDoesNotHoldThem) {
 // Pictures do not show what lies beyond float32: somebody must say so, and what to do.
 TEST(ExactSamples, ValuesBeyondFloat32AreCountedInWords) {
   const auto text = [](const std::vector<double>& values) {
-    ExactSamples samples{.of = {SampleType::kFloat64}, .bytes = AlignedVector<std::byte>(values.size() * sizeof(double))};
-    std::memcpy(samples.bytes.data(), values.data(), samples.bytes.size());
-    return RoundingText(SampleType::kFloat64, &samples);
+    FloatReach reach;
+    reach.Add(values);
+    return RoundingText(SampleType::kFloat64, nullptr, reach);
   };
   EXPECT_EQ(text({0, 3e40, -1e39, 1}),
             "2 of 4 values are beyond those of float32 (3.4e38) and are not shown: divide the values, by 1e40 for example");
@@ -146,7 +147,7 @@ TEST(ExactSamples, ATypeThatDoesNotHoldALabelNamesItToTheLastDigit) {
   const TemporaryDirectory directory;
   const FileSpec spec{.size = {2, 1, 1}, .type = SampleType::kUint64};
   WriteFile(directory / "v.nrrd", NrrdHeader(spec, "raw") + BytesOf(std::vector<std::uint64_t>{1, std::uint64_t{1} << 63 | 1}));
-  const LoadedVolume read = ReadVolume(directory / "v.nrrd").value();
+  const LoadedVolume read = ReadVolume(directory / "v.nrrd", {}, true).value();
   const auto write = [&](SampleType type) {
     return WriteVolume(*read.volume, directory / "w.nrrd", {.type = type, .progress = {}, .exact = read.exact.get()});
   };

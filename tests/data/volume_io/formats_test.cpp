@@ -6,7 +6,10 @@
 #include <cstring>
 #include <limits>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
+#include "data/volume_io/exact_samples.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/full_disk.h"
@@ -50,7 +53,7 @@ LoadedVolume Read(const std::string& path) {
   Result<LoadedVolume> loaded = ReadVolume(path);
   CHECK(loaded.ok()) << loaded.status().message();
   const Volume& volume = *loaded->volume;
-  EXPECT_EQ(volume.description, loaded->info.description);
+  EXPECT_EQ(volume.description, loaded->info.finest());
   EXPECT_EQ(volume.block.box, volume.description.geometry.bounds());
   EXPECT_EQ(volume.block.type, volume.description.type);
   EXPECT_EQ(std::int64_t(volume.block.bytes.size()), volume.description.voxel_bytes());
@@ -134,8 +137,8 @@ TEST_P(EveryFormat, GivesBackEveryTypeInBothByteOrders) {
       const LoadedVolume loaded = Read(directory / writer.file);
       EXPECT_EQ(loaded.info.format, writer.format);
       EXPECT_EQ(loaded.info.file_type, ToString(type));
-      EXPECT_EQ(loaded.info.description.geometry.size, spec.size);
-      EXPECT_EQ(loaded.info.description.geometry.spacing, states_spacing ? spec.spacing : (Vec3{1, 1, 1}));
+      EXPECT_EQ(loaded.info.finest().geometry.size, spec.size);
+      EXPECT_EQ(loaded.info.finest().geometry.spacing, states_spacing ? spec.spacing : (Vec3{1, 1, 1}));
       std::vector<double> expected = values;
       if (type == SampleType::kFloat32) expected.back() = double(float(expected.back()));
       EXPECT_EQ(DataValues(*loaded.volume), expected);
@@ -169,8 +172,8 @@ TEST(SampleTypes, AreKeptInTheSmallestTypeThatLosesNothing) {
     const TemporaryDirectory directory;
     WriteFile(directory / "v.nrrd", NrrdHeader({.size = {2, 1, 1}, .type = type}, "raw") + EncodeSamples(type, values));
     const LoadedVolume loaded = Read(directory / "v.nrrd");
-    EXPECT_EQ(loaded.info.description.type, kept);
-    EXPECT_EQ(loaded.info.description.mapping, (ValueMapping{1, offset}));
+    EXPECT_EQ(loaded.info.finest().type, kept);
+    EXPECT_EQ(loaded.info.finest().mapping, (ValueMapping{1, offset}));
     EXPECT_THAT(DataValues(*loaded.volume), testing::Pointwise(testing::NanSensitiveDoubleEq(), values));
   }
 }
@@ -180,7 +183,7 @@ TEST(SampleTypes, WarnWhereFloatsCannotHoldAValue) {
     const FileBytes file = EncodeSamples(type, values);
     AlignedVector<std::byte> bytes(file.size());
     std::memcpy(bytes.data(), file.data(), file.size());
-    return Keep(type, std::move(bytes)).exact;
+    return KeepBeside(type, bytes).exact;
   };
   EXPECT_TRUE(exact({0, 16777216}, SampleType::kInt32));
   EXPECT_FALSE(exact({0, 16777217}, SampleType::kInt32));
@@ -199,8 +202,8 @@ TEST(Nifti, KeepsStoredIntegersUnderASlope) {
     WriteFile(directory / "v.nii.gz", Gzip(NiftiHeader(spec) + EncodeSamples(type, values)));
     const LoadedVolume loaded = Read(directory / "v.nii.gz");
     const ScalarType kept[] = {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32};
-    EXPECT_EQ(loaded.info.description.type, kept[type == SampleType::kUint8 ? 0 : type == SampleType::kInt16 ? 1 : 2]);
-    EXPECT_EQ(loaded.info.description.mapping.scale, double(spec.slope));
+    EXPECT_EQ(loaded.info.finest().type, kept[type == SampleType::kUint8 ? 0 : type == SampleType::kInt16 ? 1 : 2]);
+    EXPECT_EQ(loaded.info.finest().mapping.scale, double(spec.slope));
     const std::vector<double> read = DataValues(*loaded.volume);
     for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(read[i], values[i] * double(spec.slope) + double(spec.intercept), 1e-9);
   }
@@ -210,22 +213,22 @@ TEST(Nifti, TakesASlopeOfZeroOrNanAsNone) {
   const TemporaryDirectory directory;
   for (const float slope : {0.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     WriteFile(directory / "v.nii", NiftiHeader({.size = {2, 1, 1}, .slope = slope, .intercept = 7}) + "ab");
-    EXPECT_EQ(Read(directory / "v.nii").info.description.mapping, ValueMapping{});
+    EXPECT_EQ(Read(directory / "v.nii").info.finest().mapping, ValueMapping{});
   }
 }
 
 TEST(Nifti, TakesFurtherDimensionsOfOne) {
   const TemporaryDirectory directory;
   WriteFile(directory / "v.nii", NiftiHeader({.dimensions = {4, 3, 2, 1, 1}}) + std::string(24, 'x'));
-  EXPECT_EQ(Read(directory / "v.nii").info.description.geometry.size, (Index3{4, 3, 2}));
+  EXPECT_EQ(Read(directory / "v.nii").info.finest().geometry.size, (Index3{4, 3, 2}));
 }
 
 TEST(Geometry, TakesDistancesFromNegativeSpacingsAndOneFromZero) {
   const TemporaryDirectory directory;
   WriteFile(directory / "v.mha", MetaHeader({.spacing = {-2, 0.5, 0}}, "LOCAL") + std::string(24, 'x'));
-  EXPECT_EQ(Read(directory / "v.mha").info.description.geometry.spacing, (Vec3{2, 0.5, 1}));
+  EXPECT_EQ(Read(directory / "v.mha").info.finest().geometry.spacing, (Vec3{2, 0.5, 1}));
   WriteFile(directory / "v.nrrd", NrrdHeader({.spacing = {-2, 0.5, 3}}, "raw") + std::string(24, 'x'));
-  EXPECT_EQ(Read(directory / "v.nrrd").info.description.geometry.spacing, (Vec3{2, 0.5, 3}));
+  EXPECT_EQ(Read(directory / "v.nrrd").info.finest().geometry.spacing, (Vec3{2, 0.5, 3}));
 }
 
 TEST(Nrrd, SkipsBytesBeforeTheSamples) {
@@ -259,7 +262,7 @@ TEST(TiffStack, IsReadInTheNaturalOrderOfItsNames) {
   EXPECT_TRUE(LooksLikeVolume(directory.path()));
   const LoadedVolume loaded = Read(directory.path());
   EXPECT_EQ(loaded.info.format, "TIFF");
-  EXPECT_EQ(loaded.info.description.geometry.size, (Index3{3, 2, 6}));
+  EXPECT_EQ(loaded.info.finest().geometry.size, (Index3{3, 2, 6}));
   const std::vector<double> values = DataValues(*loaded.volume);
   for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(values[i], double(i / 6) - 3);
 }
@@ -285,7 +288,7 @@ TEST(Tiff, IsReadFromTilesCompressedOrNotInBothByteOrders) {
 TEST(Tiff, TakesTheShapeOfPixelsFromTheResolution) {
   const TemporaryDirectory directory;
   WriteTiff(directory / "v.tif", {}, std::string(24, 'x'), {.y_resolution = 50});
-  EXPECT_EQ(Read(directory / "v.tif").info.description.geometry.spacing, (Vec3{1, 2, 1}));
+  EXPECT_EQ(Read(directory / "v.tif").info.finest().geometry.spacing, (Vec3{1, 2, 1}));
 }
 
 TEST(WriteVolume, IsReadBackForEveryTypeAndEnding) {
@@ -301,13 +304,13 @@ TEST(WriteVolume, IsReadBackForEveryTypeAndEnding) {
         const Status status = WriteVolume(volume, directory / file);
         ASSERT_TRUE(status.ok()) << status.message();
         const LoadedVolume loaded = Read(directory / file);
-        EXPECT_EQ(loaded.info.description.geometry, volume.description.geometry);
+        EXPECT_EQ(loaded.info.finest().geometry, volume.description.geometry);
         const std::vector<double> found = DataValues(*loaded.volume), expected = DataValues(volume);
         for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i], double(float(expected[i])));
         const bool as_it_was = mapping == ValueMapping{} || (type == ScalarType::kUint8 && mapping.offset == -128) ||
                                (type == ScalarType::kUint16 && mapping.offset == -32768);
         if (as_it_was) {
-          EXPECT_EQ(loaded.info.description, volume.description);
+          EXPECT_EQ(loaded.info.finest(), volume.description);
         }
       }
     }

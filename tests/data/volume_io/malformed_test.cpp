@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/volume_io/formats.h"
-#include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
@@ -89,7 +90,7 @@ TEST(Malformed, AlteredBytesNeverDoHarm) {
       const Result<LoadedVolume> loaded = ReadVolume(path);
       EXPECT_TRUE(CheckVolumeHeaders(path).ok() || !loaded.ok()) << "headers refuse what can be read";
       if (loaded.ok()) {
-        EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.description.voxel_bytes());
+        EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.finest().voxel_bytes());
       } else {
         EXPECT_THAT(loaded.status().message(), testing::AllOf(HasSubstr(directory.path()), testing::Not(HasSubstr("\n"))));
       }
@@ -167,7 +168,7 @@ TEST(Malformed, NamesThatAreNoVolumesFail) {
   ExpectFailure(ReadVolume(directory / "v.png").status(), StatusCode::kInvalidArgument, directory / "v.png", "not a PNG");
   ExpectFailure(ReadVolume("/dev/zero").status(), StatusCode::kInvalidArgument, "/dev/zero", "not a file");
   std::vector<std::string> endings;
-  for (const VolumeFormat& format : VolumeFormats()) {
+  for (const VolumeFormat& format : FileFormats()) {
     if (format.required.empty()) endings.insert(endings.end(), format.endings.begin(), format.endings.end());
   }
   EXPECT_GE(endings.size(), 16U);
@@ -223,9 +224,9 @@ TEST(Slices, AFileOfOneIsAVolume) {
   for (const char* file : {"v.nii", "v.mha", "v.tif"}) {
     const Result<LoadedVolume> loaded = ReadVolume(directory / file);
     ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-    EXPECT_EQ(loaded->info.description.geometry.size, (Index3{4, 6, 1})) << file;
+    EXPECT_EQ(loaded->info.finest().geometry.size, (Index3{4, 6, 1})) << file;
   }
-  EXPECT_EQ(ReadVolume(directory / "v.mha")->info.description.geometry.spacing, (Vec3{0.5, 2, 0.5}));
+  EXPECT_EQ(ReadVolume(directory / "v.mha")->info.finest().geometry.spacing, (Vec3{0.5, 2, 0.5}));
 }
 
 TEST(Malformed, HeadersCannotMakeItTakeMemory) {

@@ -36,14 +36,14 @@ std::string AsText(const std::vector<double>& values);
 
 struct VtiOptions {
   std::string format = "appended";  // ascii, binary or appended
-  std::string encoding = "raw";     // of appended samples: raw or base64
+  std::string encoding = "raw";     // how appended samples are written: raw or base64
   bool wide_header = false;         // UInt64
   std::size_t block = 0;            // bytes of a block; 0: not compressed
   std::string compressor = "ZLib";  // or LZ4 or LZMA
   std::string direction;            // nine numbers
   std::string extent;               // "0 3 0 2 0 1" by the size
   Vec3 origin;
-  std::string attributes = "Scalars=\"density\"";  // of PointData
+  std::string attributes = "Scalars=\"density\"";  // the attributes of PointData
   int arrays = 1;                                  // the same samples under the names density, density2, ...
   int components = 1;
 };

@@ -10,7 +10,8 @@
 #include <cstring>
 #include <numbers>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/data/volume_io/volume_files.h"

@@ -12,7 +12,8 @@
 #include <numbers>
 #include <optional>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/expect_near.h"
@@ -101,7 +102,7 @@ TEST(Orientation, OfAnyOfThe48StoragesIsTheSameInEveryFormat) {
         ExpectNear(found.orientation.origin, object.origin, 1e-5);
         EXPECT_TRUE(std::ranges::equal(loaded.volume->block.bytes, first.volume->block.bytes));
         EXPECT_EQ(loaded.volume->block.box, found.bounds());
-        EXPECT_FALSE(loaded.info.straightened);
+        EXPECT_FALSE(loaded.info.stored->slanted);
       }
       const std::uint8_t* sample = first.volume->block.samples<std::uint8_t>();
       for (std::size_t i = 0; i < CountIn(object.size); ++i) EXPECT_EQ(sample[i], i);
@@ -173,7 +174,7 @@ TEST(Orientation, OfSlantedSlicesIsStraightened) {
     FileBytes file = NrrdFile(with_values, "right-anterior-superior", {1, 1, 1});
     file.replace(file.find("uint8"), 5, "float");
     const LoadedVolume loaded = ReadBytes(directory, "v.nrrd", file);
-    EXPECT_TRUE(loaded.info.straightened);
+    EXPECT_TRUE(loaded.info.stored->slanted);
     const VolumeGeometry& geometry = loaded.volume->description.geometry;
     const double outside = *std::ranges::min_element(values);
     int inside = 0;

@@ -6,7 +6,8 @@
 #include <filesystem>
 #include <numeric>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
@@ -39,15 +40,15 @@ TEST_F(PicturesTest, FoldersOfPicturesAreVolumes) {
   EXPECT_TRUE(LooksLikeVolume(directory_.path()));
   const LoadedVolume loaded = ReadPath(directory_.path(), {.spacing = Vec3{0.5, 0.5, 2}});
   EXPECT_EQ(loaded.info.format, "PNG");
-  EXPECT_EQ(loaded.info.description.geometry.size, (Index3{4, 3, 3}));
-  EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.5, 0.5, 2}));
+  EXPECT_EQ(loaded.info.finest().geometry.size, (Index3{4, 3, 3}));
+  EXPECT_EQ(loaded.info.finest().geometry.spacing, (Vec3{0.5, 0.5, 2}));
   std::vector<double> counted(36);
   std::iota(counted.begin(), counted.end(), 0);
   EXPECT_EQ(ValuesIn(loaded), counted);
   WritePng(directory_ / "s7.png", {4, 3, 1}, 16, 0, slice(0) + slice(1));
   EXPECT_THAT(ReadVolume(directory_.path()).status().message(), testing::AllOf(HasSubstr("s7.png is 4 x 3 uint16, must be 4 x 3 uint8")));
   // A picture alone is a volume of one slice.
-  EXPECT_EQ(ReadPath(directory_ / "s5.png").info.description.geometry.size, (Index3{4, 3, 1}));
+  EXPECT_EQ(ReadPath(directory_ / "s5.png").info.finest().geometry.size, (Index3{4, 3, 1}));
   // A folder of one picture is none, nor are pictures of several names, nor those beside a volume.
   std::filesystem::remove(directory_ / "s7.png");
   WritePng(directory_ / "t8.png", {4, 3, 1}, 8, 0, slice(0));

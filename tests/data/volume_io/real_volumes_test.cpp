@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "common/volume/summary.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/volume_files.h"
 
 namespace slabstream {
@@ -34,7 +34,7 @@ TEST(RealVolumes, HaveTheSizesRangesAndOccupanciesThatAreKnown) {
     SCOPED_TRACE(volume.name);
     const Result<LoadedVolume> loaded = ReadVolume(folder + "/" + volume.name + ".nrrd");
     ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-    const VolumeDescription& description = loaded->info.description;
+    const VolumeDescription& description = loaded->info.finest();
     EXPECT_EQ(description.geometry.size, volume.size);
     EXPECT_EQ(description.type, volume.type);
     for (const Axis axis : kAxes) EXPECT_NEAR(description.geometry.spacing[axis], volume.spacing[axis], 1e-4);
@@ -54,9 +54,9 @@ TEST(RealVolumes, TheDemoBrainIsEightBitAndSkullStripped) {
   const Result<LoadedVolume> loaded = ReadVolume(path);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_EQ(loaded->info.format, "NIfTI");
-  EXPECT_EQ(loaded->info.description.geometry.size, (Index3{301, 370, 316}));
-  EXPECT_EQ(loaded->info.description.geometry.spacing, (Vec3{0.5, 0.5, 0.5}));
-  EXPECT_EQ(loaded->info.description.type, ScalarType::kUint8);
+  EXPECT_EQ(loaded->info.finest().geometry.size, (Index3{301, 370, 316}));
+  EXPECT_EQ(loaded->info.finest().geometry.spacing, (Vec3{0.5, 0.5, 0.5}));
+  EXPECT_EQ(loaded->info.finest().type, ScalarType::kUint8);
   const VolumeSummary summary = Summarize(*loaded->volume);
   EXPECT_EQ(summary.range, (ValueRange{0, 130}));
   EXPECT_NEAR(double(summary.histogram[0]) / double(summary.description.geometry.bounds().voxel_count()), 0.63, 0.005);

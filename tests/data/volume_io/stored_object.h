@@ -18,7 +18,7 @@ struct Object {
   Index3 size = {4, 3, 2};
   Steps steps = {Vec3{0.5, 0, 0}, Vec3{0, 1.25, 0}, Vec3{0, 0, 3}};
   Vec3 origin = {-20, 30.5, 7};
-  std::function<std::uint8_t(const Index3&)> value;  // of a voxel; none: its number
+  std::function<std::uint8_t(const Index3&)> value;  // the value of a voxel; none: its number
 };
 
 // Stored axis i is the object's axis from[i], backwards if flipped[i].

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <set>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
@@ -161,7 +161,7 @@ TEST_F(TextVolumes, NrrdAxesThatAreNoneOfSpaceAreComponentsOrVolumes) {
 
 // As ITK writes pictures.
 TEST_F(TextVolumes, AFileOfTwoDimensionsIsASlice) {
-  const auto geometry = [&](const LoadedVolume& loaded) { return loaded.info.description.geometry; };
+  const auto geometry = [&](const LoadedVolume& loaded) { return loaded.info.finest().geometry; };
   const VolumeGeometry plain = geometry(Read("v.nrrd", Nrrd("dimension: 2\nsizes: 4 6\nspacings: 0.5 2\n", Numbers(24))));
   EXPECT_EQ(plain.size, (Index3{4, 6, 1}));
   EXPECT_EQ(plain.spacing, (Vec3{0.5, 2, 0.5}));
@@ -291,7 +291,7 @@ TEST_F(TextVolumes, SlantedLabelsKeepTheirNumbers) {
     const std::string fields = fmt::format("dimension: 3\nspace: RAS\nsizes: 9 8 7\nspace directions: (1,0,0) ({},1,0) ({},{},2)\n",
                                            random.Real(-1, 1), random.Real(-1, 1), random.Real(-1, 1));
     const auto values = [&](const LoadedVolume& loaded) {
-      EXPECT_TRUE(loaded.info.straightened);
+      EXPECT_TRUE(loaded.info.stored->slanted);
       std::set<int> found;
       for (const std::byte sample : loaded.volume->block.bytes) found.insert(std::to_integer<int>(sample));
       return found;

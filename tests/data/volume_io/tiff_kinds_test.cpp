@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/tiff_files.h"
 #include "tests/support/temporary_directory.h"
 

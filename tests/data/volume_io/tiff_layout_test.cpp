@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "data/volume_io/volume_reader.h"
+#include "data/open/read_volume.h"
 #include "tests/data/volume_io/tiff_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/expect_near.h"
@@ -45,7 +45,7 @@ class TiffLayoutTest : public testing::Test {
     return slices;
   }
   static VolumeGeometry Geometry(const std::string& path, const ReadOptions& options = {}) {
-    return Read(path, options).info.description.geometry;
+    return Read(path, options).info.finest().geometry;
   }
   // One line that names the path.
   static std::string WhyNot(const std::string& path, const ReadOptions& options = {}, StatusCode code = StatusCode::kInvalidArgument) {
@@ -84,7 +84,7 @@ TEST_F(TiffLayoutTest, OmeWithoutADistanceOfSlicesKeepsTheSizeOfPixels) {
   const std::string image = "SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\"";
   for (const char* z : {"", " PhysicalSizeZ=\"2\" PhysicalSizeZUnit=\"pixel\"", " PhysicalSizeZ=\"0\""}) {
     const LoadedVolume loaded = Read(Write(Ome(image + z), 2));
-    EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.25, 0.5, 0.25})) << z;
+    EXPECT_EQ(loaded.info.finest().geometry.spacing, (Vec3{0.25, 0.5, 0.25})) << z;
     EXPECT_THAT(loaded.info.notes, Contains(HasSubstr("no PhysicalSizeZ")));
   }
 }
@@ -267,7 +267,7 @@ TEST_F(TiffLayoutTest, ImageJPagesRunThroughChannelsThenSlicesThenFrames) {
 
 TEST_F(TiffLayoutTest, ImageJHeadersThatDoNotFitThePages) {
   const LoadedVolume loaded = Read(Write("ImageJ=1.54f\nimages=5\nslices=5\n", 7));
-  EXPECT_EQ(loaded.info.description.geometry.size.z, 7);
+  EXPECT_EQ(loaded.info.finest().geometry.size.z, 7);
   EXPECT_THAT(loaded.info.notes, Contains(HasSubstr("speaks of 5 slices: each of its 7 pages is one")));
   EXPECT_THAT(WhyNot(Write("ImageJ=1.54f\nimages=10\nslices=5\nchannels=2\n", 7)),
               HasSubstr("speaks of 5 slices, 2 channels and 1 time, the file has 7 pages"));

@@ -49,7 +49,7 @@ struct TiffOptions {
   int compression = 1;           // a number of tiff.h
   int tile = 0;                  // pixels a side; 0: strips
   float y_resolution = 0;        // 0: no resolution, else that of x is 100
-  std::string description = {};  // of the first page
+  std::string description = {};  // the description of the first page
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
 
@@ -61,7 +61,7 @@ void Damage(char& byte, Random& random);
 
 // The values of all voxels.
 std::vector<double> DataValues(const Volume& volume);
-// Of a box of such a volume.
+// The data values in a box of such a volume.
 std::vector<double> DataValues(const VolumeDescription& description, const VoxelBlock& block);
 
 }  // namespace slabstream

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "data/open/read_volume.h"
 #include "data/volume_io/grid_arrays.h"
 #include "data/volume_io/mesh_reader.h"
 #include "data/volume_io/structured_grid.h"
-#include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
@@ -71,7 +71,7 @@ class VtkTest : public testing::Test {
   VolumeGeometry GeometryOf(const std::string& name, const FileBytes& bytes, const ReadOptions& options = {}) {
     const Result<LoadedVolume> loaded = Read(name, bytes, options);
     EXPECT_TRUE(loaded.ok()) << loaded.status().message();
-    return loaded.ok() ? loaded->info.description.geometry : VolumeGeometry{};
+    return loaded.ok() ? loaded->info.finest().geometry : VolumeGeometry{};
   }
   std::string WhyNot(const std::string& name, const FileBytes& bytes, const ReadOptions& options = {}) {
     const Result<LoadedVolume> loaded = Read(name, bytes, options);
@@ -261,7 +261,7 @@ TEST_F(VtkTest, FilesOfVtkThatAreNotReadAreNamed) {
   EXPECT_THAT(WhyNot("v.pvti", "<VTKFile/>"), HasSubstr("v.pvti: a list of VTK files, which is not read; ParaView writes"));
   EXPECT_THAT(WhyNot("V.VTS", "<VTKFile/>"), HasSubstr("a curvilinear grid of VTK (StructuredGrid), which is not read"));
   EXPECT_THAT(WhyNot("v.vtp", "<VTKFile/>"), HasSubstr("a surface of VTK (PolyData), which holds no volume"));
-  EXPECT_THAT(WhyNot("v.vtx", "<VTKFile/>"), HasSubstr("not a volume, which must end in .nii"));
+  EXPECT_THAT(WhyNot("v.vtx", "<VTKFile/>"), HasSubstr("not a volume, which must end in ."));
 }
 
 TEST_F(VtkTest, FilesThatAreCutOffOrAlteredDoNoHarm) {

@@ -22,7 +22,7 @@ struct VtuSpec {
   bool big_endian = false;
 };
 
-// Of `options`: format, encoding, wide_header and block.
+// Uses format, encoding, wide_header and block of `options`.
 FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options = {});
 
 struct LegacyOptions {

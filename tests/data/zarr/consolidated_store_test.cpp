@@ -45,7 +45,7 @@ class SilentStore : public Store {
   std::vector<std::string> asked_;
 };
 
-ZarrJson ReadJsonFile(const std::string& path) { return ZarrJson::parse(ReadFile(path)); }
+Json ReadJsonFile(const std::string& path) { return Json::Parse(ReadFile(path)).value(); }
 
 // A group of an array of volumes and its coordinates, consolidated.
 void WriteConsolidated(const std::string& folder, int version) {
@@ -53,8 +53,8 @@ void WriteConsolidated(const std::string& folder, int version) {
   const ZarrSpec line{.version = version, .shape = {4}, .chunk = {4}};
   WriteZarrArray(folder + "/runs/a", volume, [](auto at) { return double(at[2]); });
   WriteZarrArray(folder + "/runs/x", line, [](auto at) { return double(at[0]); });
-  WriteZarrGroup(folder + "/runs", version, ZarrJson::object());
-  ZarrJson nodes;
+  WriteZarrGroup(folder + "/runs", version, Json::object());
+  Json nodes;
   for (const std::string path : {"runs", "runs/a", "runs/x"}) {
     if (version == 3) {
       nodes[path] = ReadJsonFile(folder + "/" + path + "/zarr.json");
@@ -64,7 +64,7 @@ void WriteConsolidated(const std::string& folder, int version) {
     }
   }
   if (version == 2) {
-    WriteZarrGroup(folder, 2, ZarrJson::object());
+    WriteZarrGroup(folder, 2, Json::object());
     return WriteJson(folder + "/.zmetadata", {{"zarr_consolidated_format", 1}, {"metadata", nodes}});
   }
   WriteJson(folder + "/zarr.json", {{"zarr_format", 3},
@@ -86,7 +86,7 @@ TEST(ConsolidatedStoreTest, NodesAreKnownWithoutAsking) {
     ASSERT_TRUE(pyramid.ok()) << pyramid.status().message();
     EXPECT_THAT(silent->asked(), Not(Contains(testing::StartsWith("runs/"))));
     // What is not said there may still be there, and chunks are.
-    WriteZarrGroup(folder / "later", version, ZarrJson::object());
+    WriteZarrGroup(folder / "later", version, Json::object());
     EXPECT_TRUE(ReadNow(*store, version == 3 ? "later/zarr.json" : "later/.zgroup").ok());
     EXPECT_TRUE(ReadNow(*store, version == 3 ? "runs/a/c/0/0/0" : "runs/a/0/0/0").ok());
     EXPECT_EQ(ReadNow(*store, "runs/a/.zattrs").status().code(), StatusCode::kNotFound);

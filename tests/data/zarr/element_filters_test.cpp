@@ -23,7 +23,7 @@ Bytes ToBytes(const std::string& text) {
 std::string Text(const Bytes& bytes) { return {reinterpret_cast<const char*>(bytes.span().data()), bytes.size()}; }
 
 struct Filtered {
-  ZarrJson filters;                    // as .zarray has them
+  Json filters;                        // as .zarray has them
   SampleType type, stored;             // of the array, and of what its chunks hold
   std::vector<double> values, packed;  // the elements of the array, and those of its chunk
   bool big_endian = false;
@@ -31,7 +31,7 @@ struct Filtered {
 
 std::vector<Filtered> Cases() {
   using enum SampleType;
-  const auto one = [](const ZarrJson& filter) { return ZarrJson::array({filter}); };
+  const auto one = [](const Json& filter) { return Json::array({filter}); };
   return {{one({{"id", "delta"}, {"dtype", "<u2"}}), kUint16, kUint16, {5, 7, 4, 65535, 0}, {5, 2, 65533, 65531, 1}},
           {one({{"id", "delta"}, {"dtype", "<u2"}, {"astype", "|i1"}}), kUint16, kInt8, {5, 7, 4, 65535, 0}, {5, 2, -3, -5, 1}},
           {one({{"id", "delta"}, {"dtype", ">i4"}, {"astype", ">i2"}}), kInt32, kInt16, {-5, 70, 0, 3, 3}, {-5, 75, -70, 3, 0}, true},
@@ -44,8 +44,8 @@ std::vector<Filtered> Cases() {
           {one({{"id", "astype"}, {"encode_dtype", "<f8"}, {"decode_dtype", "<i2"}}), kInt16, kFloat64, {-3, 4}, {-3, 4}},
           {one({{"id", "quantize"}, {"digits", 1}, {"dtype", "<f8"}, {"astype", "<f4"}}), kFloat64, kFloat32, {0.5, -8}, {0.5, -8}},
           {one({{"id", "bitround"}, {"keepbits", 3}}), kFloat32, kFloat32, {0.5, -8}, {0.5, -8}},
-          {ZarrJson::array({{{"id", "fixedscaleoffset"}, {"scale", 2}, {"offset", 0}, {"dtype", "<f4"}, {"astype", "<i4"}},
-                            {{"id", "delta"}, {"dtype", "<i4"}, {"astype", "|i1"}}}),
+          {Json::array({{{"id", "fixedscaleoffset"}, {"scale", 2}, {"offset", 0}, {"dtype", "<f4"}, {"astype", "<i4"}},
+                        {{"id", "delta"}, {"dtype", "<i4"}, {"astype", "|i1"}}}),
            kFloat32,
            kInt8,
            {1, 0.5, 3},
@@ -56,7 +56,7 @@ TEST(ElementFiltersTest, ElementsComeBack) {
   for (const Filtered& each : Cases()) {
     SCOPED_TRACE(each.filters.dump());
     const TemporaryDirectory folder;
-    ZarrJson metadata =
+    Json metadata =
         MetadataOf({.shape = {each.values.size()}, .chunk = {each.values.size()}, .type = each.type, .big_endian = each.big_endian});
     metadata["filters"] = each.filters;
     WriteJson(folder / ".zarray", metadata);
@@ -68,9 +68,9 @@ TEST(ElementFiltersTest, ElementsComeBack) {
     EXPECT_EQ(*elements, each.values);
 
     // Version 3 has them in front of its codec "bytes", whatever their byte order.
-    ZarrJson third = MetadataOf({.version = 3, .shape = {each.values.size()}, .chunk = {each.values.size()}, .type = each.type});
-    ZarrJson codecs = ZarrJson::array();
-    for (ZarrJson filter : each.filters) {
+    Json third = MetadataOf({.version = 3, .shape = {each.values.size()}, .chunk = {each.values.size()}, .type = each.type});
+    Json codecs = Json::array();
+    for (Json filter : each.filters) {
       const std::string name = "numcodecs." + filter["id"].get<std::string>();
       filter.erase("id");
       codecs.push_back({{"name", name}, {"configuration", filter}});
@@ -86,7 +86,7 @@ TEST(ElementFiltersTest, ElementsComeBack) {
 }
 
 TEST(ElementFiltersTest, TruthValuesAreUnpacked) {
-  const ZarrJson settings = ZarrJson::object();
+  const Json settings = Json::object();
   const auto filter = zarr::ReadElementFilter("packbits", metadata::Field("object", settings), SampleType::kUint8, true);
   ASSERT_TRUE(filter.ok());
   const std::string packed = "\x06\xb1\xc0";  // 6 bits of the last byte count for nothing
@@ -99,7 +99,7 @@ TEST(ElementFiltersTest, TruthValuesAreUnpacked) {
 }
 
 TEST(ElementFiltersTest, AChunkTakesNoMoreThanItMay) {
-  const ZarrJson settings = {{"dtype", "<u2"}, {"astype", "|u1"}};
+  const Json settings = {{"dtype", "<u2"}, {"astype", "|u1"}};
   const auto filter = zarr::ReadElementFilter("delta", metadata::Field("object", settings), SampleType::kUint16, true);
   ASSERT_TRUE(filter.ok());
   EXPECT_EQ(DecodeChain(filter->chain, ToBytes(std::string(100'000, 'a')), 10).status().code(), StatusCode::kResourceExhausted);
@@ -111,8 +111,8 @@ TEST(ElementFiltersTest, ChecksumsStandInFrontOrBehind) {
     const std::string text = "123456789", stated(sum, 4);
     for (const bool in_front : {true, false}) {
       const TemporaryDirectory folder;
-      ZarrJson metadata = MetadataOf({.shape = {9}, .chunk = {9}, .type = SampleType::kUint8});
-      metadata["filters"] = ZarrJson::array({{{"id", name}}});
+      Json metadata = MetadataOf({.shape = {9}, .chunk = {9}, .type = SampleType::kUint8});
+      metadata["filters"] = Json::array({{{"id", name}}});
       if (!in_front) metadata["filters"][0]["location"] = "end";
       WriteJson(folder / ".zarray", metadata);
       WriteObject(folder / "0", in_front ? stated + text : text + stated);

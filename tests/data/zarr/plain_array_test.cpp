@@ -25,16 +25,16 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 double Number(std::span<const std::uint64_t> at) { return double(at[2] + 4 * at[1] + 12 * at[0]); }
 
 // An array "temperature" of 2 x 3 x 4 elements whose axes are called so, in a group.
-void WriteXarray(const std::string& folder, int version, const std::vector<std::string>& names,
-                 const ZarrJson& attributes = ZarrJson::object(), SampleType type = SampleType::kInt16) {
-  WriteZarrGroup(folder, version, ZarrJson::object());
+void WriteXarray(const std::string& folder, int version, const std::vector<std::string>& names, const Json& attributes = Json::object(),
+                 SampleType type = SampleType::kInt16) {
+  WriteZarrGroup(folder, version, Json::object());
   ZarrSpec spec{.version = version, .shape = {2, 3, 4}, .chunk = {2, 2, 2}, .type = type, .separator = '/'};
   if (version == 3) spec.names = names;
   WriteZarrArray(folder + "/temperature", spec, Number);
-  ZarrJson all = attributes;
+  Json all = attributes;
   if (version == 2) all["_ARRAY_DIMENSIONS"] = names;
   if (version == 2) return WriteJson(folder + "/temperature/.zattrs", all);
-  ZarrJson metadata = MetadataOf(spec);
+  Json metadata = MetadataOf(spec);
   metadata["attributes"] = all;
   WriteJson(folder + "/temperature/zarr.json", metadata);
 }
@@ -43,10 +43,10 @@ void WriteCoordinates(const std::string& folder, int version, const std::string&
                       const std::string& unit = "") {
   const ZarrSpec spec{.version = version, .shape = {values.size()}, .chunk = {2}, .type = SampleType::kFloat64};
   WriteZarrArray(folder + "/" + name, spec, [&](std::span<const std::uint64_t> at) { return at[0] < values.size() ? values[at[0]] : 0; });
-  ZarrJson attributes = ZarrJson::object();
+  Json attributes = Json::object();
   if (!unit.empty()) attributes["units"] = unit;
   if (version == 2) return WriteJson(folder + "/" + name + "/.zattrs", attributes);
-  ZarrJson metadata = MetadataOf(spec);
+  Json metadata = MetadataOf(spec);
   metadata["attributes"] = attributes;
   WriteJson(folder + "/" + name + "/zarr.json", metadata);
 }
@@ -101,8 +101,8 @@ TEST(PlainArrayTest, PackedValuesAreUnpacked) {
 }
 
 TEST(PlainArrayTest, MissingValuesAreNotANumber) {
-  const ZarrJson five = {{"_FillValue", 5}}, in_base64 = {{"_FillValue", "AAAAAAAAFEA="}}, by_name = {{"missing_value", 5}};
-  for (const ZarrJson& attributes : {five, in_base64, by_name}) {
+  const Json five = {{"_FillValue", 5}}, in_base64 = {{"_FillValue", "AAAAAAAAFEA="}}, by_name = {{"missing_value", 5}};
+  for (const Json& attributes : {five, in_base64, by_name}) {
     for (const SampleType type : {SampleType::kUint8, SampleType::kInt16, SampleType::kFloat16, SampleType::kFloat64}) {
       const TemporaryDirectory folder;
       WriteXarray(folder.path(), 3, {"z", "y", "x"}, attributes, type);

@@ -8,7 +8,7 @@
 
 #include "common/base/status.h"
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/zarr/zarr_array.h"
 
 namespace slabstream {

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <future>
 #include <mutex>
@@ -114,7 +115,7 @@ TEST(ZarrArrayTest, HasTheFillValueThatTheMetadataWrite) {
   const TemporaryDirectory folder;
   const struct {
     SampleType type;
-    ZarrJson fill;
+    Json fill;
     double value;
   } cases[] = {{SampleType::kUint8, 255, 255},
                {SampleType::kInt8, -128, -128},

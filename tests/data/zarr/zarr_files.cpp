@@ -22,8 +22,8 @@ std::string DtypeOf(SampleType type, bool big_endian) {
   return (bytes == 1 ? "|" : big_endian ? ">" : "<") + kind + std::to_string(bytes);
 }
 
-ZarrJson NamedCodec(const std::string& codec, const ZarrSpec& spec) {
-  ZarrJson configuration = ZarrJson::object();
+Json NamedCodec(const std::string& codec, const ZarrSpec& spec) {
+  Json configuration = Json::object();
   if (codec == "gzip") configuration["level"] = 6;
   if (codec == "zstd") configuration = {{"level", 1}, {"checksum", false}};
   if (codec == "blosc") {
@@ -33,11 +33,11 @@ ZarrJson NamedCodec(const std::string& codec, const ZarrSpec& spec) {
   return {{"name", (standard ? "" : "numcodecs.") + codec}, {"configuration", configuration}};
 }
 
-ZarrJson TransposeCodec(const std::vector<std::size_t>& order) { return {{"name", "transpose"}, {"configuration", {{"order", order}}}}; }
-ZarrJson BytesCodec(bool big_endian) { return {{"name", "bytes"}, {"configuration", {{"endian", big_endian ? "big" : "little"}}}}; }
+Json TransposeCodec(const std::vector<std::size_t>& order) { return {{"name", "transpose"}, {"configuration", {{"order", order}}}}; }
+Json BytesCodec(bool big_endian) { return {{"name", "bytes"}, {"configuration", {{"endian", big_endian ? "big" : "little"}}}}; }
 
-ZarrJson ChunkCodecs(const ZarrSpec& spec, const std::vector<std::size_t>& transpose) {
-  ZarrJson codecs = ZarrJson::array();
+Json ChunkCodecs(const ZarrSpec& spec, const std::vector<std::size_t>& transpose) {
+  Json codecs = Json::array();
   if (!transpose.empty()) codecs.push_back(TransposeCodec(transpose));
   codecs.push_back(BytesCodec(spec.big_endian));
   if (!spec.codec.empty()) codecs.push_back(NamedCodec(spec.codec, spec));
@@ -127,11 +127,10 @@ std::string ShardBytes(const ZarrSpec& spec, const Counts& shard, const ElementA
 
 }  // namespace
 
-ZarrJson MetadataOf(const ZarrSpec& spec) {
+Json MetadataOf(const ZarrSpec& spec) {
   if (spec.version == 2) {
-    const ZarrJson compressor = spec.codec.empty() ? ZarrJson() : ZarrJson{{"id", spec.codec}};
-    const ZarrJson filters =
-        spec.shuffled ? ZarrJson::array({{{"id", "shuffle"}, {"elementsize", BytesPerSample(spec.type)}}}) : ZarrJson();
+    const Json compressor = spec.codec.empty() ? Json() : Json{{"id", spec.codec}};
+    const Json filters = spec.shuffled ? Json::array({{{"id", "shuffle"}, {"elementsize", BytesPerSample(spec.type)}}}) : Json();
     return {{"zarr_format", 2},
             {"shape", spec.shape},
             {"chunks", spec.chunk},
@@ -142,20 +141,20 @@ ZarrJson MetadataOf(const ZarrSpec& spec) {
             {"order", spec.fortran ? "F" : "C"},
             {"dimension_separator", std::string(1, spec.separator)}};
   }
-  ZarrJson codecs = ChunkCodecs(spec, spec.shard.empty() ? spec.transpose : spec.inner_transpose);
+  Json codecs = ChunkCodecs(spec, spec.shard.empty() ? spec.transpose : spec.inner_transpose);
   if (!spec.shard.empty()) {
-    ZarrJson index_codecs = ZarrJson::array({BytesCodec(spec.index_big_endian)});
+    Json index_codecs = Json::array({BytesCodec(spec.index_big_endian)});
     if (spec.index_checked) index_codecs.push_back({{"name", "crc32c"}});
     const Counts chunk = Reordered(spec.chunk, OrderOrSame(spec.transpose, spec.shape.size()));
-    const ZarrJson sharding = {{"chunk_shape", chunk},
-                               {"codecs", codecs},
-                               {"index_codecs", index_codecs},
-                               {"index_location", spec.index_at_end ? "end" : "start"}};
-    codecs = ZarrJson::array();
+    const Json sharding = {{"chunk_shape", chunk},
+                           {"codecs", codecs},
+                           {"index_codecs", index_codecs},
+                           {"index_location", spec.index_at_end ? "end" : "start"}};
+    codecs = Json::array();
     if (!spec.transpose.empty()) codecs.push_back(TransposeCodec(spec.transpose));
     codecs.push_back({{"name", "sharding_indexed"}, {"configuration", sharding}});
   }
-  ZarrJson metadata = {
+  Json metadata = {
       {"zarr_format", 3},
       {"node_type", "array"},
       {"shape", spec.shape},
@@ -165,7 +164,7 @@ ZarrJson MetadataOf(const ZarrSpec& spec) {
        {{"name", spec.old_keys ? "v2" : "default"}, {"configuration", {{"separator", std::string(1, spec.separator)}}}}},
       {"fill_value", spec.fill},
       {"codecs", codecs},
-      {"attributes", ZarrJson::object()}};
+      {"attributes", Json::object()}};
   if (!spec.names.is_null()) metadata["dimension_names"] = spec.names;
   return metadata;
 }
@@ -185,11 +184,11 @@ void WriteObject(const std::string& path, const std::string& bytes) {
   WriteFile(path, bytes);
 }
 
-void WriteJson(const std::string& path, const ZarrJson& json) { WriteObject(path, json.dump()); }
+void WriteJson(const std::string& path, const Json& json) { WriteObject(path, json.dump()); }
 
-void WriteZarrGroup(const std::string& folder, int version, const ZarrJson& attributes) {
+void WriteZarrGroup(const std::string& folder, int version, const Json& attributes) {
   if (version == 3) {
-    ZarrJson group = {{"zarr_format", 3}, {"node_type", "group"}};
+    Json group = {{"zarr_format", 3}, {"node_type", "group"}};
     if (!attributes.is_null()) group["attributes"] = attributes;
     return WriteJson(folder + "/zarr.json", group);
   }

@@ -3,16 +3,15 @@
 
 #include <cstdint>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/json/json.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
 
-using ZarrJson = nlohmann::json;  // members in alphabetical order
 using Counts = std::vector<std::uint64_t>;
 
 struct ZarrSpec {
@@ -26,16 +25,16 @@ struct ZarrSpec {
   bool old_keys = false;                          // version 3: those of version 2
   std::vector<std::size_t> transpose = {};        // version 3, before shards are made
   std::vector<std::size_t> inner_transpose = {};  // version 3, of chunks in shards
-  std::string codec = {};                         // of PackBytes, but for crc32c
+  std::string codec = {};                         // a codec of PackBytes, except crc32c
   bool checked = false;                           // version 3: crc32c behind it
   bool shuffled = false;                          // version 2: the filter
   bool index_at_end = true, index_big_endian = false, index_checked = true;
-  ZarrJson fill = 0;
-  ZarrJson names = nullptr;  // version 3: dimension_names
+  Json fill = 0;
+  Json names = nullptr;  // version 3: dimension_names
 };
 
 // .zarray or zarr.json
-ZarrJson MetadataOf(const ZarrSpec& spec);
+Json MetadataOf(const ZarrSpec& spec);
 
 // The value of an element, by its index along each axis.
 using ElementAt = std::function<double(std::span<const std::uint64_t>)>;
@@ -50,9 +49,9 @@ void WriteZarrArray(const std::string& folder, const ZarrSpec& spec, const Eleme
 
 // A file, with the folders that it needs.
 void WriteObject(const std::string& path, const std::string& bytes);
-void WriteJson(const std::string& path, const ZarrJson& json);
+void WriteJson(const std::string& path, const Json& json);
 
 // A group; of version 2 `attributes` are .zattrs.
-void WriteZarrGroup(const std::string& folder, int version, const ZarrJson& attributes = nullptr);
+void WriteZarrGroup(const std::string& folder, int version, const Json& attributes = nullptr);
 
 }  // namespace slabstream

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "data/open/open_source.h"
+#include "data/volume_io/formats.h"
 #include "tests/data/stores/zip_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/data/zarr/read_zarr.h"
@@ -78,27 +79,27 @@ ZarrSpec SpecOf(const std::string& axes, int version) {
 }
 
 // The attributes of an image whose levels are called 0, 1, ...; a scale for each level and axis.
-ZarrJson ImageAttributes(const std::string& axes, int version, const std::vector<std::vector<double>>& scales, bool types = true) {
-  ZarrJson image = {{"axes", ZarrJson::array()}, {"datasets", ZarrJson::array()}};
+Json ImageAttributes(const std::string& axes, int version, const std::vector<std::vector<double>>& scales, bool types = true) {
+  Json image = {{"axes", Json::array()}, {"datasets", Json::array()}};
   if (version == 2) image["version"] = "0.4";
   for (const char axis : axes) {
-    ZarrJson described = {{"name", std::string(1, axis)}};
+    Json described = {{"name", std::string(1, axis)}};
     if (types) described["type"] = axis == 't' ? "time" : axis == 'c' ? "channel" : "space";
     if (axis >= 'x') described["unit"] = "micrometer";
     image["axes"].push_back(described);
   }
   for (std::size_t level = 0; level < scales.size(); ++level) {
-    const ZarrJson scale = {{"type", "scale"}, {"scale", scales[level]}};
-    image["datasets"].push_back({{"path", std::to_string(level)}, {"coordinateTransformations", ZarrJson::array({scale})}});
+    const Json scale = {{"type", "scale"}, {"scale", scales[level]}};
+    image["datasets"].push_back({{"path", std::to_string(level)}, {"coordinateTransformations", Json::array({scale})}});
   }
-  const ZarrJson attributes = {{"multiscales", ZarrJson::array({image})}};
+  const Json attributes = {{"multiscales", Json::array({image})}};
   if (version == 2) return attributes;
-  ZarrJson ome = attributes;
+  Json ome = attributes;
   ome["version"] = "0.5";
   return {{"ome", ome}};
 }
 
-ZarrJson& OmePart(ZarrJson& attributes) { return attributes.contains("ome") ? attributes["ome"] : attributes; }
+Json& OmePart(Json& attributes) { return attributes.contains("ome") ? attributes["ome"] : attributes; }
 
 void WriteImage(const std::string& path, const std::string& axes, int version, bool types = true) {
   WriteZarrGroup(path, version, ImageAttributes(axes, version, {std::vector<double>(axes.size(), 1)}, types));
@@ -133,7 +134,7 @@ TEST(ZarrSourceTest, ImagesShowTheTimeAndChannelThatAreAskedForInAnyOrderOfAxes)
   EXPECT_THAT(OpenText(folder / "czyx3.ome.zarr?channel=3").status().message(), HasSubstr("has 3 channels, so channel must be 0 to 2"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?channel=luminance").status().message(), HasSubstr("has 1 channel, so channel must be 0"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?spacing=1,1,1").status().message(), HasSubstr("states its spacing"));
-  EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("Zarr takes no option lattice"));
+  EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("lattice is no option of Zarr"));
 }
 
 TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
@@ -142,8 +143,8 @@ TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
   for (const int version : {2, 3}) {
     for (const bool translated : {false, true}) {
       const std::string path = folder / (std::to_string(version) + (translated ? "t" : "") + ".zarr");
-      ZarrJson attributes = ImageAttributes("zyx", version, scales);
-      ZarrJson& image = OmePart(attributes)["multiscales"][0];
+      Json attributes = ImageAttributes("zyx", version, scales);
+      Json& image = OmePart(attributes)["multiscales"][0];
       if (translated) {
         for (std::size_t level = 0; level < scales.size(); ++level) {
           const std::vector<double> by = {100 + double(level), 10, 5};
@@ -182,7 +183,7 @@ TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
 
 TEST(ZarrSourceTest, UnitsAreThatOfX) {
   const TemporaryDirectory folder;
-  ZarrJson attributes = ImageAttributes("zyx", 2, {{2, 3, 4}});
+  Json attributes = ImageAttributes("zyx", 2, {{2, 3, 4}});
   attributes["multiscales"][0]["axes"][0]["unit"] = "millimeter";
   WriteImage(folder / "a", "zyx", 2);
   WriteZarrGroup(folder / "a", 2, attributes);
@@ -201,8 +202,8 @@ TEST(ZarrSourceTest, LabelImagesSayThatTheyAre) {
   for (const int version : {2, 3}) {
     const std::string path = folder / std::to_string(version);
     WriteImage(path, "zyx", version);
-    ZarrJson attributes = ImageAttributes("zyx", version, {{1, 1, 1}});
-    OmePart(attributes)["image-label"] = {{"colors", ZarrJson::array()}};
+    Json attributes = ImageAttributes("zyx", version, {{1, 1, 1}});
+    OmePart(attributes)["image-label"] = {{"colors", Json::array()}};
     WriteZarrGroup(path + "/labels", version);
     WriteZarrGroup(path + "/labels/cells", version, attributes);
     WriteZarrArray(path + "/labels/cells/0", SpecOf("zyx", version), ElementsOf("zyx"));
@@ -237,9 +238,9 @@ TEST(ZarrSourceTest, ArchivesHoldWhatFoldersHold) {
 
 TEST(ZarrSourceTest, PlainArraysTakeTheirAxesFromNamesOrFromTheirOrder) {
   const TemporaryDirectory folder;
-  const auto write = [&](const std::string& name, const std::string& axes, const ZarrJson& names, int version) {
+  const auto write = [&](const std::string& name, const std::string& axes, const Json& names, int version) {
     ZarrSpec spec = SpecOf(axes, version);
-    spec.names = version == 3 ? names : ZarrJson();
+    spec.names = version == 3 ? names : Json();
     WriteZarrArray(folder / name, spec, ElementsOf(axes));
     if (version == 2 && !names.is_null()) WriteJson(folder / (name + "/.zattrs"), {{"_ARRAY_DIMENSIONS", names}});
     return folder / name;
@@ -296,7 +297,7 @@ TEST(ZarrSourceTest, SeriesOfImagesOpenTheFirst) {
   const TemporaryDirectory folder;
   for (const int version : {2, 3}) {
     const std::string path = folder / std::to_string(version);
-    ZarrJson attributes = ZarrJson::object();
+    Json attributes = Json::object();
     (version == 3 ? attributes["ome"] : attributes)["bioformats2raw.layout"] = 3;
     WriteZarrGroup(path, version, attributes);
     WriteImage(path + "/0", "zyx", version);
@@ -310,8 +311,8 @@ TEST(ZarrSourceTest, PlatesAndWellsNameTheirImages) {
   const TemporaryDirectory folder;
   for (const int version : {2, 3}) {
     const std::string path = folder / std::to_string(version);
-    const auto group = [&](const std::string& at, const ZarrJson& attributes) {
-      WriteZarrGroup(path + at, version, version == 3 ? ZarrJson{{"ome", attributes}} : attributes);
+    const auto group = [&](const std::string& at, const Json& attributes) {
+      WriteZarrGroup(path + at, version, version == 3 ? Json{{"ome", attributes}} : attributes);
     };
     group("", {{"plate", {{"wells", {{{"path", "A/1"}}, {{"path", "B/2"}}}}}}});
     group("/A/1", {{"well", {{"images", {{{"path", "0"}}, {{"path", "1"}}}}}}});
@@ -340,7 +341,7 @@ TEST(ZarrSourceTest, AGroupOfLabelImagesNamesThem) {
 TEST(ZarrSourceTest, LabelImagesSayHowTheirLabelsLook) {
   const TemporaryDirectory folder;
   WriteImage(folder / "a", "zyx", 2);
-  ZarrJson attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
+  Json attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
   attributes["image-label"] = {{"colors",
                                 {{{"label-value", 3}, {"rgba", {255, 0, 51, 255}}},
                                  {{"label-value", 1}, {"rgba", {0, 300, 0}}},
@@ -359,7 +360,7 @@ TEST(ZarrSourceTest, ChunksInFoldersAreFoundEvenIfTheMetadataDoNotSaySo) {
     ZarrSpec spec = SpecOf("zyx", 2);
     spec.separator = separator;
     WriteZarrArray(path, spec, ElementsOf("zyx"), [](auto index) { return index[0] == 0 && index[2] == 0; });
-    ZarrJson metadata = MetadataOf(spec);
+    Json metadata = MetadataOf(spec);
     metadata.erase("dimension_separator");
     WriteJson(path + "/.zarray", metadata);
     const std::vector<double> values = ValuesOf(**OpenText(path)), all = Volume(0, 0);
@@ -407,7 +408,7 @@ TEST(ZarrSourceTest, OneLineSaysWhatIsWrongWithAnImage) {
   const std::string path = folder / "a";
   WriteImage(path, "zyx", 2);
   const auto message = [&] { return OpenText(path).status().message(); };
-  ZarrJson attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
+  Json attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
   attributes["multiscales"][0]["datasets"][0]["path"] = "gone";
   WriteZarrGroup(path, 2, attributes);
   EXPECT_THAT(message(), HasSubstr("a/gone: no Zarr array or group is there"));
@@ -428,16 +429,16 @@ TEST(ZarrSourceTest, KnowsItsFolders) {
   const TemporaryDirectory folder;
   std::filesystem::create_directories(folder / "plain/sub");
   WriteImage(folder / "plain/sub", "zyx", 3);
-  EXPECT_EQ(FindSourceFormat(folder / "plain"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "plain"), nullptr);
   // Some writers leave out .zgroup.
   WriteImage(folder / "bare", "zyx", 2);
   std::filesystem::remove(folder / "bare/.zgroup");
   EXPECT_EQ(ValuesOf(**OpenText(folder / "bare")), Volume(0, 0));
-  ASSERT_NE(FindSourceFormat(folder / "plain/sub"), nullptr);
-  EXPECT_EQ(FindSourceFormat(folder / "plain/sub")->name, "Zarr");
+  ASSERT_NE(FindFormat(folder / "plain/sub"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "plain/sub")->name, "Zarr");
   EXPECT_EQ(OpenText(folder / "none.zarr").status().code(), StatusCode::kNotFound);
   WriteZip(folder / "other.zip", {{"readme", "text"}});
-  EXPECT_EQ(FindSourceFormat(folder / "other.zip"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "other.zip"), nullptr);
 }
 
 }  // namespace

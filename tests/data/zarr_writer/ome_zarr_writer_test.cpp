@@ -1,8 +1,10 @@
 // What is written is compared with the definition of each level, read back by the reader of Zarr, which shares no code with the writer.
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "common/json/json.h"
+#include "common/parallel/task_arena.h"
+#include "data/open/open_source.h"
 
 #include <gmock/gmock.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,13 +12,13 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <sstream>
 
-#include "data/sources/memory_source.h"
-#include "data/zarr/zarr.h"
+#include "common/files/files.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/json_at.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -137,7 +139,7 @@ Values Coarser(const Values& fine, const Index3& step, bool labels, bool whole) 
 }
 
 void ExpectLevels(const Case& made, const std::string& folder) {
-  const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}));
+  const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}));
   ASSERT_TRUE(read.ok()) << read.status().message();
   const VolumeDescription& description = made.volume->description;
   const std::vector<WrittenLevel> plan = PlanLevels(description.geometry, made.options.coarsest_side > 0 ? made.options.coarsest_side : 8);
@@ -205,7 +207,7 @@ TEST(OmeZarrWriterTest, KeepsTheWorldAndTheMapping) {
       made.options = {.version = version, .chunk_side = 8, .shard_side = 16};
       const std::string folder = directory / (std::string(ToString(version)) + (turned ? "turned" : "straight"));
       ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
-      const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1}));
+      const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1}));
       ASSERT_TRUE(read.ok()) << read.status().message();
       const SourceInfo& info = (*read)->info();
       EXPECT_EQ(info.levels[0].description, description);
@@ -236,7 +238,7 @@ TEST(OmeZarrWriterTest, LabelsOf64BitsAreExactAtEveryLevel) {
     const std::string folder = directory / std::string(ToString(version));
     const Status status = WriteOmeZarr(*made.source(), folder, made.options);
     ASSERT_TRUE(status.ok()) << status.message();
-    const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).value();
+    const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).value();
     EXPECT_EQ(read->info().exact.type, SampleType::kUint64);
     EXPECT_TRUE(read->info().labels);
     const auto level = [&](int number) {
@@ -258,13 +260,12 @@ TEST(OmeZarrWriterTest, WrongAttributesAreNamed) {
   Case made = RandomCase(random, {9, 9, 9});
   made.options.version = OmeZarrVersion::k05;
   ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
-  nlohmann::json right;
-  std::ifstream(file) >> right;
-  const auto refusal = [&](const std::string& field, const nlohmann::json& value) {
-    nlohmann::json wrong = right;
-    wrong[nlohmann::json::json_pointer("/attributes/slabstream" + field)] = value;
+  const Json right = Json::Parse(ReadTextFile(file, std::size_t{1} << 20).value()).value();
+  const auto refusal = [&](const std::string& field, const Json& value) {
+    Json wrong = right;
+    JsonAt(wrong, "/attributes/slabstream" + field) = value;
     std::ofstream(file) << wrong;
-    return Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
+    return OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
   };
   EXPECT_THAT(refusal("/orientation/world", "moon").message(),
               HasSubstr("slabstream.orientation.world is \"moon\", must be voxels, scene or patient"));
@@ -283,7 +284,7 @@ TEST(OmeZarrWriterTest, TheBytesDoNotDependOnThreadsOrMemory) {
     Case made = RandomCase(random, {50, 30, 20});
     const std::string one = directory / (std::to_string(seed) + "a.ome.zarr"), other = directory / (std::to_string(seed) + "b.ome.zarr");
     ASSERT_TRUE(WriteOmeZarr(*made.source(), one, made.options).ok());
-    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
+    const ThreadLimit threads(1);
     // As little memory as it takes.
     made.options.memory = 1;
     const Status refused = WriteOmeZarr(*made.source(), other, made.options);

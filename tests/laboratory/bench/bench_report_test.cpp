@@ -1,17 +1,16 @@
 #include "laboratory/bench/bench_report.h"
+#include "common/json/json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "tests/support/random.h"
 
 namespace slabstream {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 TEST(Spread, OfKnownValues) {
@@ -78,29 +77,29 @@ TEST(BenchReport, JsonHasThePromisedFields) {
   BenchResult skipped;
   skipped.bench_case = StandardBenchCases().back();
   skipped.skipped = "no file";
-  const json report = json::parse(BenchJson(EmbeddedRun(), {FiveFrames(), skipped}));
-  EXPECT_EQ(report["machine"], (json{{"cpu", "a processor"}, {"cores", 2}, {"simd", "AVX2"}}));
+  const Json report = Json::Parse(BenchJson(EmbeddedRun(), {FiveFrames(), skipped})).value();
+  EXPECT_EQ(report["machine"], (Json{{"cpu", "a processor"}, {"cores", 2}, {"simd", "AVX2"}}));
   EXPECT_EQ(report["command"], "slabstream bench class1-256");
   EXPECT_EQ(report["size"], 512);
   EXPECT_EQ(report["workers"], 2);
   EXPECT_NE(report["version"], "");
   ASSERT_EQ(report["cases"].size(), 2U);
 
-  const json& first = report["cases"][0];
+  const Json& first = report["cases"][0];
   EXPECT_EQ(first["case"], "class1-256");
-  EXPECT_EQ(first["volume"]["size"], (json{4, 5, 6}));
+  EXPECT_EQ(first["volume"]["size"], (Json{4, 5, 6}));
   EXPECT_EQ(first["volume"]["raw_bytes"], 120);
   EXPECT_EQ(first["renderer"], "splat");
   EXPECT_EQ(first["opacity"], 0.05);
   EXPECT_EQ(first["first_frame_ms"], 99);
   EXPECT_EQ(first["latency_ms"]["orthographic"]["median"], 20);
-  EXPECT_EQ(first["latency_ms"]["perspective"]["all"], (json{40, 50}));
+  EXPECT_EQ(first["latency_ms"]["perspective"]["all"], (Json{40, 50}));
   EXPECT_EQ(first["latency_ms"]["both"]["frames"], 5);
   EXPECT_EQ(first["latency_ms"]["both"]["median"], 30);
   EXPECT_EQ(first["stage_median_ms"]["splat"], 3);
   EXPECT_EQ(first["stage_median_ms"].size(), std::size_t(kStageCount));
   EXPECT_EQ(first["peak_rss_bytes"], 3 << 20);
-  EXPECT_EQ(report["cases"][1], (json{{"case", "brain"}, {"skipped", "no file"}}));
+  EXPECT_EQ(report["cases"][1], (Json{{"case", "brain"}, {"skipped", "no file"}}));
 }
 
 TEST(BenchReport, RowsStandUnderTheirHeader) {

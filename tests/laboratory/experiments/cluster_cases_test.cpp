@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/experiments/figures.h"
 #include "tests/support/temporary_directory.h"
 
@@ -19,7 +19,7 @@ constexpr double kMeanError = 0.22, kMostError = 0.5;
 
 Json ReadCases() {
   const std::string path = std::string(SLABSTREAM_SOURCE_DIRECTORY) + "/tests/laboratory/experiments/cluster_cases.json";
-  return Json::parse(ReadTextFile(path, std::size_t{1} << 24).value());
+  return Json::Parse(ReadTextFile(path, std::size_t{1} << 24).value()).value();
 }
 
 FrameCase FrameOf(const Json& recorded) {
@@ -30,7 +30,7 @@ FrameCase FrameOf(const Json& recorded) {
   FrameCase frame{SphereCase(request, sphere["opacity"].get<double>(), renderer),
                   {pixels, pixels},
                   BenchView(Projection::kOrthographic, 1, 12),
-                  {.decomposition = recorded["decomposition"], .balance_by = recorded["balance_by"], .groups = 1},
+                  {.decomposition = recorded["decomposition"].text(), .balance_by = recorded["balance_by"].text(), .groups = 1},
                   recorded["workers"].get<int>()};
   frame.policy.combine = "fan-in";
   return frame;

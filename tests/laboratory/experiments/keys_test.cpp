@@ -12,7 +12,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/experiments/request_json.h"
@@ -312,11 +312,7 @@ TEST_F(Keys, ReadPlainly) {
   EXPECT_EQ(key["volume"], (Json{{"class", 1}, {"size", 24}, {"occupancy", 0.1}}));
   EXPECT_EQ(key["renderer"], "splat");
   EXPECT_EQ(key["view"]["roll_degrees"], 10);
-  const std::map<std::string, Json> policy = key["policy"], expected = {{"decomposition", "kd-tree"},
-                                                                        {"balance_by", "voxels"},
-                                                                        {"axis", "AXIS_CHOICE_AUTO"},
-                                                                        {"groups", 2}};
-  EXPECT_EQ(policy, expected);
+  EXPECT_EQ(key["policy"], (Json{{"decomposition", "kd-tree"}, {"balance_by", "voxels"}, {"axis", "AXIS_CHOICE_AUTO"}, {"groups", 2}}));
 }
 
 // A trial that several cases share measures the boxes of each of them.

@@ -40,7 +40,7 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->policies[1].policy.teams, 2);
   EXPECT_EQ(sweep->views[0].name, "view 1");
   EXPECT_EQ(sweep->views[1].view.zoom, 2);
-  EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, static, 1 groups, fan-in");
+  EXPECT_EQ(sweep->policies[0].name, "kd-tree by bricks, cyclic, static, 1 groups, fan-in");
   EXPECT_EQ(sweep->policies[1].policy.balance_by, "occupied");
   EXPECT_EQ(sweep->policies[1].policy.assignment, "greedy");
   EXPECT_EQ(sweep->policies[1].policy.balance, "dynamic");
@@ -51,11 +51,11 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
 }
 
-TEST(SweepFile, LeavesNamesOpen) {
+TEST(SweepFile, LeavesTheSchemeAndTheGroupsToTheService) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
-    "policies": [{"decomposition": "auto", "balance_by": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})");
+    "policies": [{"groups": "auto"}]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
-  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, auto groups, auto");
+  EXPECT_EQ(sweep->policies[0].name, "kd-tree by bricks, cyclic, static, auto groups, combined as the service does");
   EXPECT_EQ(sweep->policies[0].policy.groups, 0);
 }
 
@@ -84,9 +84,9 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"[1, 16]", "[]", "workers: [] must be a list of at least one"},
       {"[1, 16]", "3", "workers: 3 must be a list"},
       {"\"workers\"", "\"wrokers\"", "'wrokers' is no field; there are title, size"},
-      {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: decomposition 'cake' is not one of auto, slab, "},
+      {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: decomposition 'cake' is not one of slab, "},
       {"\"tree:4,strips=8\"", "\"tree:1\"", "policies[1].combine: "},
-      {"\"greedy\"", "\"lots\"", "policies[1].assignment: assignment 'lots' is not one of auto, cyclic"},
+      {"\"greedy\"", "\"lots\"", "policies[1].assignment: assignment 'lots' is not one of cyclic"},
       {"\"dynamic\"", "\"always\"", "policies[1].balance: balance 'always' is not one of static, dynamic"},
       {"0.001", "2", "policies[1].pixel_error: pixel-error 2 is out of range [0, 0.1]"},
       {"\"groups\": 2", "\"groups\": -1", "policies[1].groups: groups -1 is out of range [0, 1024]"},

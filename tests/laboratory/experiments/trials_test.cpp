@@ -28,7 +28,7 @@ std::vector<Trial> Trials(std::map<std::string, int>& runs, std::vector<int>* or
     trial.run = [&runs, order, i] {
       ++runs[std::to_string(i)];
       if (order != nullptr) order->push_back(i);
-      return Json{{"value", i * 1.1}, {"list", {i, 2.0 * i}}};
+      return Json{{"value", i * 1.1}, {"list", {i, 2.0 * i}}, {"inner", {{"double", 2.0 * i}}}};
     };
     trials.push_back(std::move(trial));
   }
@@ -68,7 +68,7 @@ TEST(Trials, RunsEveryRepeatInARandomOrderOfTheSeed) {
     std::ranges::sort(round);
     EXPECT_THAT(round, testing::ElementsAre(0, 1, 2, 3, 4, 5, 6));
     EXPECT_EQ(EstimateOf(*log, {{"i", 2}}, "value").count, kRepeats);
-    EXPECT_EQ(ValuesOf(*log, {{"i", 2}}, "/list/1").front(), 4.0);
+    EXPECT_EQ(ValuesOf(*log, {{"i", 2}}, "/inner/double").front(), 4.0);
     EXPECT_THAT(MediansOf(log->All({{"i", 5}}), "list"), testing::ElementsAre(5, 10));
   }
   EXPECT_EQ(orders[0], orders[1]);

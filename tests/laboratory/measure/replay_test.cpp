@@ -1,11 +1,11 @@
 #include "laboratory/measure/replay.h"
+#include "common/json/json.h"
 #include "common/renderers/registry.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "client/client.h"
 #include "client/embedded/embedded_service.h"
@@ -139,7 +139,7 @@ TEST(Replay, FramesOfTheServiceCanBeReplayed) {
       }
     }
   }
-  const nlohmann::ordered_json trace = {{kRecordingKey, RecordingJson(frames)}};
+  const Json trace = {{kRecordingKey, RecordingJson(frames)}};
   const std::vector<RecordedFrame> read = ParseRecording(trace.dump()).value();
   for (const CombiningEntry& scheme : CombiningSchemes()) {
     const ReplayReport report = Replay(read, {.combine = std::string(scheme.name)}, MachineModel(), MachineModel()).value();

@@ -5,7 +5,7 @@
 
 #include <regex>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/results/columns.h"
 #include "tests/support/temporary_directory.h"
 
@@ -58,7 +58,7 @@ TEST(Results, FilesHoldTheSameRows) {
   EXPECT_THAT(csv, HasSubstr("simulated,c0ffee,\"a machine, 2 cores\",0.5 0.25 1.0\n"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 4);
   const std::string lines = ReadTextFile(folder.path() + "/results.jsonl", 1 << 20).value();
-  EXPECT_EQ(Json::parse(lines.substr(0, lines.find('\n'))), results.rows().front());
+  EXPECT_EQ(Json::Parse(lines.substr(0, lines.find('\n'))).value(), results.rows().front());
   EXPECT_EQ(ReadTextFile(folder.path() + "/boxes.csv", 1 << 20).value(), "box,seconds\n1,0.5\n");
 }
 

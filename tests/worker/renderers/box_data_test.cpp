@@ -1,6 +1,5 @@
 // What is kept of a padded box between frames, and the behaviour that both pipelines share.
 #include <gtest/gtest.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
@@ -10,6 +9,7 @@
 #include <thread>
 
 #include "common/mesh/mesh_part.h"
+#include "common/parallel/parallel.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
 #include "tests/worker/renderers/render_support.h"
@@ -319,7 +319,7 @@ TEST(Renderers, ReportTheirStages) {
     EXPECT_GT(stages, 0) << kind->name();
     stages += report.stage_ns[std::size_t(Stage::kPrepare)];
     // Stages count the time of every thread.
-    EXPECT_LE(stages, report.stage_ns[std::size_t(Stage::kRender)] * tbb::this_task_arena::max_concurrency());
+    EXPECT_LE(stages, report.stage_ns[std::size_t(Stage::kRender)] * ThreadsHere());
   }
 }
 

@@ -181,7 +181,7 @@ struct LaneNumbers {
 
 // Samples among the corners of bricks.
 struct BrickPlace {
-  Ints number;         // of the brick
+  Ints number;         // the brick's number
   Ints within;         // from the brick's first corner to the sample's
   LaneNumbers corner;  // the sample's first one
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "worker/rays/ray_box.h"
 
 namespace slabstream {

@@ -96,14 +96,15 @@ HWY_INLINE Gradient IndicatorGradientAt(const RayLayers& layers, const RayBox& b
 
 // Samples after the layers have had their say. Lanes that are not `sampled` mean nothing.
 struct LayeredSample {
-  Floats opacity;  // of volume and overlay together
-  // Of the volume's part: its colour is (1 - tint) times its own and tint times `label_entry`'s. A label that is matter has a tint of 1.
+  Floats opacity;  // the opacity of volume and overlay together
+  // The share of a label's colour in the volume's part: that part has (1 - tint) times the volume's colour and tint
+  // times the colour of `label_entry`. A label that is matter has a tint of 1.
   Floats tint;
   Ints label;        // number
   Ints label_entry;  // index into LabelTables::entries
   Mask matter;       // the label is the material
-  // Of the overlay's part.
-  Floats overlay_share;  // of the colour, [0, 1]
+  // The overlay's part.
+  Floats overlay_share;  // the overlay's share of the colour, [0, 1]
   Ints overlay_entry;
   Neighbours<float> overlay;  // only if the overlay is shown
 };
@@ -151,7 +152,7 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
     const auto sum = hn::Add(sample.opacity, over);
     const auto any = hn::Gt(sum, zero);
     sample.overlay_share = hn::IfThenElseZero(any, hn::Div(over, hn::IfThenElse(any, sum, one)));
-    // Of opaque material exactly 1; of material without an overlay as it was.
+    // Opaque material keeps exactly 1; material without an overlay stays as it was.
     const auto together = hn::Sub(one, hn::Mul(hn::Sub(one, sample.opacity), hn::Sub(one, over)));
     sample.opacity = hn::IfThenElse(hn::Gt(over, zero), together, sample.opacity);
   }

@@ -30,7 +30,8 @@ struct MarchWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
   const RayLook* look = nullptr;
-  // Of the box's cells, for the octants of the rays: to cells with visible samples, and to those that an isosurface passes through.
+  // Distances of the box's cells, for the octants of the rays: to cells with visible samples, and to those that an
+  // isosurface passes through.
   const EmptyDistances* to_samples = nullptr;
   const EmptyDistances* to_surfaces = nullptr;  // null: no isosurface is shown
   const std::int32_t* surface_cells = nullptr;  // FindSurfaceCells

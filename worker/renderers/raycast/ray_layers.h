@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "common/base/aligned_buffer.h"
 #include "common/frame/layer_look.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "worker/rays/ray_look.h"
 

@@ -4,7 +4,6 @@
 //   1. once a padded box: pad its voxels (RayVolume) and find the range of each small cell
 //   2. once a transfer function, look of layers, and octant of directions: for each cell, find how far rays may leap (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
-#include <tbb/enumerable_thread_specific.h>
 
 #include <cmath>
 #include <optional>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "common/frame/matter_labels.h"
+#include "common/parallel/per_thread.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/layer_volume.h"
@@ -201,7 +201,7 @@ class RaycastRenderer : public Renderer {
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
     const RayEnds ends(setup.termination);
     std::atomic<std::uint64_t> shaded = 0;
-    tbb::enumerable_thread_specific<GradientBricks> bricks;
+    PerThread<GradientBricks> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
@@ -215,7 +215,7 @@ class RaycastRenderer : public Renderer {
                                   .termination = ends[steps],
                                   .layers = layers ? &*layers : nullptr,
                                   .light = light ? &*light : nullptr};
-          shaded += MarchTile(work, tile, bricks.local(), rgba, floats_a_row);
+          shaded += MarchTile(work, tile, bricks.Mine(), rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
     clock.Finish(Stage::kRender, control);

@@ -1,9 +1,9 @@
 #include "worker/renderers/raycast/surface_cells.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstddef>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -45,7 +45,7 @@ std::vector<std::int32_t> FindSurfaceCells(const PaddedVoxels& voxels, const Mac
   const Index3 cells_along = voxels.box.size() + Uniform(2 * kPad - 2);  // the first one is next to voxel box.begin - 1
   VisitScalarType(voxels.type, [&]<class T>(const T*) {
     const T* const first = reinterpret_cast<const T*>(voxels.At(voxels.box.begin - Uniform(1)));
-    tbb::parallel_for(std::int32_t{0}, counts.z, [&](std::int32_t group_z) {
+    ParallelFor(0, counts.z, [&](std::int32_t group_z) {
       for (Index3 group{0, 0, group_z}; group.y < counts.y; ++group.y) {
         for (group.x = 0; group.x < counts.x; ++group.x) {
           const std::size_t number = NumberIn(counts, group);

@@ -39,7 +39,7 @@ HWY_INLINE Ints OctantStart(const EmptyDistances& distances, const RayPacket& pa
   }
   return hn::GatherIndex(di, distances.starts().data(), octant);
 }
-// Of cells, which lie at `cell` from there.
+// The distances of cells, which lie at `cell` from there.
 HWY_INLINE Ints DistanceAt(const EmptyDistances& distances, Ints octant_start, Ints cell) {
   const auto four = hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(distances.data()), hn::Add(octant_start, cell));
   return hn::And(four, SetInt(0xFF));
@@ -84,7 +84,7 @@ HWY_INLINE Extrema ExtremaOf(const Cubic& f) {
 struct Crossing {
   Floats at;       // samples; kRayEnd: there is none
   Floats surface;  // number
-  Ints voxel[3];   // as in SamplePlace, and so are
+  Ints voxel[3];   // as SamplePlace has it, and so are
   Floats fraction[3];
 
   HWY_INLINE void Become(Mask rays, const Crossing& other) {
@@ -240,7 +240,7 @@ class SurfaceWalk {
   // A place between low and high, where `above` changes its sign; `low_side`: its side at low. Two halvings at a time, whose polynomials
   // are evaluated side by side.
   static HWY_INLINE Floats Bisect(const Cubic& above, Mask low_side, Floats low, Floats high) {
-    constexpr int kQuarterings = 8;  // of at most 1.8 voxels
+    constexpr int kQuarterings = 8;  // quarters an interval of at most 1.8 voxels
     const auto middle = [&](Floats a, Floats b) HWY_ATTR { return hn::Mul(Set(0.5F), hn::Add(a, b)); };
     const auto is_behind = [&](Floats x) HWY_ATTR { return hn::Xor(hn::Ge(above.At(x), hn::Zero(FloatTag())), low_side); };
     for (int i = 0; i < kQuarterings; ++i) {

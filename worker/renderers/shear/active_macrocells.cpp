@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/parallel/parallel.h"
 #include "worker/renderers/brick_ranges.h"
 
 namespace slabstream::shear {
@@ -33,7 +34,7 @@ MacrocellRange RangeIn(const BrickView<T>& brick, const Box& box) {
 std::vector<std::uint8_t> Grow(const std::vector<std::uint8_t>& cells, std::size_t stride, std::int32_t count, std::int32_t radius) {
   std::vector<std::uint8_t> grown(cells.size());
   const std::size_t plane = stride * std::size_t(count);
-  tbb::parallel_for(std::size_t{0}, cells.size() / plane, [&](std::size_t number) {
+  ParallelFor(0, cells.size() / plane, [&](std::size_t number) {
     for (std::int32_t i = 0; i < count; ++i) {
       std::uint8_t* const to = &grown[number * plane + std::size_t(i) * stride];
       for (std::int32_t j = std::max(i - radius, 0); j <= std::min(i + radius, count - 1); ++j) {
@@ -99,7 +100,7 @@ ActiveMacrocells FindActiveMacrocells(const VoxelRanges& ranges, const VisibleSa
   constexpr std::int32_t kReach[3] = {2, 2, 1};
   const Index3& counts = ranges.counts;
   std::vector<std::uint8_t> near(ranges.ranges.size());
-  tbb::parallel_for(std::size_t{0}, std::size_t(counts.z), [&](std::size_t z) {
+  ParallelFor(0, std::size_t(counts.z), [&](std::size_t z) {
     const std::size_t plane = std::size_t(counts.x) * std::size_t(counts.y);
     for (std::size_t i = z * plane; i < (z + 1) * plane; ++i) {
       const MacrocellRange& range = ranges.ranges[i];

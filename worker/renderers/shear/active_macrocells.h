@@ -25,7 +25,7 @@ inline constexpr std::int32_t kCell = 8;  // voxels
 struct ActiveMacrocells {
   std::array<std::int32_t, 3> first{}, counts{};  // cells, by place in ShearPasses::axes; the first is fastest
   std::vector<std::uint8_t> active;
-  Box hull;  // of the volume: holds all voxels of active cells, and perhaps others; empty if there are none
+  Box hull;  // a box of the volume that holds all voxels of active cells, and perhaps others; empty if there are none
 
   // Whether one of the cells is active in which lie [x_low, x_high] x [y_low, y_high] x z, in voxels, or the nearest ones.
   bool Any(float x_low, float x_high, float y_low, float y_high, float z) const;

@@ -91,7 +91,7 @@ class Composer : TileContext {
       if (!hn::AllFalse(df, hn::And(visible, is_end))) {
         const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, hn::Load(df, &part.first_excess[row][column])));
         const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, hn::Load(df, &part.last_excess[row][column])));
-        // Of these alone: no ray depends on those beside it, which other boxes need not have.
+        // Only the samples at ends are changed: no ray depends on those beside it, which other boxes need not have.
         opacity = hn::IfThenElse(is_end, hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power)), opacity);
       }
       Light light = {one, zero};

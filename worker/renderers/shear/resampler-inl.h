@@ -100,8 +100,8 @@ class Resampler : TileContext {
  private:
   // The places of rows [row_begin, row_end) of a chunk of columns, in a slice.
   struct Strip {
-    float u_first = 0;                          // of the chunk
-    double z = 0;                               // of the slice
+    float u_first = 0;                          // u of the chunk's first column
+    double z = 0;                               // z of the slice
     int scale = 1;                              // beams for each of the volume
     float y_rows[kTileRows], y_step = 0;        // lattice points lie at y_rows + y_step u, in beams
     std::int32_t beam_begin = 0, beam_end = 0;  // beams that they are made from
@@ -134,7 +134,7 @@ class Resampler : TileContext {
   // The lattice points of a vector of columns in a row: the first beam that each is made from, and how far behind beam `before` it lies.
   struct Places {
     Floats beam, t;
-    float first, last;  // of the beams
+    float first, last;  // the first and the last beam
   };
   HWY_INLINE Places PlacesOf(const Strip& strip, std::int32_t row, std::int32_t column, std::int32_t before, std::int32_t behind) const {
     const FloatTag df;
@@ -179,7 +179,7 @@ class Resampler : TileContext {
   // written.
   const float* BeamBetween(std::int32_t beam, std::int32_t slice, const Strip& strip) {
     const TurnedVoxels& voxels = *work_.voxels;
-    // Of the beam, as numbers of its samples.
+    // The beam's position, in numbers of its samples.
     const double x_0 = passes_.x_0 + passes_.x_y * (double(beam) / scale_) + passes_.x_z * strip.z;
     const auto sample = [&](float u, double slack) {
       const double floor = std::floor(x_0 + passes_.x_u * double(u)) + slack;

@@ -5,13 +5,13 @@
 //   2. once an order of the axes: store the voxels so that beams of the first pass are contiguous (TurnedVoxels)
 //   3. once a transfer function, too: find where anything can be visible (ActiveMacrocells)
 //   4. once a frame: tiles of the picture are separate tasks (ShearTile)
-#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <tuple>
 
+#include "common/parallel/per_thread.h"
 #include "worker/rays/ray_box.h"
 #include "worker/rays/render_tiles.h"
 #include "worker/renderers/renderer.h"
@@ -70,7 +70,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const Render
   const std::ptrdiff_t column = 4, row = 4 * std::ptrdiff_t{bounds.width()};
   const std::int32_t across = (u_end - u_begin - 1) / kTileColumns + 1, down = (v_end - v_begin - 1) / kTileRows + 1;
   std::atomic<std::uint64_t> shaded = 0;
-  tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
+  PerThread<TileRoomPtr> rooms;
   ForEachTile(across * down, control, report, [&](std::int32_t number) {
     TilePixels tile;
     tile.u_begin = u_begin + number % across * kTileColumns;
@@ -82,7 +82,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const Render
     tile.first = image.rgba.data() + (tile.u_begin - u_begin) * tile.along_u + (tile.v_begin - v_begin) * tile.along_v;
     const PixelBounds pixels = turned ? PixelBounds{tile.v_begin, tile.u_begin, tile.v_end, tile.u_end}
                                       : PixelBounds{tile.u_begin, tile.v_begin, tile.u_end, tile.v_end};
-    if (!work.hidden->HidesAll(pixels)) shaded += ShearTile(work, tile, *rooms.local());
+    if (!work.hidden->HidesAll(pixels)) shaded += ShearTile(work, tile, *rooms.Mine(MakeTileRoom));
   });
   return shaded;
 }

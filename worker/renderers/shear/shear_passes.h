@@ -31,7 +31,7 @@
 namespace slabstream::shear {
 
 struct ShearPasses {
-  std::array<Axis, 3> axes{};  // of the volume, that x, y and z are
+  std::array<Axis, 3> axes{};  // which axes of the volume x, y and z are
   bool turned = false;
   double x_u = 0, x_y = 0, x_z = 0, x_0 = 0;
   double y_u = 0, y_v = 0, y_z = 0, y_0 = 0;

@@ -40,7 +40,7 @@ struct ShearWork {
   const VisibleSamples* visible = nullptr;
   Float3 low{}, high{};                   // the box owns the positions p with low <= p < high on every axis of the volume
   std::int32_t k_begin = 0, k_end = 0;    // its samples are among these
-  const OcclusionMask* hidden = nullptr;  // of the frame
+  const OcclusionMask* hidden = nullptr;  // the frame's hidden tiles
   float termination = 0;                  // a ray ends where it transmits less; 0: never
 };
 

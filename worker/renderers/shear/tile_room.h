@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/renderers/shear/shear_tile.h"
 
 namespace slabstream::shear {
@@ -33,7 +33,7 @@ struct BlockState {
 // Lattice points of a slice.
 struct SliceRoom {
   alignas(64) float values[kTileRows][kTileColumns];
-  alignas(64) float low[kTileRows][kChunks], high[kTileRows][kChunks];  // of the chunk's values
+  alignas(64) float low[kTileRows][kChunks], high[kTileRows][kChunks];  // bounds of the chunk's values
 };
 
 // Central differences of the volume's samples, over two voxels, at lattice points of a slice of the volume.
@@ -41,7 +41,7 @@ struct GradientRoom {
   alignas(64) float along[3][kTileRows][kTileColumns];  // x, y and z
 };
 
-// Of a tile.
+// The memory that one tile needs.
 struct TileRoom {
   SliceRoom slots[kSlots];
   GradientRoom gradients[2];

@@ -1,5 +1,6 @@
 #include "worker/renderers/shear/turned_voxels.h"
 
+#include "common/parallel/parallel.h"
 #include "worker/renderers/brick_ranges.h"
 
 namespace slabstream::shear {
@@ -45,7 +46,7 @@ TurnedVoxels Turn(const VoxelBricks& voxels, const std::array<Axis, 3>& axes) {
         TurnBrick(view, box, turned);
       }
     });
-    tbb::parallel_for(0, slices, [&](std::int32_t slice) {
+    ParallelFor(0, slices, [&](std::int32_t slice) {
       for (std::int32_t row = 0; row < rows; ++row) {
         T* const beam = const_cast<T*>(turned.Beam<T>(turned.begin[1] + row, turned.begin[2] + slice));
         std::fill_n(beam, kBeamPad, beam[kBeamPad]);

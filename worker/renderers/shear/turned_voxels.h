@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "common/base/large_array.h"
+#include "common/memory/large_array.h"
 #include "common/volume/bricks.h"
 
 namespace slabstream::shear {

@@ -1,10 +1,11 @@
 #include "worker/renderers/slice/cell_bins.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream::slice {
 
@@ -47,7 +48,7 @@ Result<CellBins> CellBins::Make(std::span<const PointBounds> points, std::span<c
       }
     }
   };
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t number) {
+  ParallelFor(0, count, [&](std::size_t number) {
     Block& block = blocks[number];
     block.next.assign(tiles, 0);
     const std::size_t begin = shown.size() * number / count, end = shown.size() * (number + 1) / count;
@@ -80,7 +81,7 @@ Result<CellBins> CellBins::Make(std::span<const PointBounds> points, std::span<c
   }
   bins.first_[tiles] = total;
   bins.entries_.resize(total);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t number) {
+  ParallelFor(0, count, [&](std::size_t number) {
     Block& block = blocks[number];
     for (const Found& found : block.found) {
       for_each_tile(found, [&](std::size_t tile) { bins.entries_[block.next[tile]++] = {found.cell, found.chunk}; });

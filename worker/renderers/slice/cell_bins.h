@@ -63,7 +63,7 @@ class CellBins {
 
   PixelBounds pixels_;
   std::int32_t first_column_, first_row_, columns_, rows_;  // tiles
-  std::vector<std::size_t> first_;                          // of entries_, by tile, and their number
+  std::vector<std::size_t> first_;                          // where each tile's cells begin in entries_, and where the last one's end
   std::vector<Entry> entries_;
 };
 

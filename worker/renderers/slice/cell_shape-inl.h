@@ -36,7 +36,7 @@ HWY_INLINE bool MakeCellShape(const CellCorners& corners, double x_begin, CellSh
     return Vec3{points[b]->x - points[a]->x, points[b]->y - points[a]->y, points[b]->s - points[a]->s};
   };
   const Vec3 p01 = from(0, 1), p02 = from(0, 2), p03 = from(0, 3);
-  // Of the face that lacks each point.
+  // The normal of the face that lacks each point.
   std::array<Vec3, 4> normals = {Cross(from(1, 2), from(1, 3)), Cross(p02, p03), Cross(p01, p03), Cross(p01, p02)};
   // Six times; on point i, the function of the face that lacks it has the value of this with alternating signs, - + - +.
   const double volume = Dot(normals[3], p03);

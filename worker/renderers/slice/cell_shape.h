@@ -15,9 +15,9 @@ struct CellShape {
   // Faces. Face 0 lies before the cell (x >= root), face 3 behind it, and the others as the numbers say that are added to their roots: 0 or
   // an infinity.
   double at[4], per_s[4], per_y[4];
-  double before[2], behind[2];  // of faces 1 and 2
+  double before[2], behind[2];  // what is added to the roots of faces 1 and 2
   LinearFunction value;         // divided by FrameSpace::ScaleOf(k)
-  float least, greatest;        // of the cell's values
+  float least, greatest;        // the range of the cell's values
   LinearFunction slope[3];      // the gradient's components, of any scale that they share; of cells that are lit
 };
 

@@ -1,10 +1,9 @@
 #include "worker/renderers/slice/frame_space.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "common/parallel/parallel.h"
 
 namespace slabstream::slice {
 namespace {
@@ -68,8 +67,8 @@ void FrameSpace::Place(const Vec3& point, FramePoint& at, PointBounds& bounds) c
 void FrameSpace::Place(std::span<const Vector3<float>> points, FramePoints& result) const {
   result.points.resize(points.size());
   result.bounds.resize(points.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+  ParallelForRanges(0, points.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
       Place({double(points[i].x), double(points[i].y), double(points[i].z)}, result.points[i], result.bounds[i]);
     }
   });

@@ -12,8 +12,8 @@
 
 #include <span>
 
-#include "common/base/aligned_buffer.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "worker/rays/view_rays.h"
@@ -48,7 +48,7 @@ class FrameSpace {
 
   const ViewRays& rays() const { return rays_; }  // on planes; they run through the samples
 
-  // Of points in data space. Parallel.
+  // Places points of data space. Parallel.
   void Place(std::span<const Vector3<float>> points, FramePoints& result) const;
 
   double SOf(double k) const { return perspective_ ? numerator_ / DepthOf(k) : k; }
@@ -67,7 +67,7 @@ class FrameSpace {
   ViewRays rays_;
   bool perspective_ = false;
   double step_ = 1;         // physical
-  double first_depth_ = 0;  // of plane 0
+  double first_depth_ = 0;  // the depth of plane 0
   double numerator_ = 1;    // s * depth
   double moved_ = 0;        // voxel lengths: samples are moved by less
   Vec3 first_;              // data space: a point of plane 0, before it was moved

@@ -1,11 +1,10 @@
 #include "worker/renderers/slice/shown_cells.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <numeric>
 
 #include "common/mesh/mesh_cell.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream::slice {
 
@@ -15,8 +14,7 @@ std::span<const std::uint32_t> ShownCells::Of(const Mesh& mesh, const VisibleSam
   constexpr std::size_t kBlock = 1 << 15;
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   const auto for_each_block = [&](auto&& work) {
-    tbb::parallel_for(std::size_t{0}, blocks,
-                      [&](std::size_t block) { work(block, block * kBlock, std::min((block + 1) * kBlock, count)); });
+    ParallelFor(0, blocks, [&](std::size_t block) { work(block, block * kBlock, std::min((block + 1) * kBlock, count)); });
   };
 
   if (ranges_.size() != count) {

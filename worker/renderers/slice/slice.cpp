@@ -3,11 +3,11 @@
 //   1. once a transfer function: find the cells of which anything may be visible (ShownCells)
 //   2. once a frame: move the cells' points to frame space (FrameSpace), and find the cells of each tile of the picture (CellBins)
 //   3. tiles are separate tasks (SliceTile)
-#include <tbb/enumerable_thread_specific.h>
 
 #include <cmath>
 #include <optional>
 
+#include "common/parallel/per_thread.h"
 #include "worker/rays/ray_box.h"
 #include "worker/rays/render_tiles.h"
 #include "worker/renderers/renderer.h"
@@ -82,13 +82,13 @@ class SliceRenderer : public Renderer {
                                    RankReport& report) {
     const auto width = std::size_t(image.bounds.width());
     std::atomic<std::uint64_t> drawn = 0;
-    tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
+    PerThread<TileRoomPtr> rooms;
     ForEachTile(bins.tiles(), control, report, [&](std::int32_t number) {
       const std::span<const CellBins::Entry> cells = bins.VoxelsOf(number);
       if (cells.empty()) return;
       const PixelBounds tile = bins.TileAt(number);
       const std::size_t pixel = std::size_t(tile.y_begin - image.bounds.y_begin) * width + std::size_t(tile.x_begin - image.bounds.x_begin);
-      drawn += SliceTile(work, tile, cells, *rooms.local(), &image.rgba[4 * pixel], 4 * width);
+      drawn += SliceTile(work, tile, cells, *rooms.Mine(MakeTileRoom), &image.rgba[4 * pixel], 4 * width);
     });
     return drawn;
   }

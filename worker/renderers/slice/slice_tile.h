@@ -25,7 +25,7 @@ namespace slabstream::slice {
 struct SliceWork {
   const FrameSpace* space = nullptr;
   const Mesh* mesh = nullptr;
-  const FramePoints* points = nullptr;  // of the mesh
+  const FramePoints* points = nullptr;  // the mesh's points
   const RayLook* look = nullptr;
   Float3 low{}, high{};                     // the box owns the positions p with low <= p < high on every axis
   bool at_border = false;                   // the box touches the volume's border

@@ -23,7 +23,7 @@ struct OctetLight {
   OctetLight(const Shading& shading, const Vec3& view_direction, const FrameLight& light);
 
   FrameLight::View view;
-  float ambient = 0;                                // of the factors of a normal
+  float ambient = 0;                                // the ambient part of a normal's factors
   std::vector<std::vector<PhongFactors>> by_light;  // by normal code: of each light alone; empty: there is one light
 };
 

@@ -1,13 +1,12 @@
 #include "worker/renderers/splat/occupied_voxels.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <bit>
 #include <limits>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
+#include "common/parallel/per_thread.h"
 
 namespace slabstream {
 namespace {
@@ -85,16 +84,10 @@ OccupiedVoxels VoxelsOf(const VoxelBeams& beams, Axis traversal, const Box& want
   cells.first_record = {beams.first_record.get(), beams.beam_count + 1};
   cells.records = {beams.records.get(), beams.record_count()};
 
-  const Found found = tbb::parallel_reduce(
-      tbb::blocked_range<std::int32_t>(cells.box.begin[c], cells.box.end[c]), Found{},
-      [&](const tbb::blocked_range<std::int32_t>& slices, Found sum) {
-        for (std::int32_t slice = slices.begin(); slice < slices.end(); ++slice) sum.Include(FindInSlice(cells, wanted, slice));
-        return sum;
-      },
-      [](Found a, const Found& b) {
-        a.Include(b);
-        return a;
-      });
+  PerThread<Found> parts;
+  ParallelFor(cells.box.begin[c], cells.box.end[c], [&](std::int32_t slice) { parts.Mine().Include(FindInSlice(cells, wanted, slice)); });
+  Found found;
+  parts.ForEach([&](const Found& part) { found.Include(part); });
   if (found.begin.x != Found::kFar) cells.occupied = {found.begin, found.end};
   cells.occupied_in_box = found.in_box;
   return cells;

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/base/large_array.h"
+#include "common/memory/large_array.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/bricks.h"
 #include "worker/kernels/voxel_record.h"

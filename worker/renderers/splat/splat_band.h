@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "worker/kernels/splat.h"
 #include "worker/renderers/splat/splat_pass.h"
 #include "worker/renderers/stage_clock.h"
@@ -61,19 +61,19 @@ class SplatBand {
   LocalImage& image_;
   RankReport& report_;
   StageClock clock_;
-  const std::int32_t segments_, words_;  // of a row
-  const std::int32_t first_tile_row_;    // of the frame
+  const std::int32_t segments_, words_;  // segments and words of a row
+  const std::int32_t first_tile_row_;    // the first row of tiles, counted in the frame
   const bool clipped_;
   std::vector<float> opaque_alpha_;  // [row of tiles][segment]: alpha of the box at which nothing behind shows
   std::vector<SegmentWord> open_;    // [row][word]: not opaque yet
 
-  // Of the current slice.
+  // What follows belongs to the current slice.
   std::int32_t slice_ = 0;
   std::vector<std::array<ColumnInterval, 2>> left_;                // by row, of a clipped volume: columns of the slice
   std::vector<std::array<VoxelRecord, std::size_t{kOctet}>> cut_;  // records of octets near a cut
   std::vector<SegmentWord> open_whole_, open_part_, open_one_;     // [word]: scratch of CompositeClipped
   SheetOpacity::Slopes slopes_;
-  Rows rows_;                                     // that the slice can touch
+  Rows rows_;                                     // rows that the slice can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // beams whose footprints reach these rows
   std::vector<SegmentWord> owned_;                // [word]: segments with a column that the box owns
   const std::vector<SegmentWord> nothing_;        // [word]: 0
@@ -81,7 +81,7 @@ class SplatBand {
   std::vector<SegmentWord> filled_;               // [beam][word]: needed segments that the beam's voxels reach
   std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any segment is filled
   std::vector<OctetWork> octets_;                 // beam by beam
-  std::vector<VoxelPlace> octet_places_;          // of a clipped volume, or with a FrameLight: the first voxel of each octet
+  std::vector<VoxelPlace> octet_places_;          // the first voxel of each octet, if the volume is clipped or there is a FrameLight
   std::vector<OctetShares> shares_;               // with a FrameLight: of octets_
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_

@@ -24,7 +24,7 @@ const OccupiedVoxels& SplatCache::Occupied(BoxData& data, const FrameSetup& setu
   const Axis axis = setup.camera.traversal_axis;
   auto& of_axis = occupied_[std::size_t(axis)];
   if (const OccupiedVoxels* kept = of_axis.Find(box)) return *kept;
-  return of_axis.Add(box, VoxelsOf(Beams(data, setup, AxesOf(axis).u), axis, box), data.bricks().box().voxel_count());
+  return KeepBox(of_axis, box, VoxelsOf(Beams(data, setup, AxesOf(axis).u), axis, box), data.bricks().box().voxel_count());
 }
 
 std::size_t SplatCache::bytes() const { return (along_x_ ? along_x_->bytes() : 0) + (along_y_ ? along_y_->bytes() : 0); }

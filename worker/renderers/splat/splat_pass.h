@@ -35,8 +35,8 @@ struct SplatPass {
   ShadeTables tables;
   std::optional<OctetLight> light;
   Footprints footprints;
-  std::vector<SliceSamples> slices;               // of the occupied slices
-  PixelBounds bounds;                             // of the image: whole segments; empty if nothing shows
+  std::vector<SliceSamples> slices;               // the samples of the occupied slices
+  PixelBounds bounds;                             // the image's pixels, in whole segments; empty if nothing shows
   std::int32_t first_octet = 0, octet_count = 0;  // octets of whole cells
   std::vector<SegmentSpan> reached;               // [slice][octet]
 };

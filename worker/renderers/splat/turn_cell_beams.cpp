@@ -1,7 +1,5 @@
 // TurnVoxelBeams: transposes masks 32 x 32 voxels at a time and distributes records to their beams. Slices of one z go to beams of their
 // own, so they are the tasks.
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 #include "worker/renderers/splat/occupied_voxels.h"
 
 namespace slabstream {
@@ -92,10 +91,9 @@ VoxelBeams TurnVoxelBeams(const VoxelBeams& along_x) {
 
   constexpr std::int32_t kSlices = 8;  // at a time: their beams are neighbours in memory
   const auto for_each_z = [&](auto&& function) {
-    tbb::parallel_for(tbb::blocked_range<std::int32_t>(box.begin.z, box.end.z, kSlices),
-                      [&](const tbb::blocked_range<std::int32_t>& slices) {
-                        for (std::int32_t z = slices.begin(); z < slices.end(); ++z) function(z);
-                      });
+    ParallelForRanges(box.begin.z, box.end.z, kSlices, [&](std::int32_t begin, std::int32_t end) {
+      for (std::int32_t z = begin; z < end; ++z) function(z);
+    });
   };
   for_each_z([&](std::int32_t z) { TurnMasks(along_x, z, turned); });
   std::uint64_t total = 0;

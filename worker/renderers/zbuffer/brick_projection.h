@@ -12,9 +12,9 @@ namespace slabstream {
 
 // A brick as a frame sees it.
 struct ProjectedBrick {
-  PixelBounds pixels;       // that its faces may touch, within the frame; may be empty
+  PixelBounds pixels;       // pixels that its faces may touch, within the frame; may be empty
   float nearest = 0;        // depth; no face is nearer
-  std::uint32_t sides = 0;  // that may face the eye: bit side
+  std::uint32_t sides = 0;  // sides that may face the eye: bit side
   bool clipped = false;     // not all of its faces are drawn
 };
 
@@ -38,7 +38,7 @@ class BrickProjection {
   const Camera& camera_;
   const Index3 volume_size_;
   Vec3 ray_x_, ray_y_;                          // change of a ray per pixel: of its direction (perspective) or its origin
-  Vec3 direction_;                              // of the central ray
+  Vec3 direction_;                              // the central ray's direction
   std::array<FaceProjection, kSides> by_side_;  // the part that all bricks share
 };
 

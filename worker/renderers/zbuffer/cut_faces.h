@@ -29,7 +29,7 @@ struct CutPixel {
   float depth = 0;
   std::uint32_t voxel = 0;  // FaceIndex
   std::uint16_t bin = 0, label = 0;
-  std::uint16_t side = 0;  // of the clip region
+  std::uint16_t side = 0;  // the side of the clip region
 };
 
 class CutFaces {
@@ -56,7 +56,7 @@ class CutFaces {
   void Draw(const KeyBand& band, std::vector<CutPixel>& cuts) const;
   // Takes the cuts out of the band again, and leaves those in `cuts` that are seen.
   static void TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts);
-  // Fills in pixels of `image` (kDepth), after the others. Of `shading`: the colours.
+  // Fills in pixels of `image` (kDepth), after the others. Takes the colours of `shading`.
   void Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const;
 
  private:
@@ -69,9 +69,9 @@ class CutFaces {
   const Box box_;
   const bool keep_;
   const double slack_;                               // physical
-  const double margin_;                              // likewise: what is so far from every side needs no limits
-  const float least_depth_;                          // of a cut; kNeverMet: there is none
-  std::array<LinearInImage, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
+  const double margin_;                              // physical: what is so far from every side needs no limits
+  const float least_depth_;                          // the least depth of a cut; kNeverMet: there is none
+  std::array<LinearInImage, 3> origin_, direction_;  // a pixel's ray in data space: origin + depth * direction
   std::vector<PhongFactors> light_;                  // by side
   std::vector<PhongFactors> of_each_light_;          // with a FrameLight: [side][light], without the ambient light
   float ambient_ = 0;

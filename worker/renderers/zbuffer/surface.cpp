@@ -1,7 +1,5 @@
 #include "worker/renderers/zbuffer/surface.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <memory>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/renderers/zbuffer/vertex_normals.h"
 
@@ -239,7 +238,7 @@ Surface Join(std::span<const FoundFaces> parts, bool labelled) {
   surface.sites.resize(faces + kSitesReadAhead);
   surface.normals.resize(faces);
   if (labelled) surface.labels.resize(faces + 1);
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+  ParallelFor(0, parts.size(), [&](std::size_t i) {
     const auto& [brick, sites, normals, labels] = parts[i];
     if (brick.face_count() == 0) return;
     std::copy_n(sites + brick.side_begin[0], brick.face_count(), surface.sites.data() + begins[i]);

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "worker/kernels/surface_face.h"
 #include "worker/renderers/bin_lookup.h"
@@ -46,7 +46,7 @@ struct KnownSurface {
 struct OpaqueVoxels {
   const ClassificationTable& table;
   const BinSelection& bins;                   // opaque ones
-  const BrickRanges& ranges;                  // of the voxels
+  const BrickRanges& ranges;                  // ranges of the voxels
   const ShownLabels* labels = nullptr;        // null: not shown
   const BrickRanges* label_ranges = nullptr;  // if they are
 };

@@ -28,18 +28,18 @@ const Surface& SurfaceCache::Of(BoxData& data, const FrameSetup& setup, const Bo
   ShowLabels(data, setup.looks);
   if (const Surface* kept = surfaces_.Find(box)) return *kept;
   std::vector<KnownSurface> known;
-  for (const auto& [other, surface] : surfaces_.entries()) {
-    if (!Intersection(other, box).empty()) known.push_back({other, &surface});
+  for (const auto& other : surfaces_.entries()) {
+    if (!Intersection(other.key, box).empty()) known.push_back({other.key, &other.value});
   }
   const BrickRanges& ranges = data.ranges();  // first: bricks are read faster than the block
   const VoxelBlock& voxels = data.voxels();
   const OpaqueVoxels opaque = {table, opaque_bins_, ranges, labels(), label_ranges_ ? &*label_ranges_ : nullptr};
-  return surfaces_.Add(box, FindSurface(voxels, opaque, setup.description.geometry.spacing, box, known), voxels.box.voxel_count());
+  return KeepBox(surfaces_, box, FindSurface(voxels, opaque, setup.description.geometry.spacing, box, known), voxels.box.voxel_count());
 }
 
 std::size_t SurfaceCache::bytes() const {
   std::size_t total = label_ranges_ ? label_ranges_->bytes() : 0;
-  for (const auto& [box, surface] : surfaces_.entries()) total += surface.bytes();
+  for (const auto& surface : surfaces_.entries()) total += surface.value.bytes();
   return total;
 }
 

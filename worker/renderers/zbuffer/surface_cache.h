@@ -16,7 +16,7 @@ class SurfaceCache : public BoxCache {
  public:
   // Faces of the opaque voxels of `box`, which lies in the padded box. Valid until the next call.
   const Surface& Of(BoxData& data, const FrameSetup& setup, const Box& box);
-  // Of the voxels that were opaque at the last call; valid until the next one.
+  // The bins of the voxels that were opaque at the last call; valid until the next one.
   const BinSelection& opaque_bins() const { return opaque_bins_; }
   const ShownLabels* labels() const { return labels_ ? &*labels_ : nullptr; }  // null: they are not shown
 

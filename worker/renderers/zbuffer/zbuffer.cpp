@@ -8,15 +8,13 @@
 //   3. each band draws its bricks (draw_faces.h), except those behind what is already drawn, and if the volume is clipped, the cuts through
 //      opaque voxels (cut_faces.h); then it shades its pixels (shade_faces.h)
 #include <hwy/cache_control.h>
-#include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <numeric>
 #include <optional>
 
+#include "common/parallel/parallel.h"
+#include "common/parallel/per_thread.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/for_each_piece.h"
@@ -43,8 +41,8 @@ Scene PlaceBricks(const Surface& surface, const BrickProjection& projection, con
   Scene scene;
   const std::size_t count = surface.bricks.size();
   scene.views.resize(count);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+  ParallelForRanges(0, count, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
       const SurfaceBrick& brick = surface.bricks[i];
       if (cuts == nullptr) {
         scene.views[i] = projection.View(brick);
@@ -187,7 +185,7 @@ class ZBufferRenderer : public Renderer {
     const CutFaces* const drawn_cuts = cuts ? &*cuts : nullptr;
     const Scene scene = PlaceBricks(surface, projection, setup.clip, drawn_cuts);
     LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
-    const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
+    const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * ThreadsHere());
     FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) shading.frame_light = &light.emplace(data.light()->Seen());
@@ -214,7 +212,7 @@ class ZBufferRenderer : public Renderer {
       band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
       band.stride = std::size_t(band.bounds.width() + kKeyPadding);
       const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
-      Scratch& scratch = scratch_.local();
+      Scratch& scratch = scratch_.Mine();
       scratch.keys.resize(std::max(scratch.keys.size(), pixels));
       band.keys = scratch.keys.data();
       drawn += DrawBand(surface, scene, projection, setup.camera.projection, drawn_cuts, control, band, scratch);
@@ -242,7 +240,7 @@ class ZBufferRenderer : public Renderer {
   // More bands balance the load better, but bricks on the border of two bands are drawn by both.
   static constexpr int kBandsPerThread = 4;
 
-  tbb::enumerable_thread_specific<Scratch> scratch_;
+  PerThread<Scratch> scratch_;
 };
 
 }  // namespace

@@ -180,7 +180,7 @@ TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
       all_seen += seen;
     });
   }
-  EXPECT_GT(all_seen, 20000);
+  EXPECT_GT(all_seen, 5000) << "also with one instruction set";
 }
 
 // Every cell of the padded voxels, of every type.

@@ -6,7 +6,8 @@
 
 namespace slabstream::testing {
 
-// Of the whole volume, which is not clipped; the image covers the whole frame. setup.termination is not used, nor is gradient opacity.
+// Renders the whole volume, which is not clipped; the image covers the whole frame. setup.termination is not used, nor
+// is gradient opacity.
 LocalImage ReferenceShear(const Volume& volume, const FrameSetup& setup);
 
 }  // namespace slabstream::testing

@@ -1,8 +1,8 @@
 // Which voxels are kept for splatting, in which order, and with which normals: against a plain look at every voxel.
 #include "worker/renderers/splat/occupied_voxels.h"
+#include "common/parallel/task_arena.h"
 
 #include <gtest/gtest.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <cstring>
@@ -169,8 +169,8 @@ TEST(OccupiedVoxels, DoNotDependOnThreads) {
   const ClassificationTable table = Classify(scene.setup.transfer, scene.setup.description, scene.setup.range);
   const BinSelection selection = SelectBins(table, 0);
   const auto find = [&](int threads) {
-    tbb::task_arena arena(threads);
-    return arena.execute([&] {
+    TaskArena arena(threads);
+    return arena.Run([&] {
       VoxelBeams along_x = FindVoxelBeams(scene.volume.block, BrickRanges(scene.volume.block), table, selection, {1, 1, 1});
       VoxelBeams along_y = TurnVoxelBeams(along_x);
       return std::pair(std::move(along_x), std::move(along_y));

@@ -6,13 +6,13 @@
 
 namespace slabstream::testing {
 
-// Of the whole volume; the image covers the whole frame (the sheet grid). setup.termination is not used.
+// Renders the whole volume; the image covers the whole frame (the sheet grid). setup.termination is not used.
 LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup);
 
 // The picture of a frame.
 LocalImage ReferencePicture(const LocalImage& frame, const FrameSetup& setup);
 
-// Of the stored samples at a voxel, in units of the samples by physical distance.
+// The gradient of the stored samples at a voxel, in units of the samples by physical distance.
 Vec3 ReferenceGradient(const Volume& volume, const Index3& voxel);
 
 }  // namespace slabstream::testing

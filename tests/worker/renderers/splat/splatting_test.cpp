@@ -1,10 +1,10 @@
 // The splatting pipeline against its definition and against analytic truth.
 #include <gtest/gtest.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "common/parallel/task_arena.h"
 #include "tests/support/renderers.h"
 #include "tests/worker/renderers/render_support.h"
 #include "tests/worker/renderers/splat/reference_splatting.h"
@@ -241,9 +241,9 @@ TEST(Splatting, IsTheSameBitsForAnyNumberOfThreads) {
     const FrameSetup setup = MakeSetup(volume, options);
     LocalImage frame, picture;
     for (int threads : {1, 2, 3, 4}) {
-      tbb::task_arena arena(threads);
+      TaskArena arena(threads);
       LocalImage other_frame, other_picture;
-      arena.execute([&] {
+      arena.Run([&] {
         other_frame = RenderWhole(volume, setup);
         other_picture = FinishPicture(other_frame, setup);
       });

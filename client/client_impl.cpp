@@ -1,0 +1,257 @@
+#include "client/client_impl.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "client/decode_picture.h"
+#include "common/base/log.h"
+#include "common/base/overloaded.h"
+#include "common/wire/other_version.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kUnknownPongs = 2;  // in a row, before a request is submitted again
+constexpr int kMaxResubmits = 3;  // before it fails
+
+std::string Milliseconds(Duration duration) {
+  return std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) + " ms";
+}
+
+}  // namespace
+
+Status Client::Impl::NoAnswer(Duration timeout) const {
+  if (socket.refused() && !has_keys) {
+    return Status::InvalidArgument("the service at " + endpoint + " has keys: name its service file, client.json (--service)");
+  }
+  // Whoever listens with keys may end the connection before its greeting, which says so, has come.
+  if (!has_keys && !socket.connected() && !socket.local_host().empty()) {
+    return Status::Unavailable("no service answers at " + endpoint + ", but somebody listens there; a service with keys needs its " +
+                               "service file, client.json (--service)");
+  }
+  if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
+  return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
+}
+
+void Client::Impl::Submit(const SubmitFrame& message) {
+  if (const Status sent = Send(message); !sent.ok()) {
+    End(message.request, Status::Unavailable("no service at " + endpoint + ": " + sent.message()));
+  }
+}
+
+void Client::Impl::SendPing(Time now) {
+  ClientPing ping{.nonce = ++last_id, .open = {}, .received_bytes = received_bytes};
+  if (direct) ping.senders = direct->senders();
+  told_bytes = received_bytes;
+  for (const auto& [request, unused] : open) {
+    if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
+  }
+  unreachable = !Send(ping).ok();  // it counts as unanswered
+  pinged[ping.nonce] = std::move(ping.open);
+  if (!unanswered_since) unanswered_since = now;
+  next_ping = now + timing.ping;
+}
+
+std::optional<std::string> Client::Impl::Loss(Time now) const {
+  if (same_process) return unreachable ? std::optional<std::string>("has ended") : std::nullopt;
+  if (!unanswered_since || now - *unanswered_since < timing.silence) return std::nullopt;
+  return "has not answered for " + Milliseconds(now - *unanswered_since);
+}
+
+bool Client::Impl::Pump(Time limit) {
+  // Messages that have already come are handled before silence is judged: the caller may have been busy elsewhere for long.
+  bool ready = Receive();
+  Time now = MonotonicNow();
+  if (ExpireQuestions(now)) ready = true;
+  if (ExpirePictures(now)) ready = true;
+  if (!open.empty() || !questions.empty()) {
+    if (now >= next_ping) SendPing(now);
+    if (const std::optional<std::string> loss = Loss(now)) {
+      FailAll(Status::Unavailable("the service at " + endpoint + " " + *loss));
+      return false;
+    }
+    limit = std::min(limit, next_ping);
+    if (unanswered_since && !same_process) limit = std::min(limit, *unanswered_since + timing.silence);
+    for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
+    if (direct) limit = std::min(limit, direct->NextLoss());
+  }
+  if (ready) return false;  // this may be what the caller waits for
+  std::vector<Socket*> sockets = {&socket};
+  if (direct) sockets.push_back(&direct->socket());
+  now = MonotonicNow();
+  const bool woken = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
+  Receive();  // a message may come together with a wakeup, which is told all the same: nobody notifies twice
+  return woken;
+}
+
+bool Client::Impl::Receive() {
+  bool received = false;
+  while (const std::optional<Incoming> incoming = socket.TryReceive()) {
+    received = true;
+    const Bytes payload = incoming->payload();
+    Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(incoming->header(), payload.size());
+    if (!message.ok()) {
+      if (const auto other = OtherVersion(incoming->header())) {
+        FailAll(refusal = Status::InvalidArgument("the service at " + endpoint + " " + TextOfOtherVersion(*other)));
+        continue;
+      }
+      LogWarning("client plane: dropped a message: " + message.status().message());
+      continue;
+    }
+    unanswered_since.reset();
+    received_bytes += payload.size();
+    Handle(*message, payload);
+    TellReceived();
+  }
+  if (const std::uint64_t bytes = direct ? direct->Receive() : 0; bytes > 0) {
+    received = true;
+    received_bytes += bytes;
+    TellReceived();
+  }
+  MatchPictures();
+  return received;
+}
+
+// Else the service takes this client for one that does not read.
+void Client::Impl::TellReceived() {
+  constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
+  if (received_bytes - told_bytes >= kTellBytes) SendPing(MonotonicNow());
+}
+
+void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
+  const auto handle = Overloaded{[&](FrameProgress& progress) {
+                                   if (open.contains(progress.request)) events.push_back({progress.request, progress});
+                                 },
+                                 [&](FrameReply& reply) { Handle(reply, payload); },
+                                 [&](FrameFailed& failed) { End(failed.request, failed.status); },
+                                 [&](ClientPong& pong) { Handle(pong); },
+                                 [&](OrderRefused& refused) {
+                                   if (refused.nonce == 0)
+                                     refusal = Status(refused.status.code(), endpoint + ": " + refused.status.message());
+                                   End(refused.nonce, refused.status);
+                                 },
+                                 [&](auto& reply) { End(reply.nonce, std::move(reply)); },
+                                 [](VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
+  std::visit(handle, message);
+}
+
+void Client::Impl::OpenDirectPictures() {
+  if (std::exchange(direct_opened, true) || !takes_pictures) return;
+  direct = DirectPictures::Open(context, endpoint);
+  if (direct) SendPing(MonotonicNow());  // the answer says whom to admit
+}
+
+void Client::Impl::MatchPictures() {
+  if (!direct) return;
+  if (open.empty()) return direct->Clear();  // what has come is of requests that were cancelled
+  for (DirectPictures::Reply& reply : direct->TakeCome()) Handle(std::move(reply));
+}
+
+bool Client::Impl::ExpirePictures(Time now) {
+  const std::vector<FrameReply> lost = direct ? direct->TakeLost(now) : std::vector<FrameReply>();
+  for (const FrameReply& reply : lost) {
+    const auto found = open.find(reply.request);
+    if (found == open.end() || reply.groups_done < reply.group_count) continue;  // previews are not repeated
+    found->second.message.pictures.reset();
+    found->second.awaits_picture = false;
+    SubmitAgain(found->second);
+  }
+  return !lost.empty();
+}
+
+void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
+  const auto found = open.find(reply.request);
+  if (found == open.end()) return;  // cancelled, or a duplicate
+  std::vector<Bytes> runs;
+  std::uint64_t relayed_bytes = 0, direct_bytes = 0;
+  for (const PictureShare& share : reply.shares) {
+    const std::uint64_t bytes = share.runs.encoded_bytes;
+    runs.push_back(share.direct ? Bytes() : payload.Part(relayed_bytes, bytes));
+    (share.direct ? direct_bytes : relayed_bytes) += bytes;
+  }
+  if (direct_bytes == 0) return Handle(DirectPictures::Reply{std::move(reply), std::move(runs)});
+  if (!direct) return End(reply.request, Status::DataLoss("the service sent a picture on a way that this client does not have"));
+  if (reply.groups_done == reply.group_count) found->second.awaits_picture = true;
+  constexpr std::uint64_t kSlowBytesPerMillisecond = 1000;  // over a slower link, pictures come twice
+  const Time until = MonotonicNow() + timing.lost_picture + std::chrono::milliseconds(direct_bytes / kSlowBytesPerMillisecond);
+  direct->Await({std::move(reply), std::move(runs)}, until);
+}
+
+void Client::Impl::Handle(DirectPictures::Reply complete) {
+  FrameReply& reply = complete.message;
+  const auto found = open.find(reply.request);
+  if (found == open.end()) return;
+  Result<Picture> picture = DecodePicture(reply, complete.runs, found->second.message.frame.size);
+  if (!picture.ok()) {
+    End(reply.request, picture.status());
+    return;
+  }
+  if (picture->final) {
+    picture->latency = MonotonicNow() - found->second.submitted;
+    open.erase(found);
+  }
+  events.push_back({reply.request, std::move(*picture)});
+}
+
+void Client::Impl::Handle(const ClientPong& pong) {
+  const auto ping = pinged.find(pong.nonce);
+  if (pong.senders && direct) direct->Admit(*pong.senders, MonotonicNow());
+  if (ping == pinged.end()) return;
+  const std::vector<RequestId> asked = std::move(ping->second);
+  pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
+  for (const RequestId request : asked) {
+    const auto found = open.find(request);
+    if (found == open.end()) continue;
+    OpenRequest& state = found->second;
+    if (state.awaits_picture) continue;
+    if (std::find(pong.known.begin(), pong.known.end(), request) != pong.known.end()) {
+      state.unknown_pongs = 0;
+    } else if (++state.unknown_pongs >= kUnknownPongs) {
+      state.unknown_pongs = 0;
+      SubmitAgain(state);
+    }
+  }
+}
+
+// The service has lost the request: it was started anew. The deadline is still that of the first time.
+void Client::Impl::SubmitAgain(OpenRequest& lost) {
+  const RequestId request = lost.message.request;
+  const std::int64_t left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(lost.deadline - MonotonicNow()).count();
+  if (lost.cancelled) {
+    End(request, Status::Cancelled("the client cancelled the frame"));
+  } else if (left_ms < 1) {
+    End(request, Status::DeadlineExceeded("the service at " + endpoint + " lost the request, and its time is over"));
+  } else if (lost.resubmits++ < kMaxResubmits) {
+    SubmitFrame again = lost.message;  // a copy: a failed submit ends the request
+    again.deadline_ms = std::uint32_t(left_ms);
+    Submit(again);
+  } else {
+    End(request, Status::Unavailable("the service at " + endpoint + " lost the request " + std::to_string(kMaxResubmits + 1) + " times"));
+  }
+}
+
+void Client::Impl::End(RequestId request, Event::What end) {
+  if (open.erase(request) + questions.erase(request) > 0) events.push_back({request, std::move(end)});
+}
+
+bool Client::Impl::ExpireQuestions(Time now) {
+  const std::size_t asked = questions.size();
+  for (auto next = questions.begin(); next != questions.end();) {
+    const auto [nonce, question] = *next++;  // a copy: End removes it
+    if (now < question.deadline) continue;
+    const std::string text = "the service at " + endpoint + " has not answered within " + Milliseconds(question.patience);
+    End(nonce, question.order ? NoAnswer(question.patience) : Status::DeadlineExceeded(text));
+  }
+  return questions.size() < asked;
+}
+
+void Client::Impl::FailAll(const Status& reason) {
+  while (!questions.empty()) End(questions.begin()->first, reason);
+  while (!open.empty()) End(open.begin()->first, reason);
+  pinged.clear();
+  if (direct) direct->Clear();
+  unanswered_since.reset();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,381 @@
+#include "client/pictures/annotations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "client/pictures/picture_labels.h"
+#include "common/base/check.h"
+#include "common/text/utf8.h"
+
+namespace slabstream {
+namespace {
+
+constexpr float kHaloOpacity = 0.85F;
+constexpr double kAscender = 0.93, kCapital = 0.73, kDescender = 0.24;  // of letters, in shares of their size; of DejaVu Sans
+
+// How large everything is, in pixels.
+struct Scale {
+  Scale(const PictureFormat& format, ImageSize size) {
+    const int shorter = std::min(size.width, size.height);
+    const std::optional<double> points = format.annotations.font_size;
+    if (points) {
+      constexpr double kPointsAnInch = 72;
+      const double wanted = *points * format.dots_per_inch.value_or(kUsualDotsPerInch) / kPointsAnInch;
+      letters = int(std::lround(std::clamp(wanted, 1.0, std::max(0.25 * shorter, 1.0))));
+    } else {
+      letters = std::max(std::min(std::max(int(std::lround(0.032 * shorter)), 11), shorter / 9), 1);
+    }
+    halo = std::max(0.12 * letters, 1.5);
+    margin = int(std::ceil(0.35 * letters + halo));
+    line = std::max(0.11 * letters, 1.0);
+  }
+  int letters = 11;  // size
+  int margin = 0;    // from the picture's edge
+  double halo = 1;
+  double line = 1;  // width
+};
+
+using AxisColors = std::array<MarkColor, 3>;  // x, y, z
+constexpr AxisColors kBrightAxes = {{{1, 0.35F, 0.3F}, {0.45F, 0.9F, 0.35F}, {0.45F, 0.65F, 1}}};
+constexpr AxisColors kDarkAxes = {{{0.75F, 0.1F, 0.1F}, {0, 0.45F, 0}, {0.1F, 0.25F, 0.85F}}};
+
+// What marks are drawn with.
+struct Palette {
+  MarkColor letters = {1, 1, 1}, halo = {0, 0, 0};
+  AxisColors axes = kBrightAxes;
+};
+
+// Relative luminance, in [0, 1] (Web Content Accessibility Guidelines 2.1).
+double Luminance(const StraightColor& color) {
+  const auto linear = [](float code) { return code <= 0.04045F ? double(code) / 12.92 : std::pow((double(code) + 0.055) / 1.055, 2.4); };
+  return 0.2126 * linear(color.r) + 0.7152 * linear(color.g) + 0.0722 * linear(color.b);
+}
+
+Palette PaletteOn(const StraightColor& background) {
+  if (background.a < 1) return {};
+  // The contrasts with white and with black of these guidelines are equal here.
+  constexpr double kMiddle = 0.179;
+  const MarkColor ground = {background.r, background.g, background.b};
+  if (Luminance(background) < kMiddle) return {{1, 1, 1}, ground, kBrightAxes};
+  return {{0, 0, 0}, ground, kDarkAxes};
+}
+
+using Shape = decltype(Mark::shapes)::value_type;
+using Shapes = std::vector<Shape>;
+
+Shapes Arrow(InkPoint from, InkPoint to, const Scale& scale) {
+  const double dx = to.x - from.x, dy = to.y - from.y, length = std::hypot(dx, dy);
+  const double width = 1.6 * scale.line;
+  if (length < width) return {Stroke{from, from, 2.4 * width}};  // towards the viewer, or away
+  const double head = std::min(0.65 * scale.letters, length), half = 0.5 * head;
+  const InkPoint along = {dx / length, dy / length};
+  const InkPoint neck = {to.x - head * along.x, to.y - head * along.y};
+  return {Stroke{from, neck, width},
+          Polygon{{to, {neck.x - half * along.y, neck.y + half * along.x}, {neck.x + half * along.y, neck.y - half * along.x}}}};
+}
+
+InkPoint MovedRight(InkPoint point, int x) { return {point.x + x, point.y}; }
+Shape MovedRight(Shape shape, int x) {
+  const auto move = [x](auto& moved) {
+    if constexpr (requires { moved.corners; }) {
+      for (InkPoint& corner : moved.corners) corner = MovedRight(corner, x);
+    } else {
+      moved.begin = MovedRight(moved.begin, x);
+      if constexpr (requires { moved.end; }) moved.end = MovedRight(moved.end, x);
+    }
+  };
+  std::visit(move, shape);
+  return shape;
+}
+
+Ink InkOf(const Rectangle& shape, Font&) { return RectangleInk(shape.begin, shape.end); }
+Ink InkOf(const Stroke& shape, Font&) { return StrokeInk(shape.begin, shape.end, shape.width); }
+Ink InkOf(const Polygon& shape, Font&) { return PolygonInk(shape.corners); }
+Ink InkOf(const ColorRows& shape, Font&) { return RectangleInk(shape.begin, shape.end); }
+Ink InkOf(const TextLine& shape, Font& font) {
+  return Shifted(font.Draw(shape.text, shape.size), int(std::lround(shape.begin.x)), int(std::lround(shape.begin.y)));
+}
+
+// Where the label of each axis stands, seen from where the arrows begin: before the tip. That of an axis along the line of sight stands
+// opposite to the two others, where nothing else is drawn.
+std::array<InkPoint, 3> LabelPlaces(const std::array<ShownAxis, 3>& axes, double arrow, double gap) {
+  std::array<InkPoint, 3> places;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double length = std::hypot(axes[i].x, axes[i].y);
+    const InkPoint others = {axes[(i + 1) % 3].x + axes[(i + 2) % 3].x, axes[(i + 1) % 3].y + axes[(i + 2) % 3].y};
+    const double sum = std::hypot(others.x, others.y);
+    constexpr double kShort = 0.25;
+    if (length >= kShort || sum == 0) {
+      places[i] = {axes[i].x * (arrow + gap / length), axes[i].y * (arrow + gap / length)};
+    } else {
+      places[i] = {-others.x / sum * 1.2 * gap, -others.y / sum * 1.2 * gap};
+    }
+  }
+  return places;
+}
+
+MarkColor ColorOf(const Rgb& color) { return {color.r, color.g, color.b}; }
+
+// Draws the annotations of one picture, or of one of several side by side, each by one function.
+class Artist {
+ public:
+  // `left`: of this picture, in pixels of the whole.
+  Artist(Font& font, ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale, const Palette& palette)
+      : font_(&font), size_(size), left_(left), geometry_(geometry), scale_(scale), palette_(palette) {}
+
+  // What others have drawn at the top and on the right, in pixels from the edges.
+  void KeepClear(double top, double right) {
+    top_ = top;
+    right_ = right;
+  }
+  double top() const { return top_; }
+  double right() const { return right_; }
+
+  void DrawTitle(const std::string& title) {
+    top_ += kAscender * scale_.letters;
+    PutText(title, {0.5 * size_.width, top_});
+    top_ += (kDescender + 0.2) * scale_.letters;
+  }
+
+  // The letters of a patient's sides, at the middles of the picture's edges.
+  void DrawSides() {
+    const double half = 0.5 * kCapital * scale_.letters, x = 0.5 * size_.width, y = 0.5 * size_.height + half;
+    const std::pair<Vec3, InkPoint> sides[] = {{geometry_.up, {x, top_ + 2 * half}},
+                                               {-geometry_.up, {x, double(size_.height - scale_.margin)}},
+                                               {-geometry_.right, {0, y}},  // PutText keeps texts inside the picture
+                                               {geometry_.right, {size_.width - right_, y}}};
+    for (const auto& [direction, place] : sides) {
+      PutText(PatientSides(direction), place, palette_.letters, right_);
+    }
+  }
+
+  void DrawAxes() {
+    const double arrow = 2.0 * scale_.letters, gap = 0.7 * scale_.letters, reach = arrow + gap + 0.5 * scale_.letters;
+    const InkPoint origin = {scale_.margin + reach, size_.height - scale_.margin - reach};
+    const std::array<ShownAxis, 3> axes = ShownAxes(geometry_);
+    const std::array<InkPoint, 3> places = LabelPlaces(axes, arrow, gap);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const MarkColor color = palette_.axes[std::size_t(Number(axes[i].axis))];
+      const InkPoint tip = {origin.x + arrow * axes[i].x, origin.y + arrow * axes[i].y};
+      Put(Arrow(origin, tip, scale_), color);
+      const InkPoint place = {origin.x + places[i].x, origin.y + places[i].y + 0.5 * kCapital * scale_.letters};
+      PutText(std::string(axes[i].label), place, color);
+    }
+  }
+
+  void DrawScaleBar() {
+    const std::optional<ScaleBar> bar = ChooseScaleBar(geometry_, size_.width);
+    if (!bar) return;
+    const double end = size_.width - scale_.margin, begin = end - bar->pixels, thick = 2 * scale_.line, tick = 0.5 * scale_.letters;
+    const double bottom = size_.height - scale_.margin, top = bottom - tick;
+    Shapes shapes = {Rectangle{{begin, bottom - thick}, {end, bottom}}};
+    for (const double x : {begin, end - thick}) shapes.emplace_back(Rectangle{{x, top}, {x + thick, bottom}});
+    Put(std::move(shapes), palette_.letters);
+    PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
+  }
+
+  // Between the top and what may stand at the bottom: values upwards, with ticks to the left of the bar and the caption above it.
+  void DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
+    const double width = std::round(0.8 * scale_.letters), right = size_.width - scale_.margin, left = right - width,
+                 tick = 0.3 * scale_.letters;
+    double top = top_ + 0.5 * scale_.letters;
+    if (!caption.empty()) {
+      top = top_ + kAscender * scale_.letters;
+      PutText(caption, {double(size_.width), top});
+      top += (kDescender + 0.5) * scale_.letters;
+    }
+    const double bottom = size_.height - scale_.margin - 2.5 * scale_.letters;
+    const int rows = int(bottom - top);
+    if (rows < 1) return;
+    const TransferFunction colors{.colors = bar.colors, .opacities = {}};
+    const double first = std::floor(top);
+    ColorRows shown{{left, first}, {right, first + rows}, {}};
+    for (int row = 0; row < rows; ++row) {
+      shown.colors.push_back(ColorOf(colors.Color(std::lerp(bar.high, bar.low, (row + 0.5) / rows))));
+    }
+    Shapes lines = {Frame(shown.begin, shown.end)};
+    int widest = 0;
+    for (const double value : TicksOf(bar.low, bar.high)) {
+      const double y = first + rows * (bar.high - value) / (bar.high - bar.low);
+      lines.emplace_back(Rectangle{{left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}});
+      const std::string text = fmt::format("{:.6g}", value);
+      const int text_width = font_->Width(text, scale_.letters);
+      widest = std::max(widest, text_width);
+      const double x = left - 1.5 * tick - 0.5 * text_width;
+      PutText(text, {x, y + 0.5 * kCapital * scale_.letters});
+    }
+    Put(std::move(lines), palette_.letters);
+    PutPlain(std::move(shown), {});
+    right_ = scale_.margin + width + 2 * tick + widest;
+  }
+
+  // One line each, as many as there is room for.
+  void DrawLegend(const std::vector<PictureKey::Entry>& entries) {
+    const double line = 1.35 * scale_.letters, swatch = std::round(0.8 * scale_.letters), left = scale_.margin;
+    const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
+    const std::size_t lines = std::max(std::size_t(std::max(room / line, 0.0)), std::size_t{1});
+    const std::size_t shown = entries.size() <= lines ? entries.size() : lines - 1;
+    double y = top_ + 0.2 * scale_.letters;
+    const auto put = [&](const std::string& text, double x) { PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
+    for (std::size_t i = 0; i < shown; ++i, y += line) {
+      const InkPoint begin = {left, std::round(y + 0.1 * scale_.letters)}, end = {begin.x + swatch, begin.y + swatch};
+      Put({Frame(begin, end)}, palette_.letters);
+      PutPlain(Rectangle{begin, end}, ColorOf(entries[i].color));
+      put(entries[i].name, left + 1.4 * swatch);
+    }
+    if (shown < entries.size()) put(fmt::format("and {} more", entries.size() - shown), left);
+  }
+
+  std::vector<Mark> TakeMarks() { return std::move(marks_); }
+
+ private:
+  // The shapes on their halo.
+  void Put(Shapes shapes, MarkColor color) {
+    for (Shape& shape : shapes) shape = MovedRight(std::move(shape), left_);
+    marks_.push_back({.shapes = std::move(shapes), .color = color, .halo = scale_.halo, .halo_color = palette_.halo});
+  }
+  void PutPlain(Shape shape, MarkColor color) {
+    marks_.push_back({.shapes = {MovedRight(std::move(shape), left_)}, .color = color, .halo_color = {}});
+  }
+  // A thin line round something, without which it would not show where it has the colour of the background.
+  Rectangle Frame(InkPoint begin, InkPoint end) const {
+    const double line = std::round(std::max(0.5 * scale_.line, 1.0));
+    return {{begin.x - line, begin.y - line}, {end.x + line, end.y + line}};
+  }
+
+  // The text, with its baseline centred at `place`, but not beyond the picture's sides, and `right` pixels from the right one. One that is
+  // too wide shrinks.
+  void PutText(const std::string& text, InkPoint place, MarkColor color, double right = 0) {
+    TextLine line = Fitted(text);
+    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - line.width, least);
+    line.begin = {double(std::clamp(int(std::lround(place.x - 0.5 * line.width)), least, most)), std::round(place.y)};
+    Put({std::move(line)}, color);
+  }
+  void PutText(const std::string& text, InkPoint place) { PutText(text, place, palette_.letters); }
+  // Its baseline begins at `place`.
+  void PutTextFrom(const std::string& text, InkPoint place) {
+    TextLine line = Fitted(text);
+    line.begin = {std::round(place.x), std::round(place.y)};
+    Put({std::move(line)}, palette_.letters);
+  }
+
+  // The text with its size and width.
+  TextLine Fitted(const std::string& text) const {
+    const int room = std::max(size_.width - 2 * scale_.margin, 1);
+    int letters = scale_.letters, width = font_->Width(text, letters);
+    while (width > room && letters > 1) {
+      letters = std::clamp(int(std::int64_t{letters} * room / width), 1, letters - 1);
+      width = font_->Width(text, letters);
+    }
+    return {.text = text, .size = letters, .begin = {}, .width = width};
+  }
+
+  Font* font_;
+  ImageSize size_;
+  int left_;
+  PictureGeometry geometry_;
+  Scale scale_;
+  Palette palette_;
+  double top_ = scale_.margin;  // of the room that is left
+  double right_ = 0;            // what is taken of it
+  std::vector<Mark> marks_;
+};
+
+}  // namespace
+
+Status CheckTitle(std::string_view name, std::string_view title) {
+  int characters = 0;
+  for (std::string_view rest = title; !rest.empty(); ++characters) {
+    const std::size_t bytes = Utf8CharacterBytes(rest);
+    const auto lead = static_cast<unsigned char>(rest.front());
+    const auto at = title.size() - rest.size();
+    if (bytes == 0) return Status::InvalidArgument(fmt::format("{} is not UTF-8: byte {} is 0x{:02X}", name, at, lead));
+    const bool second_set = lead == 0xC2 && static_cast<unsigned char>(rest[1]) < 0xA0;
+    if (lead < 0x20 || lead == 0x7F || second_set) {
+      return Status::InvalidArgument(fmt::format("{} has a control character at byte {}; it must be one line of text", name, at));
+    }
+    rest.remove_prefix(bytes);
+  }
+  if (characters <= kMaxTitleCharacters) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} has {} characters, at most {} are possible", name, characters, kMaxTitleCharacters));
+}
+
+Status CheckCanDraw(const Annotations& annotations) { return annotations.any() ? AnnotationFont().status() : Status::Ok(); }
+
+Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
+                                  const PictureKey& key) {
+  CHECK(!panes.empty());
+  const Annotations& annotations = format.annotations;
+  std::vector<Mark> marks;
+  if (!annotations.any()) return marks;
+  Result<Font> font = Font::Open();
+  if (!font.ok()) return font.status();
+  const ImageSize pane = {size.width / int(panes.size()), size.height};
+  const Scale scale(format, pane);
+  const Palette palette = PaletteOn(format.background);
+  const auto keep = [&marks](std::vector<Mark> more) { std::ranges::move(more, std::back_inserter(marks)); };
+
+  Artist whole(*font, size, 0, panes.front(), scale, palette);
+  if (!annotations.title.empty()) whole.DrawTitle(annotations.title);
+  if (annotations.color_bar && key.bar) whole.DrawColorBar(*key.bar, *annotations.color_bar);
+  if (annotations.legend && !key.entries.empty()) whole.DrawLegend(key.entries);
+  keep(whole.TakeMarks());
+
+  for (std::size_t i = 0; i < panes.size(); ++i) {
+    const PictureGeometry& geometry = panes[i];
+    Artist artist(*font, pane, int(i) * pane.width, geometry, scale, palette);
+    artist.KeepClear(whole.top(), i + 1 == panes.size() ? whole.right() : 0);
+    const bool sides = annotations.orientation_marker && geometry.world == World::kPatient;
+    if (sides) artist.DrawSides();
+    if (annotations.orientation_marker && !(sides && annotations.sides_only)) artist.DrawAxes();
+    if (annotations.scale_bar) artist.DrawScaleBar();
+    keep(artist.TakeMarks());
+  }
+  return marks;
+}
+
+Result<AnnotationLayers> AnnotationLayers::Draw(const std::vector<Mark>& marks) {
+  AnnotationLayers drawn;
+  if (marks.empty()) return drawn;
+  Result<Font> font = Font::Open();
+  if (!font.ok()) return font.status();
+  for (const Mark& mark : marks) {
+    std::optional<Ink> ink;
+    std::vector<MarkColor> colors = {mark.color};
+    for (const Shape& shape : mark.shapes) {
+      Ink more = std::visit([&font](const auto& s) { return InkOf(s, *font); }, shape);
+      ink = ink ? Union(*ink, more) : std::move(more);
+      if (const auto* rows = std::get_if<ColorRows>(&shape)) colors = rows->colors;
+    }
+    if (!ink) continue;
+    if (mark.halo > 0) drawn.layers_.push_back({Grown(*ink, mark.halo), {mark.halo_color}, kHaloOpacity});
+    drawn.layers_.push_back({*std::move(ink), std::move(colors), 1});
+  }
+  return drawn;
+}
+
+void AnnotationLayers::PutOver(int y, std::span<float> rgba) const {
+  const auto width = std::int32_t(rgba.size() / 4);
+  for (const ColoredInk& layer : layers_) {
+    const PixelBounds& b = layer.ink.bounds;
+    if (y < b.y_begin || y >= b.y_end) continue;
+    const float* row = &layer.ink.coverage[std::size_t(y - b.y_begin) * std::size_t(b.width())];
+    const MarkColor color = layer.colors[layer.colors.size() == 1 ? 0 : std::size_t(y - b.y_begin)];
+    for (std::int32_t x = std::max(b.x_begin, 0); x < std::min(b.x_end, width); ++x) {
+      const float alpha = layer.opacity * row[x - b.x_begin];
+      if (alpha == 0) continue;
+      const float front[4] = {color.red, color.green, color.blue, 1};
+      float* out = &rgba[4 * std::size_t(x)];
+      for (int c = 0; c < 4; ++c) out[c] = alpha == 1 ? front[c] : out[c] + alpha * (front[c] - out[c]);  // exact on the same colour, too
+    }
+  }
+}
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// PictureFormat: how pixels become the picture that a file shows.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace slabstream {
+
+struct StraightColor {
+  float r = 0, g = 0, b = 0, a = 0;  // each in [0, 1]
+  friend bool operator==(const StraightColor&, const StraightColor&) = default;
+};
+
+struct Annotations {
+  bool scale_bar = false;
+  bool orientation_marker = false;  // the axes of the world; of patients also the letters of the sides
+  bool sides_only = false;          // a patient's sides as letters, without axes, as is usual in slices
+  std::string title;                // empty: none
+  // What the picture's key says (PictureKey); a key that has nothing of it leaves them out.
+  std::optional<std::string> color_bar;  // its caption, such as a unit; "": none
+  bool legend = false;
+  std::optional<double> font_size;  // points, [kMinFontSize, kMaxFontSize]; none: as the picture's size suggests (annotations.h)
+
+  bool any() const { return scale_bar || orientation_marker || !title.empty() || needs_key(); }
+  bool needs_key() const { return color_bar || legend; }
+  friend bool operator==(const Annotations&, const Annotations&) = default;
+};
+
+inline constexpr double kMinFontSize = 1, kMaxFontSize = 1000;
+inline constexpr int kMaxDotsPerInch = 10000;
+inline constexpr int kUsualDotsPerInch = 72;  // a point is a pixel
+
+struct PictureFormat {
+  int png_bits = 8;          // bits of PNG and TIFF, 8 or 16; EXR is always float, the others and frames of movies have 8
+  int quality = 90;          // the quality of JPEG and WebP, [1, 100]
+  StraightColor background;  // put behind the picture; the default leaves it as it is
+  Annotations annotations;   // drawn onto it
+  // Pixels an inch, [1, kMaxDotsPerInch], which the file states; none: it states the size of pixels in the world, if that is known.
+  std::optional<int> dots_per_inch;
+};
+
+// Whether PNGs of this format hold the codes of the picture itself, so that a picture in these codes (FrameRequest::straight8) is enough.
+inline bool HoldsStraight8(const PictureFormat& format) {
+  return format.png_bits == 8 && format.background.a == 0 && !format.annotations.any();
+}
+
+// For files without transparency: behind whatever the background lets through lies black.
+inline PictureFormat WithoutTransparency(PictureFormat format) {
+  StraightColor& b = format.background;
+  b = {b.r * b.a, b.g * b.a, b.b * b.a, 1};
+  return format;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,87 @@
+#include <limits>
+#include <string>
+
+#include "common/frame/dataset_name.h"
+#include "common/renderers/registry.h"
+#include "common/wire/rules.h"
+#include "common/wire/validate_request.h"
+
+namespace slabstream {
+namespace {
+
+// By the values of labels.
+template <class Items, class Value>
+void CheckRising(const Items& labels, const Value& value, Checker& check) {
+  for (std::size_t i = 1; i < labels.size(); ++i) check.That(value(labels[i - 1]) < value(labels[i]), "labels", "values do not rise");
+}
+
+}  // namespace
+
+void Rules(const FrameRequest& m, Checker& check) { check.Adopt(Validate(m)); }
+
+void Rules(const FrameProgress& m, Checker& check) { check.Range("groups_done", m.groups_done, 0, m.group_count); }
+
+void Rules(const PictureGeometry& m, Checker& check) {
+  check.That(AreRightHanded(m.right, m.up, -m.forward), "right", "not of three right-handed unit vectors at right angles");
+  if (m.projection == Projection::kPerspective) check.Positive("target_depth", m.target_depth);
+  check.Positive("pixel_size", m.pixel_size);
+}
+
+void Rules(const FrameReply& m, Checker& check) {
+  check.Range("groups_done", m.groups_done, 0, m.group_count);
+  const PixelBounds picture = {0, 0, m.size.width, m.size.height};
+  check.That(!m.shares.empty(), "shares", "none");
+  for (std::size_t i = 0; i < m.shares.size(); ++i) {
+    const auto share = check.In("shares", i);
+    const RunImageHeader& image = m.shares[i].runs.image;
+    check.That(picture.Contains(image.bounds), "runs.image.bounds", "not inside the picture");
+    check.That(image.format == m.shares.front().runs.image.format, "runs.image.format", "not that of the first share");
+  }
+  if (m.groups_done == m.group_count) check.Adopt(RequireRenderer(m.statistics.renderer).status());
+}
+
+void Rules(const SummaryQuery& m, Checker& check) { check.Adopt(Validate(m.transfer)); }
+
+void Rules(const SummaryReply& m, Checker& check) {
+  check.That(m.histogram.size() == kHistogramBins, "histogram", "not as many bins as expected");
+  CheckRising(
+      m.labels, [](const Label& label) { return label.value; }, check);
+  check.Adopt(Validate(m.transfer));
+}
+
+void Rules(const SampleQuery& m, Checker& check) { check.That(!m.points.empty(), "points", "none"); }
+
+void Rules(const StatisticsReply& m, Checker& check) {
+  CheckRising(
+      m.labels, [](const LabelStatistics& label) { return label.label.value; }, check);
+}
+
+void Rules(const JointHistogramReply& m, Checker& check) {
+  check.That(m.histogram.counts.size() == std::size_t{kJointValues} * kJointSlopes, "counts", "not as many bins as expected");
+}
+
+void Rules(const PickQuery& m, Checker& check) {
+  check.Between("x", m.x, 0, m.frame.size.width);
+  check.Between("y", m.y, 0, m.frame.size.height);
+}
+
+void Rules(const Ball& m, Checker& check) { check.Positive("radius", m.radius); }
+
+void Rules(const SentFile& m, Checker& check) {
+  check.Adopt(CheckDatasetName(m.name));
+  check.That(!m.name.starts_with('.'), "name", "begins with a dot");
+}
+
+void Rules(const AddVolume& m, Checker& check) {
+  if (m.layers.cells) check.Fail("layers.cells", "cells cannot be sent");
+  const std::size_t most = !m.layers.labels ? 0 : *m.layers.labels == ScalarType::kUint8 ? 255 : kMaxLabels;
+  if (m.labels.size() > most) check.Fail("labels", "more than numbers of the layer's samples");
+  CheckRising(
+      m.labels, [](const NewLabel& label) { return label.value; }, check);
+}
+
+void Rules(const VolumeCredit& m, Checker& check) {
+  check.Range("allowed", m.allowed, m.received, std::numeric_limits<std::uint64_t>::max());
+}
+
+}  // namespace slabstream

@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "common/planning/frame_occlusion.h"
+#include "common/renderers/registry.h"
+#include "common/volume/light_volume.h"
+#include "common/wire/limits.h"
+#include "common/wire/rules.h"
+#include "common/wire/validate_request.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kTolerance = 1e-6;
+
+void CheckSheets(const FrameSetup& setup, Checker& check) {
+  if (setup.sheets.empty() == setup.renderer->along_slices())
+    return check.Fail("sheets", setup.sheets.empty() ? "missing" : "not expected by this renderer");
+  if (setup.sheets.empty()) return;
+  for (const double k : {-0.5, setup.description.geometry.size[setup.camera.traversal_axis] - 0.5}) {
+    check.That(setup.sheets.w_c * k + setup.sheets.w_0 > 0, "sheets", "a slice lies behind the eye");
+    if (!check.ok()) break;
+    const SlicePlacement slice = PlaceSlice(setup.sheets, k);
+    const FootprintSigma sigma = FootprintIn(setup.sheets, slice);
+    check.That(kFootprintCut * std::max(sigma.u, sigma.v) <= kHalo, "sheets", "footprints reach beyond the halo");
+    check.That(std::max(slice.scale_u, slice.scale_v) <= kMaxSliceScale, "sheets", "a voxel is wider than 24 pixels");
+  }
+}
+
+void CheckClip(const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("clip");
+  for (std::size_t i = 0; i < setup.clip.sides.size(); ++i) {
+    const auto side = check.In("sides", i);
+    const Vec3& normal = setup.clip.sides[i].normal;
+    check.That(std::abs(Length(normal / setup.description.geometry.spacing) - 1) <= kTolerance, "normal", "not of unit length");
+  }
+}
+
+bool HasValuesOf(const VolumeDescription& description, const FrameSetup& setup) {
+  return description.type == setup.description.type && description.mapping == setup.description.mapping;
+}
+
+void CheckCoarser(const FrameSetup& setup, Checker& check) {
+  if (setup.coarser.empty()) return;
+  const auto scope = check.In("coarser");
+  check.That(setup.renderer->Can(Ability::kLevels), "", "not expected by this renderer");
+  for (std::size_t i = 0; i < setup.coarser.size(); ++i) {
+    const auto level = check.In("", i);
+    const VolumeDescription& description = setup.coarser[i].description;
+    check.That(HasValuesOf(description, setup), "description", "of other values than the volume");
+    check.That(CanStandIn(description.geometry, setup.description.geometry), "description", "not of the same part of the world");
+  }
+}
+
+void CheckLight(const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("light");
+  if (!setup.light) return check.That(!setup.shading.needs_light_volume(), "", "missing");
+  check.That(setup.renderer->Can(Ability::kShadows), "", "not expected by this renderer");
+  const VolumeDescription& description = setup.light->description;
+  check.That(IsLightSized(description.geometry), "description", "more voxels than a light volume has");
+  check.That(HasValuesOf(description, setup), "description", "of other values than the volume");
+}
+
+void CheckLayers(const FrameSetup& setup, Checker& check) {
+  const auto& [labels, overlay] = setup.looks;
+  if (labels) check.That(setup.layers.labels.has_value(), "labels", "of a dataset without labels");
+  if (overlay) check.That(setup.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
+  const RendererKind& renderer = *setup.renderer;
+  if (renderer.Can(Ability::kCells)) check.That(setup.layers.cells, "renderer", "one of cells, which the dataset does not have");
+  if (labels) check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
+  if (!overlay) return;
+  check.That(renderer.Can(Ability::kOverlay), "renderer", "one that shows no overlays");
+  const TransferFunction& transfer = overlay->transfer;
+  check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty() && transfer.regions.empty(), "overlay.transfer",
+             "not of curves over values alone");
+  check.Adopt(Validate(transfer));
+}
+
+// `m` names every worker of the group and the display worker, nobody twice.
+void CheckPeers(const GroupAssignment& m, Checker& check) {
+  std::vector<WorkerId> known;
+  known.reserve(m.peers.size());
+  for (const Peer& peer : m.peers) known.push_back(peer.worker);
+  std::sort(known.begin(), known.end());
+  check.That(std::adjacent_find(known.begin(), known.end()) == known.end(), "peers", "a worker appears twice");
+  const auto require = [&](WorkerId worker) {
+    if (!std::binary_search(known.begin(), known.end(), worker)) check.Fail("peers", "worker " + std::to_string(worker) + " is missing");
+  };
+  require(m.display);
+  for (const Placement& placement : m.group.placements) require(placement.worker);
+}
+
+void CheckHidden(const GroupAssignment& m, Checker& check) {
+  const auto scope = check.In("hidden");
+  check.That(m.hidden.empty() || m.key.group > 0, "", "a mask for the first group, in front of which there is nothing");
+  check.Adopt(CheckFits(m.hidden, m.setup));
+}
+
+// The plan fits the setup: boxes inside the volume, as many ranks as placements, a schedule that exists.
+void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("group");
+  const Box volume = setup.description.geometry.bounds();
+  for (std::size_t i = 0; i < group.placements.size(); ++i) {
+    const auto placement = check.In("placements", i);
+    check.That(volume.Contains(group.placements[i].box), "box", "not inside the volume");
+    check.That(group.placements[i].level <= setup.coarser.size(), "level", "not one of the setup");
+    check.That(group.placements[i].filled.empty() || (setup.stored && group.placements[i].level == 0), "filled",
+               "of a coarser level, or of voxels that the coordinator holds");
+  }
+  if (group.schedule.ranks != group.placements.size()) {
+    check.Fail("schedule.ranks",
+               std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
+  }
+  check.That(MayCode(setup.format, group.color), "color", "that of another format");
+  if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
+}
+
+// The shares of a frame of several groups would have to be accumulated.
+void CheckShares(const GroupAssignment& m, Checker& check) {
+  if (m.group.schedule.roots.size() == 1 || !check.ok()) return;
+  const auto scope = check.In("group.schedule.roots");
+  check.That(m.group_count == 1 && !m.previews, "", "several, in a frame of several groups or with previews");
+  std::vector<WorkerId> displays = DisplaysOf(m.group, m.display);
+  std::ranges::sort(displays);
+  check.That(std::ranges::adjacent_find(displays) == displays.end(), "", "several ranks of a worker");
+}
+
+}  // namespace
+
+void Rules(const Camera& m, Checker& check) {
+  // Whole final pixels, as many as a picture may have.
+  const std::uint64_t most = std::uint64_t{kMaxImageSide} * std::uint64_t(m.supersample);
+  check.Range("width", std::uint64_t(m.width), 1, most);
+  check.Range("height", std::uint64_t(m.height), 1, most);
+  const auto unit = [](const Vec3& v) { return std::abs(Length(v) - 1) <= kTolerance; };
+  check.That(unit(m.view_direction), "view_direction", "not a unit vector");
+  check.That(unit(m.right), "right", "not a unit vector");
+  check.That(unit(m.up), "up", "not a unit vector");
+  CheckPositive("spacing", m.spacing, check);
+  const std::string supersample = std::to_string(m.supersample);
+  check.That(std::has_single_bit(unsigned(m.supersample)), "supersample", supersample + " is not a power of two");
+  check.That(m.width % m.supersample == 0, "width", std::to_string(m.width) + " is not a multiple of supersample, " + supersample);
+  check.That(m.height % m.supersample == 0, "height", std::to_string(m.height) + " is not a multiple of supersample, " + supersample);
+}
+
+void Rules(const SheetGrid& m, Checker& check) {
+  check.That(m.width % kGridColumnStep == 0, "width", "not a multiple of " + std::to_string(kGridColumnStep));
+}
+
+void Rules(const StoredAt& m, Checker& check) {
+  check.That(m.block.begin == Index3{} && !m.block.empty(), "block", "does not begin at 0, or is empty");
+}
+
+void Rules(const FrameSetup& m, Checker& check) {
+  CheckSheets(m, check);
+  CheckClip(m, check);
+  if (check.ok() && !m.front.empty()) {
+    const auto scope = check.In("front");
+    check.Adopt(CheckFits(m.front, m));
+  }
+  CheckCoarser(m, check);
+  CheckLight(m, check);
+  CheckLayers(m, check);
+  if (check.ok()) check.Adopt(Validate(m.transfer));
+  if (check.ok()) check.Adopt(Validate(m.shading));
+}
+
+void Rules(const GroupAssignment& m, Checker& check) {
+  check.Range("group_count", m.group_count, m.key.group + 1, kMaxGroups);
+  check.Range("first_group", m.first_group, 0, m.key.group);
+  check.Range("groups_done", m.groups_done, 0, m.key.group);
+  CheckPeers(m, check);
+  CheckHidden(m, check);
+  CheckGroup(m.group, m.setup, check);
+  CheckShares(m, check);
+}
+
+void Rules(const FrameImage& m, Checker& check) {
+  check.Range("groups_done", m.groups_done, 0, m.group_count);
+  check.Range("share", m.share, 0, m.share_count - 1);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,196 @@
+// DatasetMachine::State: what the machine knows, and its handlers. Not for executors: only the sources dataset_machine*.cpp include it.
+// Handlers append to `actions` and `news`.
+//   dataset_machine.cpp            requests, voxels, checks of their files, and the Step itself
+//   dataset_machine_catalogue.cpp  the catalogue: watched folders and orders
+//   dataset_machine_questions.cpp  questions about what datasets hold
+//   dataset_machine_uploads.cpp    datasets that clients send
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/datasets/dataset_machine.h"
+
+namespace slabstream {
+
+// What datasets may take of a coordinator's memory; the rest is for a volume that is being read, and for pictures. `memory_bytes` 0: no
+// limit.
+
+inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
+
+// An entry of the table, named for messages: dataset "scan", or level 2 of dataset "scan".
+inline std::string Named(const std::string& entry) {
+  const std::string dataset = "dataset " + InQuotes(DatasetOfLevel(entry));
+  return IsLevelName(entry) ? "level " + entry.substr(entry.find('\n') + 1) + " of " + dataset : dataset;
+}
+
+struct DatasetMachine::State {
+  explicit State(DatasetConfig c) : config(std::move(c)), datasets(config.datasets, config.folders) {}
+
+  // A dataset that a request needs.
+  struct Use {
+    std::shared_ptr<const FrameRequest> request;
+    std::int64_t most_level_bytes = 0;  // SeekDataset::most_level_bytes
+    // The entries of the table that it waits for: the dataset, or the levels of it that it draws, finest first, then
+    // that of its light volume.
+    struct Entry {
+      std::string name;
+      CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
+    };
+    std::vector<Entry> entries;
+    std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
+    std::optional<ViewParameters> view = {};   // set once it waits for levels (DatasetReady::view)
+    bool has_light = false;                    // once it waits for levels: the last one is that of its light volume
+    std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
+
+    bool begun() const { return !kept.empty(); }
+    bool WaitsFor(const std::string& name) const { return std::ranges::find(entries, name, &Entry::name) != entries.end(); }
+  };
+  // An order that waits for a file check. kList: for the one of the folders and those of the datasets.
+  struct OpenOrder {
+    PeerToken client = 0;
+    DataOrder order;
+    CheckId folders = 0;
+    std::map<std::string, CheckId> datasets = {};
+  };
+  // A question that has no answer yet.
+  struct OpenQuestion {
+    PeerToken client = 0;
+    Question question;
+    std::string entry;   // the entry of the table that it waits for
+    CheckId check = 0;   // the check of its files, which must be over first; 0: none
+    bool asked = false;  // whether the executor was asked
+  };
+  // A dataset on its way from a client.
+  struct OpenUpload {
+    PeerToken client = 0;
+    AddVolume order;
+    std::uint64_t received = 0, allowed = 0;  // bytes
+  };
+
+  const DatasetConfig config;
+  DatasetTable datasets;
+  std::map<UseId, Use> uses;
+  std::map<OrderId, OpenOrder> orders;  // at most one of each client
+  OrderId last_order = 0;
+  std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
+  QuestionId last_question = 0;
+  std::map<UploadId, OpenUpload> uploads;   // at most one of each client
+  std::map<std::string, OpenUpload> files;  // by dataset: those that have come and last as long as their clients
+  UploadId last_upload = 0;
+  CheckCounter folder_checks;
+  Time next_round;                                          // when the folders are looked through, if there are any
+  std::map<std::string, std::set<std::string>> complaints;  // about what lies in each folder
+  bool folders_asked_for = false;                           // by a client, since the last check began
+  std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
+  RefusedRequests refused;                    // questions and uploads, and what could not be decoded
+
+  Time now;  // the time of this Step
+  bool started = false, stopped = false;
+  std::vector<DatasetAction> actions;  // the actions of this Step
+  DatasetNews news;                    // the news of this Step
+
+  // ---- events
+  void On(const ToDatasets& event) {
+    std::visit([this](const auto& e) { On(e); }, event);
+  }
+  void On(const SeekDataset& event);
+  void On(const KeepDataset& event);
+  void On(const LeaveDataset& event) { uses.erase(event.use); }
+  void On(const ForgetClient& event);
+  void On(const FinishStatus& event);
+  void On(const EndDatasets& event);
+  void On(const ClientAsked& event);
+  void On(const BadRequest& event);
+  void On(const DatasetLoaded& event);
+  void On(const DatasetOpened& event);
+  void On(const DatasetReading& event);
+  void On(const DatasetFailed& event);
+  void On(const DatasetSeen& event);
+  void On(const FoldersSeen& event);
+  void On(const DatasetsFound& event);
+  void On(const QuestionAnswered& event);
+  void On(const UploadBegun& event);
+  void On(const UploadFinished& event);
+  void On(const DatasetTick&) {}
+
+  // ---- messages of clients
+  void OnMessage(PeerToken client, const DataOrder& message, const Bytes&);
+  void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const ViewQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
+  void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
+  void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);
+
+  // ---- requests
+  CheckId Seek(const std::string& name);
+  Status DescendUse(Use& use);
+  void TellUse(const std::pair<const UseId, Use>& use);
+  void TellUses(const std::string& name);
+  void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
+  bool IsWanted(const std::string& name) const;  // by a request whose frame has not begun, or a question that was not asked
+  bool InUse(DatasetId dataset) const;
+
+  // ---- voxels
+  void LoadData(const std::string& name);
+  void FailData(const std::string& name, const Status& status);
+  void RenewData(const std::string& name);
+  bool UnloadOne();  // false: all are in use
+  void UnloadRetired();
+  void Unload(DatasetId dataset);
+  Status TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const;
+
+  // ---- checks
+  void CheckFilesOf(const std::string& name);
+  void CheckFolders();
+  void CheckEverything();
+
+  // ---- the catalogue
+  Status NameIsFree(const std::string& name) const;
+  void AddData(const std::string& name, const DataSource& source);
+  void RemoveData(const std::string& name, const std::string& why);
+  void StopWatching(const std::string& folder);
+  std::size_t MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
+  Status Remove(const std::vector<std::string>& items);
+  Status Reload(const std::vector<std::string>& items);
+  Status AddFound(const FoundData& found);
+  void AnswerOrder(PeerToken client, const DataOrder& order, const Status& status);
+  void AnswerLists();
+
+  // ---- questions
+  void Ask(PeerToken client, Question question);
+  Status DescendQuestion(OpenQuestion& open, const VolumeLevels& levels);
+  void AskExecutor();
+  void RefuseQuestion(const OpenQuestion& open, const Status& status);
+
+  // ---- uploads
+  Status AdmitUpload(const AddVolume& order);
+  std::uint64_t UploadBytes() const;  // bytes of the uploads under way, and of the files that clients have sent
+  void GrantCredit(OpenUpload& upload);
+  using Upload = std::map<UploadId, OpenUpload>::iterator;
+  Upload UploadOf(PeerToken client, std::optional<std::uint64_t> nonce = {});  // end: it has none, or another one
+  void EndUpload(Upload upload, const Status& why);                            // without a dataset
+  void RemoveFilesOf(PeerToken client);
+
+  Time NextWake() const;
+
+  // ---- actions
+  template <class... Values>
+  void Tell(NoteAbout about, LogLevel level, fmt::format_string<Values...> format, Values&&... values) {
+    if (level < config.log_level) return;
+    actions.emplace_back(Note{about, level, fmt::format(format, std::forward<Values>(values)...)});
+  }
+  void Send(PeerToken client, CoordinatorToClient message) { actions.emplace_back(ToClient{client, std::move(message)}); }
+};
+
+}  // namespace slabstream

@@ -1,0 +1,229 @@
+#include "coordinator/datasets/datasets.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "common/base/did_you_mean.h"
+#include "common/frame/dataset_name.h"
+#include "common/text/natural_order.h"
+
+namespace slabstream {
+
+namespace {
+constexpr std::size_t kNamesInMessage = 12;
+}
+
+DatasetTable::DatasetTable(Catalogue catalogue, std::set<std::string> watched) : folders(std::move(watched)) {
+  for (auto& [name, source] : catalogue) entries_[name].source = std::move(source);
+}
+
+DatasetTable::Entry* DatasetTable::Find(const std::string& name) {
+  auto& table = IsLevelName(name) ? levels_ : entries_;
+  const auto entry = table.find(name);
+  return entry == table.end() ? nullptr : &entry->second;
+}
+
+const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
+  const auto& table = IsLevelName(name) ? levels_ : entries_;
+  const auto entry = table.find(name);
+  return entry == table.end() ? nullptr : &entry->second;
+}
+
+bool DatasetTable::IsListed(const std::string& name) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->awaited == 0;
+}
+
+DatasetTable::Entry* DatasetTable::FindLoad(const std::string& name, LoadId load) {
+  Entry* const entry = Find(name);
+  return entry != nullptr && entry->state == DatasetState::kReady && entry->load == load ? entry : nullptr;
+}
+
+Status DatasetTable::NoSuchDataset(const std::string& name) const {
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : entries_) {
+    if (entry.awaited == 0) names.push_back(known);
+  }
+  std::ranges::sort(names, {}, InNaturalOrder);
+  const std::string meant = DidYouMean(name, names);
+  if (names.size() > kNamesInMessage) names.resize(kNamesInMessage);
+  if (names.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
+  const std::string more = size() > names.size() ? fmt::format(" and {} more", size() - names.size()) : "";
+  return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}{}", name, fmt::join(names, ", "), more, meant));
+}
+
+std::size_t DatasetTable::size() const {
+  return std::size_t(std::ranges::count_if(entries_, [](const auto& entry) { return entry.second.awaited == 0; }));
+}
+
+std::vector<std::string> DatasetTable::Named(const std::string& name) const {
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : entries_) {
+    if (entry.awaited == 0 && (known == name || NameWithoutTime(known) == name)) names.push_back(known);
+  }
+  return names;
+}
+
+void DatasetTable::ForEach(const std::function<void(const std::string&, Entry&)>& visit) { VisitAll(*this, visit); }
+
+void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
+  Entry& entry = entries_[name];
+  CHECK(entry.awaited != 0 || (entry.source.path.empty() && !entry.source.load)) << name;
+  entry = {.source = std::move(source), .since = now};
+}
+
+void DatasetTable::Await(const std::string& name, CheckId check) { entries_[name].awaited = check; }
+
+void DatasetTable::Remove(const std::string& name) {
+  RemoveLevels(name);
+  const auto entry = entries_.find(name);
+  Retire(entry->second);
+  entries_.erase(entry);
+}
+
+void DatasetTable::RemoveLevels(const std::string& name) {
+  std::erase_if(levels_, [&](const auto& each) {
+    if (DatasetOfLevel(each.first) != name) return false;
+    Retire(each.second);
+    return true;
+  });
+}
+
+LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
+  Entry& entry = *Find(name);
+  CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
+  entry.state = DatasetState::kLoading;
+  entry.since = now;
+  entry.error.clear();
+  entry.read = {};
+  return entry.load = ++last_load_;
+}
+
+void DatasetTable::Use(const std::string& name) { Find(name)->last_use = ++uses_; }
+
+bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary,
+                          std::uint64_t bytes, std::shared_ptr<const FileStamp> stamp, Time now) {
+  if (!IsLoading(name, load)) return false;
+  Entry* const entry = Find(name);
+  CHECK(summary != nullptr) << name;
+  entry->state = DatasetState::kReady;
+  entry->since = now;
+  entry->id = id;
+  entry->summary = std::move(summary);
+  entry->stamp = std::move(stamp);
+  entry->bytes = bytes;
+  retired_.erase(id);  // the same voxels again
+  return true;
+}
+
+bool DatasetTable::Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
+                          std::shared_ptr<const FileStamp> stamp, Time now) {
+  if (!IsLoading(name, load)) return false;
+  Entry& entry = *Find(name);
+  entry.state = DatasetState::kReady;
+  entry.since = now;
+  entry.levels = std::move(levels);
+  entry.stamp = std::move(stamp);
+  for (std::size_t level = 0; level < sources.size(); ++level) {
+    levels_[LevelName(name, int(level))] = {.source = std::move(sources[level]), .since = now};
+  }
+  return true;
+}
+
+bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->state == DatasetState::kLoading && entry->load == load;
+}
+
+void DatasetTable::Fail(const std::string& name, const Status& status, Time now) {
+  Reset(name, now);
+  Entry& entry = *Find(name);
+  entry.state = DatasetState::kFailed;
+  entry.error = status.message();
+}
+
+void DatasetTable::Reset(const std::string& name, Time now) {
+  RemoveLevels(name);
+  Entry& entry = *Find(name);
+  Retire(entry);
+  Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
+  fresh.checks.End();
+  entry = std::move(fresh);
+}
+
+void DatasetTable::Retire(const Entry& entry) {
+  if (entry.state == DatasetState::kReady && entry.levels == nullptr) retired_[entry.id] = entry.source.held_bytes + entry.bytes;
+}
+
+std::uint64_t DatasetTable::bytes() const {
+  std::uint64_t total = 0;
+  VisitAll(*this, [&](const std::string&, const Entry& entry) { total += entry.source.held_bytes + entry.bytes; });
+  for (const auto& [id, bytes] : retired_) total += bytes;
+  return total;
+}
+
+bool DatasetTable::Holds(DatasetId dataset) const {
+  bool held = retired_.contains(dataset);
+  VisitAll(*this, [&](const std::string&, const Entry& entry) { held |= entry.state == DatasetState::kReady && entry.id == dataset; });
+  return held;
+}
+
+std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now) {
+  const std::string* oldest = nullptr;
+  std::uint64_t last_use = 0;
+  VisitAll(*this, [&](const std::string& name, const Entry& entry) {
+    const bool held = entry.state == DatasetState::kReady && entry.levels == nullptr && entry.source.held_bytes == 0;
+    if (!held || in_use(entry.id) || (oldest != nullptr && entry.last_use >= last_use)) return;
+    oldest = &name;
+    last_use = entry.last_use;
+  });
+  if (oldest == nullptr) return std::nullopt;
+  const DatasetId id = Find(*oldest)->id;
+  Reset(*oldest, now);
+  retired_.erase(id);
+  return id;
+}
+
+std::vector<DatasetId> DatasetTable::TakeRetired(const std::function<bool(DatasetId)>& in_use) {
+  std::vector<DatasetId> unused;
+  std::erase_if(retired_, [&](const auto& retired) {
+    if (in_use(retired.first)) return false;
+    unused.push_back(retired.first);
+    return true;
+  });
+  return unused;
+}
+
+std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
+  std::vector<DatasetStatus> report;
+  for (const auto& [name, entry] : entries_) {
+    if (entry.awaited != 0) continue;
+    DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
+    const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now - entry.since);
+    status.since_ms = std::uint64_t(std::max(since, std::chrono::milliseconds(0)).count());
+    if (entry.levels != nullptr) {
+      status.description = entry.levels->levels.front();
+      status.range = entry.levels->overview->range;
+      status.levels = entry.levels->levels;
+      for (const auto& [level, of_level] : levels_) status.memory_bytes += DatasetOfLevel(level) == name ? of_level.bytes : 0;
+    } else if (entry.summary) {
+      status.description = entry.summary->description;
+      status.range = entry.summary->range;
+      status.memory_bytes = entry.source.held_bytes + entry.bytes;
+      if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
+      status.overlay = entry.summary->overlay != nullptr;
+      status.cells = std::accumulate(entry.summary->cells.begin(), entry.summary->cells.end(), std::uint64_t{0});
+    }
+    report.push_back(std::move(status));
+  }
+  std::ranges::sort(report, {}, [](const DatasetStatus& status) { return InNaturalOrder(status.name); });
+  return report;
+}
+
+}  // namespace slabstream

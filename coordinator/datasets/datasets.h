@@ -1,0 +1,117 @@
+// DatasetTable: the catalogue as it is now, and how far each dataset has been loaded. A dataset is loaded at its first use; a failed load
+// is tried again at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that
+// nobody uses may be unloaded, the least recently used one first; they are loaded again when they are asked for.
+//
+// A dataset with several levels holds no voxels itself. Each level is an entry beside it (LevelName), which is loaded at its first use like
+// a dataset, and goes with it.
+//
+// Names come and go, and files change. Voxels that have left the table, but that frames are still rendered from, are retired:
+// they stay until no frame uses them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/base/read_share.h"
+#include "common/base/status.h"
+#include "common/base/time.h"
+#include "common/planning/frame_plan.h"
+#include "common/planning/levels.h"
+#include "common/wire/client_messages.h"
+#include "coordinator/datasets/check_counter.h"
+#include "data/catalogue/data_source.h"
+
+namespace slabstream {
+
+using LoadId = std::uint32_t;
+
+// The entry of a level. No dataset of a catalogue has such a name.
+inline std::string LevelName(const std::string& name, int level) { return name + '\n' + std::to_string(level); }
+inline bool IsLevelName(const std::string& name) { return name.find('\n') != std::string::npos; }
+inline std::string DatasetOfLevel(const std::string& name) { return name.substr(0, name.find('\n')); }
+
+class DatasetTable {
+ public:
+  struct Entry {
+    DataSource source;
+    DatasetState state = DatasetState::kUnloaded;
+    Time since;                                    // in this state
+    LoadId load = 0;                               // the last one begun; 0: none
+    ReadShare read;                                // kLoading only: of its samples, as far as is known
+    DatasetId id = 0;                              // kReady only
+    std::shared_ptr<const VolumeSummary> summary;  // kReady only
+    std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
+    std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change
+    std::string error;                             // kFailed only
+    std::uint64_t bytes = 0;                       // kReady only: memory of its voxels beside what the source holds
+    std::uint64_t last_use = 0;                    // greater: later
+    CheckCounter checks;                           // at its files, while it is ready
+    // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
+    CheckId awaited = 0;
+  };
+
+  DatasetTable(Catalogue catalogue, std::set<std::string> folders);
+
+  bool IsListed(const std::string& name) const;  // in the catalogue
+  Entry* Find(const std::string& name);          // null: neither in the catalogue nor awaited
+  const Entry* Find(const std::string& name) const;
+  // Ready, by this load.
+  Entry* FindLoad(const std::string& name, LoadId load);
+  Status NoSuchDataset(const std::string& name) const;            // NotFound, naming what there is
+  std::size_t size() const;                                       // in the catalogue
+  std::vector<std::string> Named(const std::string& name) const;  // in the catalogue: this one, or all times of a series (NameAtTime)
+  void ForEach(const std::function<void(const std::string& name, Entry& entry)>& visit);
+
+  // ---- the catalogue
+  void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
+  void Await(const std::string& name, CheckId check);
+  void Remove(const std::string& name);  // retires its voxels
+  std::set<std::string> folders;         // folders that are watched
+
+  // ---- voxels
+  LoadId BeginLoad(const std::string& name, Time now);  // begins to load a dataset that is unloaded or failed
+  void Use(const std::string& name);                    // a request asks for it
+  // The end of a load. False: another one was begun since, or none; nothing changes.
+  bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes,
+              std::shared_ptr<const FileStamp> stamp, Time now);
+  // The same of a dataset with several levels, which are entries from then on.
+  bool Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
+              std::shared_ptr<const FileStamp> stamp, Time now);
+  bool IsLoading(const std::string& name, LoadId load) const;
+  // Both retire the voxels that it has. The first one as if it had never been loaded.
+  void Reset(const std::string& name, Time now);
+  void Fail(const std::string& name, const Status& status, Time now);
+
+  std::uint64_t bytes() const;          // bytes of all voxels, the retired ones too
+  bool Holds(DatasetId dataset) const;  // ready or retired
+  std::size_t retired() const { return retired_.size(); }
+  // Unloads the least recently used one of those that are not `in_use`, nor held by their source. nullopt: there is none.
+  std::optional<DatasetId> UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now);
+  // Takes out those that are retired and not `in_use`. Their voxels may go.
+  std::vector<DatasetId> TakeRetired(const std::function<bool(DatasetId)>& in_use);
+
+  std::vector<DatasetStatus> Report(Time now) const;  // by name
+
+ private:
+  void Retire(const Entry& entry);
+  void RemoveLevels(const std::string& name);
+  template <class Table, class Visit>
+  static void VisitAll(Table& table, Visit&& visit) {
+    for (auto& [name, entry] : table.entries_) visit(name, entry);
+    for (auto& [name, entry] : table.levels_) visit(name, entry);
+  }
+
+  std::map<std::string, Entry> entries_;
+  std::map<std::string, Entry> levels_;         // by LevelName
+  std::map<DatasetId, std::uint64_t> retired_;  // and the memory of each
+  LoadId last_load_ = 0;
+  std::uint64_t uses_ = 0;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,255 @@
+#include "coordinator/service/answer_question.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "common/planning/frame_plan.h"
+#include "common/planning/levels.h"
+#include "common/planning/shown_zones.h"
+#include "common/volume/memory_budget.h"
+#include "coordinator/probe/box_statistics.h"
+#include "coordinator/probe/joint_histogram.h"
+#include "coordinator/probe/percentiles.h"
+#include "coordinator/probe/pick.h"
+
+namespace slabstream {
+namespace {
+
+struct Dataset {
+  const ProbeVolume& volume;
+  std::shared_ptr<const VolumeSummary> summary;
+  DatasetId id;
+  std::optional<WholeNumbers> exact = {};  // where stored samples round them
+};
+
+WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
+  WholeNumbers found;
+  found.mapping = exact.of.mapping;
+  VisitSampleType(exact.of.type, [&]<class T>(const T*) {
+    const std::span<const T> samples(reinterpret_cast<const T*>(exact.bytes.data()), exact.bytes.size() / sizeof(T));
+    if constexpr (requires { found.samples = samples; }) found.samples = samples;
+  });
+  return found;
+}
+
+Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary) {
+  Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
+  if (!transfer.ok()) return transfer.status();
+  SummaryReply reply{.nonce = query.nonce,
+                     .description = summary.description,
+                     .range = summary.range,
+                     .histogram = {summary.histogram.begin(), summary.histogram.end()},
+                     .non_finite = std::uint64_t(summary.non_finite),
+                     .percentiles = {},
+                     .transfer = *std::move(transfer),
+                     .labels = {}};
+  if (summary.label_table != nullptr) reply.labels = summary.label_table->labels;
+  for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
+  return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) { return AnswerSummary(query, *dataset.summary); }
+
+Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
+  SampleReply reply{.nonce = query.nonce};
+  for (const Vec3& point : query.points) reply.samples.push_back(SampleAt(dataset.volume, *dataset.summary, point));
+  return QuestionReply(std::move(reply));
+}
+
+Status NoLabels(const StatisticsQuery& query) {
+  return Status::InvalidArgument(
+      fmt::format("dataset \"{}\" has no labels to measure: --data NAME=FILE,labels=FILE gives it some", query.dataset));
+}
+
+Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
+  const MeasuredVolume measured{*dataset.volume.voxels.held(), dataset.summary->description, dataset.exact};
+  const Result<BoxStatistics> statistics = StatisticsIn(measured, query.box);
+  if (!statistics.ok()) return statistics.status();
+  StatisticsReply reply{.nonce = query.nonce, .statistics = *statistics, .description = dataset.summary->description};
+  if (!query.labels) return QuestionReply(std::move(reply));
+  if (dataset.volume.labels == nullptr) return NoLabels(query);
+  const std::vector<Label>& labels = dataset.summary->label_table->labels;
+  const Result<std::vector<BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, *dataset.volume.labels, labels.size());
+  if (!of_labels.ok()) return of_labels.status();
+  for (std::size_t i = 0; i < labels.size(); ++i) reply.labels.push_back({labels[i], (*of_labels)[i]});
+  return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> AnswerJointHistogram(const JointHistogramQuery& query, const VolumeSummary& summary, const ReadJointBox& read) {
+  Result<JointHistogram> histogram = CountJointly(summary.description, summary.range, read);
+  if (!histogram.ok()) return histogram.status();
+  return QuestionReply(JointHistogramReply{.nonce = query.nonce, .range = summary.range, .histogram = *std::move(histogram)});
+}
+
+Result<QuestionReply> Answer(const JointHistogramQuery& query, const Dataset& dataset) {
+  const VoxelBricks& voxels = *dataset.volume.voxels.held();
+  return AnswerJointHistogram(query, *dataset.summary, [&](const Box& box) {
+    VoxelBlock block = MakeVoxelBlock(box, voxels.type());
+    voxels.Read(box, 0, block.bytes);
+    return Result<VoxelBlock>(std::move(block));
+  });
+}
+
+Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
+  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary);
+  if (!resolved.ok()) return resolved.status();
+  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  if (!setup.ok()) return setup.status();
+  PickReply reply{.nonce = query.nonce};
+  if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
+    reply.sample =
+        SampleAtVoxel(dataset.volume, *dataset.summary, dataset.summary->description.geometry.ToWorld(picked->at), picked->voxel);
+    reply.depth = picked->depth * setup->unit;
+  }
+  return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& finest,
+                                 const std::shared_ptr<const VolumeSummary>& overview) {
+  const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed);
+  if (!chosen.ok()) return chosen.status();
+  if (Status status = CheckView(chosen->view, finest); !status.ok()) return status;
+  return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
+}
+Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
+  return AnswerView(query, dataset.summary->description.geometry, dataset.summary);
+}
+
+// ---- voxels that nobody holds are read for the answer
+
+Result<VoxelBlock> ReadBox(const VoxelServer::Samples::InParts& from, const Box& box) {
+  const ScalarType type = from.description().type;
+  const std::int64_t bytes = box.voxel_count() * std::int64_t(BytesPerSample(type));
+  if (Status fits = CheckFitsMemory(bytes, "the box"); !fits.ok()) return fits;
+  VoxelBlock block = MakeVoxelBlock(box, type);
+  if (Status read = from.source->ReadNow(from.level, box, block.bytes); !read.ok()) return read;
+  return block;
+}
+
+// Reads pieces of about a block of the source as they are asked for, and keeps the last few.
+class ReadVoxels {
+ public:
+  explicit ReadVoxels(const VoxelServer::Samples::InParts& from)
+      : from_(from), piece_(Max(Uniform(16), Min(Uniform(64), from.source->info().levels[std::size_t(from.level)].block))) {}
+
+  const Status& status() const { return status_; }  // the first failure; from then on nothing is read
+  ProbedVoxels voxels() {
+    return {from_.description().geometry.size, [this](const Index3& voxel) { return At(voxel); }};
+  }
+  ExactValue ExactAt(const Index3& voxel) {
+    const ExactType& of = from_.source->info().exact;
+    std::array<std::byte, sizeof(std::uint64_t)> sample{};
+    const Box box = {voxel, voxel + Uniform(1)};
+    if (status_.ok()) status_ = from_.source->ReadNow(from_.level, box, BoxRoom::Dense(box, sample.data(), true));
+    return ExactValueOf(of, sample.data());
+  }
+
+ private:
+  double At(const Index3& voxel) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    constexpr std::size_t kMostKept = 16;
+    if (!status_.ok()) return kNone;
+    const Index3 begin = voxel / piece_ * piece_;
+    auto piece = pieces_.find(Tuple(begin));
+    if (piece == pieces_.end()) {
+      if (pieces_.size() == kMostKept) pieces_.clear();
+      Result<VoxelBlock> read = ReadBox(from_, Intersection({begin, begin + piece_}, from_.description().geometry.bounds()));
+      if (!read.ok()) {
+        status_ = read.status();
+        return kNone;
+      }
+      piece = pieces_.emplace(Tuple(begin), *std::move(read)).first;
+    }
+    const VoxelBlock& block = piece->second;
+    return VisitScalarType(block.type, [&]<class T>(const T*) { return double(block.samples<T>()[block.Offset(voxel)]); });
+  }
+  static std::array<std::int32_t, 3> Tuple(const Index3& index) { return {index.x, index.y, index.z}; }
+
+  const VoxelServer::Samples::InParts& from_;
+  const Index3 piece_;
+  std::map<std::array<std::int32_t, 3>, VoxelBlock> pieces_;  // by their begins
+  Status status_;
+};
+
+// A question about a few points.
+template <class Query>
+Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+  ReadVoxels read(from);
+  ProbeVolume volume{.voxels = read.voxels()};
+  if (MayBeRounded(from.source->info().exact.type)) volume.exact = [&](const Index3& voxel) { return read.ExactAt(voxel); };
+  Result<QuestionReply> answer = Answer(query, {volume, asked.summary, asked.dataset});
+  return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
+}
+
+// Adds the pieces of a box that the region may keep, halving it again and again: a volume may say that it has any number of voxels.
+void AddKept(const ClipRegion& region, const Box& box, Box& kept) {
+  constexpr std::int32_t kPiece = 64;
+  if (kept.Contains(box) || !region.MayKeep(box)) return;
+  const Index3 size = box.size();
+  const Axis longest = *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return size[axis]; });
+  if (size[longest] <= kPiece) {
+    kept = Hull(kept, box);
+    return;
+  }
+  Box low = box, high = box;
+  low.end[longest] = high.begin[longest] = (box.begin[longest] + size[longest] / 2 + kPiece - 1) / kPiece * kPiece;
+  AddKept(region, low, kept);
+  AddKept(region, high, kept);
+}
+
+Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+  const VolumeDescription& description = asked.summary->description;
+  if (query.labels) return NoLabels(query);  // who reads in parts has no layers
+  const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
+  if (!region.ok()) return region.status();
+  Box needed;
+  AddKept(*region, description.geometry.bounds(), needed);
+  if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = {}, .description = description});
+  const Result<VoxelBlock> block = ReadBox(from, needed);
+  if (!block.ok()) return block.status();
+  const ProbeVolume volume{.voxels = VoxelBricks(*block)};
+  return Answer(query, {volume, asked.summary, asked.dataset});
+}
+
+Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+  return AnswerJointHistogram(query, *asked.summary, [&](const Box& box) { return ReadBox(from, box); });
+}
+
+Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
+  return AnswerSummary(query, *asked.summary);
+}
+
+Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
+  return AnswerView(query, asked.summary->description.geometry, asked.summary);
+}
+
+}  // namespace
+
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
+  if (asked.levels != nullptr) {
+    return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary);
+  }
+  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
+  if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+  if (samples.in_parts.source != nullptr) {
+    return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
+  }
+  ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
+  if (const ExactSamples* const exact = samples.exact.get()) {
+    volume.exact = [exact, size = samples.box().size()](const Index3& voxel) {
+      return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
+    };
+  }
+  Dataset dataset{volume, asked.summary, asked.dataset};
+  if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
+  return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,13 @@
+// The answers to questions about what a dataset holds. They may take milliseconds, and longer if voxels are read for them.
+#pragma once
+
+#include "coordinator/datasets/dataset_machine.h"
+#include "coordinator/service/voxel_server.h"
+
+namespace slabstream {
+
+// Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
+// Any thread.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples);
+
+}  // namespace slabstream

@@ -1,0 +1,346 @@
+#include "coordinator/service/background_actions.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "common/base/log.h"
+#include "common/base/printable.h"
+#include "common/mesh/lattice.h"
+#include "common/planning/layer_bricks.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/text/url.h"
+#include "common/threads/guarded.h"
+#include "common/volume/memory_budget.h"
+#include "coordinator/service/answer_question.h"
+#include "coordinator/service/dataset_id.h"
+#include "data/catalogue/client_file.h"
+#include "data/survey/brick_index.h"
+#include "data/survey/survey.h"
+
+namespace slabstream {
+namespace {
+
+// The server that a source is read from, whose tasks may hold up each other. 0: it lies in files.
+FairTasks::Owner ServerOf(std::string_view source) {
+  if (SchemeOf(source).empty()) return 0;
+  if (const std::size_t endpoint = source.find(kEndpointMark); endpoint != std::string_view::npos) {
+    source.remove_prefix(endpoint + kEndpointMark.size());
+  }
+  while (!SchemeOf(source).empty()) source.remove_prefix(SchemeOf(source).size() + 3);
+  return std::hash<std::string_view>()(source.substr(0, source.find('/')));
+}
+
+// Whether at least half of the volume's bricks hold one value each.
+bool MostBricksAreEqual(const VolumeSummary& summary) {
+  const auto equal = std::ranges::count_if(summary.bricks, [](const ValueRange& range) { return range.min == range.max; });
+  return 2 * std::size_t(equal) >= summary.bricks.size();
+}
+
+FoldersSeen Check(const CheckWatchedFolders& action, FolderMemory& memory) {
+  FoldersSeen seen;
+  for (const std::string& folder : action.folders) {
+    if (!action.asked_for && memory.IsUnchanged(folder)) {
+      seen.unchanged.insert(folder);
+    } else {
+      seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return memory.Remember(folder, [&] { return ListFolder(folder); }); }));
+    }
+  }
+  return seen;
+}
+
+// What an order wants to add. Its paths are those of this host, whatever the current folder of this process is.
+Result<FoundData> Find(const std::vector<std::string>& arguments) {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host = {"this host"};
+  const auto here = [&](const Status& status) {
+    return Status(status.code(),
+                  Printable(fmt::format("{} (paths are those of the coordinator's host, {})", status.message(), host.data())));
+  };
+  for (const std::string& argument : arguments) {
+    const Result<DataArgument> parsed = ParseDataArgument(argument);
+    if (!parsed.ok()) return parsed.status();
+    if (parsed->RelativePath() != nullptr) return here(Status::InvalidArgument(argument + ": the path must be absolute"));
+  }
+  FoundData found = FindData(arguments, "");
+  CheckFiles(found);
+  for (const std::string& line : found.complaints) LogWarning(line);
+  if (!found.errors.empty()) return here(found.errors.front());
+  return found;
+}
+
+Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const VoxelServer::Samples& samples,
+                                                   const CountDataset& action) {
+  if (samples.in_parts.source != nullptr) return Status::Unavailable("the voxels of a dataset that is read in parts are not counted");
+  const RendererKind& renderer = *action.volume.renderer();
+  const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
+  OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
+                                                     : count(samples.view(), drawn);
+  AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
+  return std::make_shared<const OccupancyGrid>(std::move(grid));
+}
+
+// Makes the event that ends an action: what names the action, then the result or the error.
+template <class Event, class... Names>
+auto EndOf(Names... names) {
+  return [names...](auto result) { return Event{names..., std::move(result)}; };
+}
+
+}  // namespace
+
+BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, VoxelServer& voxels)
+    : make_plan_(std::move(make_plan)),
+      count_occupied_(std::move(count_occupied)),
+      planner_(std::make_shared<Planner>()),
+      voxels_(voxels) {}
+
+void BackgroundActions::HandleEvents(const std::function<void(CoordinatorEvent)>& handle) {
+  for (News& news : inbox_->TakeAll()) {
+    if (news.samples.any()) voxels_.Publish(news.dataset, std::move(news.samples));
+    if (news.upload != nullptr) {
+      const auto open = uploads_.find(std::get<UploadBegun>(news.event).upload);
+      if (open != uploads_.end()) open->second = std::move(news.upload);
+    }
+    if (const auto* planned = std::get_if<Planned>(&news.event)) plans_.erase(planned->plan);
+    handle(std::move(news.event));
+  }
+}
+
+BackgroundActions::AtOnce BackgroundActions::Post(auto&& tasks, const char* what, auto make, auto failed) {
+  const Status begun = Guarded(what, [&] {
+    tasks.Post([inbox = inbox_, barrier = std::string(what), make = std::move(make), failed] {
+      Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
+      inbox->Post(news.ok() ? *std::move(news) : News{failed(news.status())});
+    });
+  });
+  if (begun.ok()) return std::nullopt;
+  return failed(begun);
+}
+
+BackgroundActions::AtOnce BackgroundActions::PostResult(auto&& tasks, const char* what, auto find, auto end) {
+  return Post(
+      tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
+}
+
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const TellRead& tell) {
+  if (action.source.at_level != nullptr) return LoadLevel(action, *action.source.at_level, tell);
+  Result<ReadableSource> read = ReadSource(action.source, action.most_bytes, tell);
+  if (!read.ok()) return read.status();
+  if (auto* const opened = std::get_if<OpenedSource>(&*read)) return Open(action, std::move(*opened), tell);
+  return Hold(action, std::get<LoadedSource>(*read));
+}
+
+// A volume that was read as a whole.
+Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
+  const std::shared_ptr<const Volume>& volume = loaded.volume;
+  const Layers& layers = loaded.layers;
+  auto summary = std::make_shared<const VolumeSummary>(SummaryOf(LayeredVolume{volume, layers}));
+  VoxelServer::Samples samples;
+  const bool held = action.source.held_bytes > 0;  // as a whole, in any case
+  if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
+  if (!held && MostBricksAreEqual(*summary)) {
+    samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
+  } else {
+    samples.volume = volume;
+  }
+  samples.exact = loaded.exact;
+  if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
+  if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
+  samples.description = volume->description;
+  const DatasetId id = IdOf(action.name, *volume, layers, loaded.exact.get());
+  const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp}, id, std::move(samples)};
+}
+
+// The levels of a source, or its only one.
+Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& action, OpenedSource opened, const TellRead& tell) {
+  const SourceInfo& info = opened.source->info();
+  const std::vector<SourceLevel>& levels = info.levels;
+  (void)opened.source->TakeStoredBytes();  // the survey's, which belong to no frame
+  std::vector<DataSource> sources;
+  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    described->levels.push_back(levels[level].description);
+    SourceAtLevel at{.source = opened.source,
+                     .surveyed = opened.survey.summary,
+                     .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
+                     .stamp = opened.stamp,
+                     .index = opened.index};
+    if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
+    sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
+  }
+  if (sources.size() == 1) return LoadLevel(action, *sources.front().at_level, tell);
+  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp}};
+}
+
+// Holds the voxels of the level if there is room for them.
+Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell) {
+  const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
+  const auto bytes = std::uint64_t(description.voxel_bytes());
+  // A picture may be drawn from several levels, which must be held together.
+  std::uint64_t with_coarser = 0;
+  for (const SourceLevel& level : std::span(at.source->info().levels).subspan(std::size_t(at.stored.level))) {
+    with_coarser += std::uint64_t(level.description.voxel_bytes());
+  }
+  // Of a larger one behind an address each process reads what it needs, which may be little.
+  const std::uint64_t most =
+      !SchemeOf(at.stored.source).empty() ? std::min(action.most_bytes, std::uint64_t(kFarSurvey.exact)) : action.most_bytes;
+  VoxelServer::Samples samples;
+  VolumeSummary summary;
+  if (with_coarser <= most && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+    ReadProgress progress(tell);
+    const Result<LevelInMemory> level = at.source->ReadLevel(at.stored.level, &progress);
+    // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
+    const Result<bool> changed = level.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
+    if (!level.ok() && (!changed.ok() || !*changed)) return level.status();
+    if (level.ok()) {
+      samples.volume = level->volume;
+      samples.exact = level->exact;
+      samples.read_from = at.source;
+      samples.description = description;
+    }
+  }
+  if (samples.volume != nullptr) {
+    summary = at.surveyed_level ? *at.surveyed : Summarize(*samples.volume);
+    summary.range = at.surveyed->range;
+    summary.histogram = at.surveyed->histogram;
+    summary.non_finite = at.surveyed->non_finite;
+  } else {
+    samples.in_parts = {at.source, at.stored.level};
+    summary = at.surveyed_level ? *at.surveyed : UnreadSummary(description, *at.surveyed);
+    summary.stored = at.stored;
+    if (at.index != nullptr) {
+      const BrickRangeList& bricks = at.index->levels[std::size_t(at.stored.level)];
+      summary.indexed = std::make_shared<const BrickRangeList>(DataRanges(bricks, description));
+    }
+  }
+  const DatasetId id = IdOf(action.name, description, at.stored);
+  const std::uint64_t held = samples.bytes();
+  return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), held, at.stamp}, id,
+              std::move(samples)};
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
+  const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
+  const auto load = [action, inbox = inbox_] {
+    const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
+    Result<News> news = Load(action, tell);
+    if (news.ok() || action.source.sent == nullptr) return news;
+    return Result<News>(action.source.sent->ForClient(news.status()));
+  };
+  const auto failed = EndOf<DatasetFailed>(action.name, action.load);
+  const DataSource& source = action.source;
+  FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
+  for (const std::string& layer : {source.layers.labels, source.layers.overlay}) server = server != 0 ? server : ServerOf(layer);
+  if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
+  return Post(loads_, barrier.c_str(), load, failed);
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
+  voxels_.Withdraw(action.dataset);
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(CheckDatasetFiles& action) {
+  return PostResult(
+      checks_, "checking the files of a dataset", [stamp = action.stamp] { return HaveChanged(*stamp); },
+      EndOf<DatasetSeen>(action.name, action.load));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action) {
+  return Post(
+      checks_, "searching the watched folders", [action, memory = folders_] { return News{Check(action, *memory)}; },
+      [](const Status& why) {
+        LogWarning(why.message());
+        return FoldersSeen{};
+      });
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
+  return PostResult(
+      checks_, "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
+  const std::optional<StoredAt>& stored = action.summary->stored;
+  return PostResult(
+      answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
+      [action, samples = voxels_.Find(action.dataset)] { return AnswerTo(action, samples); }, EndOf<QuestionAnswered>(action.id));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {
+  const UploadId upload = action.upload;
+  uploads_[upload] = nullptr;
+  return Post(
+      loads_, "taking memory for a volume",
+      [upload, order = std::move(action.order)] {
+        const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
+        return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
+      },
+      EndOf<UploadBegun>(upload));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
+  uploads_.at(action.upload)->Store(action.begin, action.bytes.span());
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
+  const auto whole = uploads_.extract(action.upload);
+  return PostResult(
+      loads_, "finishing a volume", [buffer = whole.mapped()] { return buffer->Finish(); }, EndOf<UploadFinished>(action.upload));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {
+  uploads_.erase(action.upload);
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(CountDataset& action) {
+  const auto find = [count = count_occupied_, samples = voxels_.Find(action.volume.dataset()), action] {
+    return Count(count, samples, action);
+  };
+  return PostResult(counts_.Of(action.volume.dataset()), "counting of occupied voxels", find, EndOf<OccupiedCounted>(action.count));
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
+  const PlanId plan = action.plan;
+  if (auto planned = planner_->PlanAtHand(action)) return Planned{plan, *std::move(planned)};
+  const Status begun = Guarded("planning", [&] {
+    action.stop = plans_[plan].get_token();
+    planning_.Post(action.client, [inbox = inbox_, planner = planner_, make = make_plan_, request = std::move(action)] {
+      if (request.stop.stop_requested()) return;
+      auto made = Guarded("planning", [&] { return make(*planner, request); });
+      if (!request.stop.stop_requested()) inbox->Post({Planned{request.plan, std::move(made)}});
+    });
+  });
+  if (begun.ok()) return std::nullopt;
+  plans_.erase(plan);
+  return Planned{plan, begun};
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(DropPlan& action) {
+  if (auto plan = plans_.extract(action.plan)) plan.mapped().request_stop();
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(FrameMeasured& action) {
+  const PeerToken client = action.frame->asked.client;
+  const auto learn = [planner = planner_, measured = std::move(action)] {
+    const Status learnt = Guarded("learning from a frame", [&] { planner->Learn(measured); });
+    if (!learnt.ok()) LogWarning(learnt.message());
+  };
+  const Status begun = Guarded("learning from a frame", [&] { planning_.Post(client, learn); });
+  if (!begun.ok()) LogWarning(begun.message());
+  return std::nullopt;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+#include "coordinator/service/dataset_id.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "common/mesh/mesh.h"
+#include "common/wire/digest.h"
+
+namespace slabstream {
+
+namespace {
+
+std::string OfCells(const Mesh& mesh) {
+  const auto digest = [](const auto& array) { return Digest(std::as_bytes(std::span(array))); };
+  return fmt::format(" cells {} {} {} {:x} {:x} {:x}", mesh.points.size(), mesh.tetrahedra.size(), int(mesh.at), digest(mesh.points),
+                     digest(mesh.tetrahedra), digest(mesh.values));
+}
+
+std::string OfDescription(const VolumeDescription& description) {
+  const auto& [geometry, type, mapping] = description;
+  const auto& [size, spacing, orientation] = geometry;
+  const auto numbers = [](const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", size.x, size.y, size.z, numbers(spacing), int(orientation.world),
+                     numbers(orientation.origin), numbers(orientation.axes[0]), numbers(orientation.axes[1]), numbers(orientation.axes[2]),
+                     int(type), mapping.scale, mapping.offset);
+}
+
+DatasetId IdOf(const std::string& text) { return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1); }
+
+}  // namespace
+
+DatasetId IdOf(const std::string& name, const VolumeDescription& description, const StoredAt& stored) {
+  return IdOf(fmt::format("{} {} {} {:x} {}", OfDescription(description), stored.source, stored.level, stored.version, name));
+}
+
+DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers, const ExactSamples* exact) {
+  std::string of_layers;
+  for (const Volume* layer : {layers.labels.get(), layers.overlay.get()}) {
+    if (layer != nullptr) of_layers += fmt::format(" {} {:x}", int(layer->block.type), Digest(layer->block.bytes));
+    of_layers += ",";
+  }
+  for (const Label& label : layers.table == nullptr ? std::vector<Label>() : layers.table->labels) {
+    of_layers += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
+  }
+  const std::string text =
+      fmt::format("{} {} {:x} {}", OfDescription(volume.description), volume.block.bytes.size(), Digest(volume.block.bytes), name) +
+      (exact == nullptr ? "" : fmt::format(" {:x}", Digest(exact->bytes))) + (layers.types().any() ? of_layers : "") +
+      (volume.cells == nullptr ? "" : OfCells(*volume.cells));
+  return IdOf(text);
+}
+
+}  // namespace slabstream

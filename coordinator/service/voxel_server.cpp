@@ -1,0 +1,239 @@
+#include "coordinator/service/voxel_server.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/log.h"
+#include "common/memory/pooled_vector.h"
+#include "common/threads/guarded.h"
+#include "common/volume/light_volume.h"
+#include "common/wire/payload.h"
+#include "coordinator/service/box_samples.h"
+#include "data/sources/read_part.h"
+
+namespace slabstream {
+namespace {
+
+std::string Text(const Box& box) {
+  return fmt::format("[{}, {}) x [{}, {}) x [{}, {})", box.begin.x, box.end.x, box.begin.y, box.end.y, box.begin.z, box.end.z);
+}
+
+// What this process lacks, no worker lacks: another one would get the same answer, and the same one may get a better answer later.
+Status AsWorkersSee(const Status& failure) {
+  if (failure.code() != StatusCode::kResourceExhausted && failure.code() != StatusCode::kInternal) return failure;
+  return Status::Unavailable("the coordinator cannot send voxels: " + failure.message());
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VoxelServer>> VoxelServer::Start(Context& context, const Place& place, Epoch epoch, Codec codec) {
+  SocketOptions options = place.socket;
+  options.send_high_water_mark = kMaxQueuedChunks;
+  Result<Socket> socket = Socket::Router(context, options);
+  if (!socket.ok()) return socket.status();
+  Result<std::string> bound = socket->Bind(place.endpoint);
+  if (!bound.ok()) return bound.status();
+  return std::unique_ptr<VoxelServer>(new VoxelServer(std::move(*socket), std::move(*bound), epoch, codec));
+}
+
+VoxelServer::VoxelServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec)
+    : endpoint_(std::move(endpoint)),
+      epoch_(epoch),
+      codec_(codec),
+      socket_(std::move(socket)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+
+VoxelServer::~VoxelServer() {
+  thread_.request_stop();
+  read_->wakeup().Notify();
+  thread_.join();
+}
+
+void VoxelServer::Publish(DatasetId dataset, Samples samples) {
+  const std::lock_guard lock(mutex_);
+  if (samples.description) light_volume_of_[LightVolumeOf(dataset)] = dataset;
+  samples_.insert_or_assign(dataset, std::move(samples));
+}
+
+void VoxelServer::Withdraw(DatasetId dataset) {
+  Samples unused, unused_light;  // freed without the lock
+  const std::lock_guard lock(mutex_);
+  const auto take = [this](DatasetId id, Samples& to) {
+    const auto found = samples_.find(id);
+    if (found == samples_.end()) return;
+    to = std::move(found->second);
+    samples_.erase(found);
+  };
+  take(dataset, unused);
+  if (light_volume_of_.erase(LightVolumeOf(dataset)) > 0) take(LightVolumeOf(dataset), unused_light);
+}
+
+VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
+  const std::lock_guard lock(mutex_);
+  const auto found = samples_.find(dataset);
+  return found == samples_.end() ? Samples{} : found->second;
+}
+
+VoxelServer::Samples VoxelServer::LightVolume(DatasetId light) {
+  Samples of;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = light_volume_of_.find(light);
+    if (found == light_volume_of_.end()) return {};
+    of = samples_.at(found->second);
+  }
+  const Samples made = {.volume = std::make_shared<const Volume>(of.volume != nullptr ? MakeLightVolume(of.volume->block, *of.description)
+                                                                                      : MakeLightVolume(*of.bricks, *of.description))};
+  const std::lock_guard lock(mutex_);
+  if (light_volume_of_.contains(light)) samples_.insert_or_assign(light, made);  // the dataset is still there
+  return made;
+}
+
+void VoxelServer::EndConnections(const std::string& user) {
+  {
+    const std::lock_guard lock(mutex_);
+    unwanted_.push_back(user);
+  }
+  read_->wakeup().Notify();
+}
+
+std::vector<std::string> VoxelServer::TakeUnwanted() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(unwanted_, {});
+}
+
+Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& part) {
+  if (part.layer == Layer::kVolume && samples.volume != nullptr) {
+    return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
+  }
+  const BrickedVoxels& bricks = part.layer == Layer::kVolume   ? *samples.bricks
+                                : part.layer == Layer::kLabels ? *samples.labels
+                                                               : *samples.overlay;
+  UnwrittenVector<std::byte> cut(part.bytes);
+  VoxelBricks(bricks).Read(box, part.begin, cut);
+  return Bytes(std::move(cut));
+}
+
+Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
+  const Bytes all = cell_bytes_.Of(samples.cells, request.box);
+  const std::uint64_t begin = BeginOfCellChunk(request.chunk);
+  if (begin >= all.size()) {
+    return Status::InvalidArgument(
+        fmt::format("chunk request: chunk {} of cells is not below {}", request.chunk - kFirstCellChunk, CellChunkCount(all.size())));
+  }
+  chunk.cell_bytes = all.size();
+  const auto owner = std::make_shared<const Bytes>(all);
+  return Bytes(owner, all.span().subspan(begin, BytesOfCellChunk(all.size(), request.chunk)));
+}
+
+Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
+  if (!samples.any()) return Status::NotFound(fmt::format("chunk request: no dataset {}", request.dataset));
+  if (request.box.empty() || !samples.box().Contains(request.box)) {
+    return Status::InvalidArgument(
+        fmt::format("chunk request: box {} is not inside the volume {}", Text(request.box), Text(samples.box())));
+  }
+  if (IsCellChunk(request.chunk)) {
+    return samples.cells != nullptr ? Status::Ok() : Status::InvalidArgument("chunk request: cells of a dataset that has none");
+  }
+  if (const std::uint32_t count = ChunkCount(request.box, samples.types()); request.chunk >= count) {
+    return Status::InvalidArgument(fmt::format("chunk request: chunk {} is not below {}", request.chunk, count));
+  }
+  return Status::Ok();
+}
+
+void VoxelServer::Run(const std::stop_token& stop) {
+  const std::array<Socket*, 1> sockets = {&socket_};
+  while (!stop.stop_requested()) {
+    Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
+    for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
+    for (ReadDone& done : read_->TakeAll()) {
+      const DatasetId dataset = done.asked->request.dataset;
+      --reads_.at(dataset).begun;
+      Reply(done.asked->identity, done.asked->request, std::move(done.answer));
+      ReadNext(dataset);
+    }
+    while (!stop.stop_requested()) {
+      const std::optional<Incoming> incoming = socket_.TryReceive();
+      if (!incoming) break;
+      const Status answered = Guarded("voxels plane", [&] { Answer(*incoming); });
+      if (!answered.ok()) complaints_.Warning(answered.message());  // the worker asks again when its request times out
+    }
+  }
+}
+
+void VoxelServer::Answer(const Incoming& incoming) {
+  const Result<WorkerToVoxels> decoded = Decode<WorkerToVoxels>(incoming.header(), incoming.payload().size());
+  if (!decoded.ok()) return complaints_.Warning("voxels plane: dropped a message: " + decoded.status().message());
+  const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
+  if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
+  Samples samples = Find(request.dataset);
+  if (!samples.any()) {
+    const Status made = Guarded("a light volume", [&] {
+      samples = LightVolume(request.dataset);
+      return Status::Ok();
+    });
+    if (!made.ok()) return Reply(incoming.identity, request, made);
+  }
+  if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
+  if (samples.in_parts.source != nullptr) {
+    std::deque<Asked>& waiting = reads_[request.dataset].waiting;
+    const auto is_same = [&](const Asked& asked) { return asked.identity == incoming.identity && asked.request == request; };
+    if (std::ranges::none_of(waiting, is_same)) waiting.push_back({incoming.identity, request, samples.in_parts});
+    return ReadNext(request.dataset);
+  }
+  Reply(incoming.identity, request, Guarded("chunk request", [&]() -> Result<std::pair<Chunk, Bytes>> {
+          Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+          if (samples.read_from != nullptr) chunk.stored_bytes = samples.read_from->TakeStoredBytes();
+          Result<Bytes> cut = IsCellChunk(request.chunk)
+                                  ? CutCells(samples, request, chunk)
+                                  : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
+          if (!cut.ok()) return cut.status();
+          Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
+          return std::pair(chunk, std::move(payload));
+        }));
+}
+
+void VoxelServer::ReadNext(DatasetId dataset) {
+  Reads& reads = reads_.at(dataset);
+  while (!reads.waiting.empty() && reads.begun < kReadAtOnce) {
+    const auto asked = std::make_shared<const Asked>(std::move(reads.waiting.front()));
+    reads.waiting.pop_front();
+    ++reads.begun;
+    const ChunkRequest& request = asked->request;
+    // Of zeros, also where there is no layer: g++ 12 says of any other that it may be read before it is set.
+    const SampleTypes types(asked->from.description().type, LayerTypes());
+    const ChunkPart part = PartOfChunk(request.box, types, request.chunk);
+    ReadPart(asked->from.source, asked->from.level, request.box, part.begin, part.bytes,
+             [inbox = read_, codec = codec_, epoch = epoch_, asked](Result<Bytes> samples) {
+               const ChunkRequest& of = asked->request;
+               auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
+                 if (!samples.ok()) return samples.status();
+                 Chunk chunk{.epoch = epoch, .dataset = of.dataset, .box = of.box, .chunk = of.chunk};
+                 chunk.stored_bytes = asked->from.source->TakeStoredBytes();
+                 Bytes payload = PackChunk(*std::move(samples), codec, chunk);
+                 return std::pair(chunk, std::move(payload));
+               });
+               inbox->Post({asked, std::move(answer)});
+             });
+  }
+  if (reads.waiting.empty() && reads.begun == 0) reads_.erase(dataset);
+}
+
+void VoxelServer::Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer) {
+  if (answer.ok()) {
+    const Status sent = socket_.Send(identity, Encode(answer->first), answer->second);
+    if (!sent.ok()) LogDebug("voxels plane: " + sent.message());  // it has gone, or asks again when its request times out
+    return;
+  }
+  complaints_.Warning(answer.status().message());
+  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, AsWorkersSee(answer.status())};
+  (void)socket_.Send(identity, Encode(refused));  // a worker that has gone needs no refusal
+}
+
+}  // namespace slabstream

@@ -1,0 +1,142 @@
+// VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
+// volumes.
+//
+// Of a source that is read in parts, it reads a chunk when somebody asks for it, kReadAtOnce chunks of a dataset at a time. Other requests
+// do not wait for them, so a store that does not answer holds up its own dataset alone.
+//
+// It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
+// refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,
+// except over inproc: they are raw there, and those of a whole volume refer to its own memory.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/base/limited_log.h"
+#include "common/base/status.h"
+#include "common/transport/mailbox.h"
+#include "common/transport/socket.h"
+#include "common/volume/bricks.h"
+#include "common/volume/layers.h"
+#include "common/wire/any_message.h"
+#include "coordinator/service/cell_bytes.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's credit allows
+
+class VoxelServer {
+ public:
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers,
+  // and its cells.
+  struct Samples {
+    std::shared_ptr<const Volume> volume = nullptr;
+    std::shared_ptr<const BrickedVoxels> bricks = nullptr;
+    std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
+    std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
+    std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
+    // Instead of all that: a level of a source, of which nothing is held.
+    struct InParts {
+      std::shared_ptr<VolumeSource> source = nullptr;
+      int level = 0;
+      const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
+    } in_parts = {};
+    std::shared_ptr<VolumeSource> read_from = nullptr;  // where `volume` was read from, if chunks tell what was read of it
+    std::optional<VolumeDescription> description = {};  // describes what is held; none: nobody can ask for its light volume
+
+    bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
+    // What follows needs any().
+    Box box() const {
+      CHECK(any());
+      if (in_parts.source != nullptr) return in_parts.description().geometry.bounds();
+      return volume != nullptr ? volume->block.box : bricks->grid().box;
+    }
+    std::uint64_t bytes() const {
+      if (in_parts.source != nullptr) return 0;
+      const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
+      const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes(), of_exact = exact == nullptr ? 0 : exact->bytes.size();
+      return of_layers + of_cells + of_exact + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
+    }
+    SampleTypes types() const {
+      if (in_parts.source != nullptr) return in_parts.description().type;
+      LayerTypes layers;
+      if (labels != nullptr) layers.labels = labels->type();
+      if (overlay != nullptr) layers.overlay = overlay->type();
+      layers.cells = cells != nullptr;
+      return {volume != nullptr ? volume->block.type : bricks->type(), layers};
+    }
+    // Not in_parts.
+    VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
+  };
+
+  struct Place {
+    std::string endpoint;  // bound
+    SocketOptions socket = {};
+  };
+  static Result<std::unique_ptr<VoxelServer>> Start(Context& context, const Place& place, Epoch epoch, Codec codec = Codec::kRaw);
+  ~VoxelServer();  // stops and joins
+
+  const std::string& endpoint() const { return endpoint_; }
+
+  // From any thread. The same id means the same voxels. They are served until they are withdrawn. So is the light volume of samples that
+  // are held (LightVolumeOf), which is made when it is first asked for.
+  void Publish(DatasetId dataset, Samples samples);
+  void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
+  Samples Find(DatasetId dataset);   // from any thread; neither: not published
+  // From any thread: as Socket::EndConnections, soon.
+  void EndConnections(const std::string& user);
+
+ private:
+  VoxelServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
+  void Run(const std::stop_token& stop);
+  std::vector<std::string> TakeUnwanted();
+  void Answer(const Incoming& incoming);
+  Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
+  // Reads the next voxels that must be read first; Reply follows when they are there.
+  void ReadNext(DatasetId dataset);
+  void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
+  Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
+  // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
+  Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
+  static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
+
+  struct Asked {
+    std::string identity;
+    ChunkRequest request;
+    Samples::InParts from;
+  };
+  struct ReadDone {
+    std::shared_ptr<const Asked> asked;
+    Result<std::pair<Chunk, Bytes>> answer;
+  };
+  static constexpr std::size_t kReadAtOnce = 32;  // chunks of a dataset, which are in memory until they are sent
+  struct Reads {                                  // the reads of a dataset
+    std::deque<Asked> waiting;                    // no two alike
+    std::size_t begun = 0;                        // and not ended
+  };
+
+  const std::string endpoint_;
+  const Epoch epoch_;
+  const Codec codec_;
+  std::mutex mutex_;
+  std::map<DatasetId, Samples> samples_;            // guarded by mutex_
+  std::map<DatasetId, DatasetId> light_volume_of_;  // by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;               // users whose connections are to end; guarded by mutex_
+  CellBytes cell_bytes_;                            // the thread's
+  LimitedLog complaints_;                           // the thread's
+  std::map<DatasetId, Reads> reads_;                // the thread's
+  const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
+  Socket socket_;                                                                          // the thread's
+  std::jthread thread_;                                                                    // last member
+};
+
+}  // namespace slabstream

@@ -1,0 +1,81 @@
+// Where the voxels of datasets come from. The machine keeps sources and hands them to the executor; it opens nothing itself.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/files/file_stamp.h"
+#include "common/volume/layers.h"
+#include "common/volume/stored_at.h"
+#include "common/volume/summary.h"
+#include "data/layers/layer_reader.h"
+#include "data/sources/volume_source.h"
+#include "data/volume_io/exact_samples.h"
+#include "data/volume_io/read_progress.h"
+
+namespace slabstream {
+
+struct BrickIndex;
+class ClientFile;
+
+// A level of a source that is open.
+struct SourceAtLevel {
+  std::shared_ptr<VolumeSource> source;           // never null
+  std::shared_ptr<const VolumeSummary> surveyed;  // Survey::summary
+  std::optional<int> surveyed_level = {};         // the survey's level, if that is it and all of it was read
+  StoredAt stored;                                // where workers find it
+  std::shared_ptr<const FileStamp> stamp;         // the state of its files
+  std::shared_ptr<const BrickIndex> index = {};   // the source's brick index; null: there is none
+};
+
+using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
+struct LoadedData : LayeredVolume {
+  std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that the volume rounds
+};
+using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
+
+// Paths, or a function whose volume never changes.
+struct DataSource {
+  DataSource() = default;
+  DataSource(std::string from_path, std::string of_folder, LayerFiles with_layers = {})
+      : path(std::move(from_path)), folder(std::move(of_folder)), layers(std::move(with_layers)) {}
+  template <std::convertible_to<DataLoader> Loader>
+  DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
+  template <std::convertible_to<VolumeLoader> Loader>
+  DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one whose volume has no layers
+      : load([loader = VolumeLoader(std::move(loader))](const TellRead&) -> Result<LoadedData> {
+          Result<std::shared_ptr<const Volume>> volume = loader();
+          if (!volume.ok()) return volume.status();
+          return LoadedData{{.volume = *std::move(volume)}};
+        }) {}
+
+  std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
+  std::string folder;  // the watched folder that it was found in; empty: it was named
+  LayerFiles layers;   // the files of the layers; only a named dataset has them
+  // Set: this is one level of a source with several, and is loaded as a dataset of its own.
+  std::shared_ptr<const SourceAtLevel> at_level = {};
+  DataLoader load;                         // set: `path` and `layers` are not used
+  std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it
+  std::uint64_t held_bytes = 0;            // memory that the source itself takes, loaded or not, since a client has sent it
+};
+
+// By name.
+using Catalogue = std::map<std::string, DataSource>;
+
+// What arguments of --data mean, or what lies in a folder.
+struct FoundData {
+  Catalogue datasets;
+  std::vector<std::string> folders;     // folders that are to be watched
+  std::vector<Status> errors;           // why an argument or a named file is wrong
+  std::vector<std::string> complaints;  // about files in folders, a line each: left out, or not to be read so far
+};
+
+}  // namespace slabstream

@@ -1,0 +1,60 @@
+#include "data/open/read_volume.h"
+
+#include <fmt/format.h>
+
+#include <new>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/volume/memory_budget.h"
+#include "data/open/open_source.h"
+#include "data/volume_io/chosen_channel.h"
+
+namespace slabstream {
+
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options, bool all_exact) {
+  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+  return source.ok() ? ReadVolume(**source, path, options, all_exact) : source.status();
+}
+
+Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, bool all_exact) try {
+  // What is decoded as a whole checks for itself what it takes.
+  if (Status fits = source.info().whole ? Status::Ok() : CheckFitsMemory(source.info().finest().voxel_bytes(), path); !fits.ok())
+    return fits;
+  Result<LevelInMemory> level = source.ReadLevel(0, options.progress, {.all_exact = all_exact, .narrow = true});
+  if (!level.ok()) return level.status();
+  LoadedVolume loaded{*std::move(level), source.info()};
+  loaded.info.levels.front().description = loaded.volume->description;
+  WarnOfPart(path, options, loaded.info);
+  return loaded;
+} catch (const std::bad_alloc&) {
+  return Status::ResourceExhausted(path + ": does not fit the memory");
+}
+
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, const ReadOptions& options) {
+  ReadOptions of_headers = options;
+  of_headers.headers_only = true;
+  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, of_headers, ProcessReadContext());
+  return source.ok() ? Result((*source)->info().files) : source.status();
+}
+
+std::vector<std::string> PartTexts(const std::string& path, const ReadOptions& options, const SourceInfo& info) {
+  std::vector<std::string> texts;
+  if (!options.time && info.times > 1) {
+    texts.push_back(fmt::format("{}: shows time {} of {}; --time takes another one: 0 to {}", path, info.time, info.times, info.times - 1));
+  }
+  if (info.components == 1) {
+    if (auto channel = ShownChannelText(path, info.channels, info.channel, options)) texts.push_back(*std::move(channel));
+  } else if (!options.channel) {
+    const bool colour = info.components == 3 || info.components == 4;
+    texts.push_back(fmt::format("{}: shows component 0 of {}; --channel takes another one: 0 to {}{}", path, info.components,
+                                info.components - 1, colour ? ", or luminance, of red, green and blue" : ""));
+  }
+  return texts;
+}
+
+void WarnOfPart(const std::string& path, const ReadOptions& options, const SourceInfo& info) {
+  for (const std::string& text : PartTexts(path, options, info)) LogWarning(text);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,118 @@
+// Colour bars and legends: where they stand, what colours they have, and that pictures side by side have annotations of their own.
+#include "client/pictures/picture_key.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "client/pictures/annotations.h"
+
+namespace slabstream {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr ImageSize kKeySize = {300, 200};
+
+struct KeyDrawing {
+  ImageSize size;
+  std::vector<float> rgba;  // on black
+  std::array<float, 3> At(int x, int y) const {
+    const float* const pixel = &rgba[4 * (std::size_t(y) * std::size_t(size.width) + std::size_t(x))];
+    return {pixel[0], pixel[1], pixel[2]};
+  }
+  bool Changed(int x, int y) const { return At(x, y) != std::array<float, 3>{}; }
+  // Whether any pixel of the columns is.
+  bool AnyIn(int begin, int end) const {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = begin; x < end; ++x) {
+        if (Changed(x, y)) return true;
+      }
+    }
+    return false;
+  }
+};
+
+KeyDrawing DrawKey(const Annotations& annotations, const PictureKey& key, const std::vector<PictureGeometry>& panes = {{}},
+                   ImageSize size = kKeySize) {
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(MarksOf({.annotations = annotations}, size, panes, key).value());
+  EXPECT_TRUE(layers.ok()) << layers.status().message();
+  KeyDrawing drawing{size, {}};
+  const std::array<float, 4> black = {0, 0, 0, 1};
+  for (int i = 0; i < size.width * size.height; ++i) drawing.rgba.insert(drawing.rgba.end(), black.begin(), black.end());
+  const std::size_t row = 4 * std::size_t(size.width);
+  for (int y = 0; y < size.height; ++y) layers->PutOver(y, std::span(drawing.rgba).subspan(std::size_t(y) * row, row));
+  return drawing;
+}
+
+PictureKey::Bar RedToBlue() { return {.colors = {{-100, {1, 0, 0}}, {300, {0, 0, 1}}}, .low = -100, .high = 300}; }
+
+TEST(TicksOf, AreRoundNumbersInTheRange) {
+  EXPECT_THAT(TicksOf(0, 1), ElementsAre(0, 0.2, 0.4, 0.6, 0.8, 1));
+  EXPECT_THAT(TicksOf(-100, 300), ElementsAre(-100, 0, 100, 200, 300));
+  EXPECT_THAT(TicksOf(3, 217), ElementsAre(50, 100, 150, 200));
+  EXPECT_THAT(TicksOf(0, 0.0007), ElementsAre(0, 0.0002, 0.0004, 0.0006));
+  for (const auto& [low, high] : {std::pair(-1e30, 1e30), std::pair(1e-30, 3e-30), std::pair(1e6, 1e6 + 1)}) {
+    const std::vector<double> ticks = TicksOf(low, high);
+    EXPECT_GE(ticks.size(), 2U) << low;
+    EXPECT_LE(ticks.size(), 7U) << low;
+    EXPECT_GE(ticks.front(), low);
+    EXPECT_LE(ticks.back(), high);
+  }
+}
+
+TEST(ColorBar, StandsOnTheRightWithTheGreatestValueOnTop) {
+  const KeyDrawing drawing = DrawKey({.color_bar = ""}, {.bar = RedToBlue(), .entries = {}});
+  EXPECT_FALSE(drawing.AnyIn(0, 200));
+  int first = kKeySize.height, last = 0;
+  const int x = kKeySize.width - 12;  // inside of the bar
+  for (int y = 0; y < kKeySize.height; ++y) {
+    const auto [r, g, b] = drawing.At(x, y);
+    if (g != 0 || r + b < 0.9F) continue;
+    first = std::min(first, y);
+    last = std::max(last, y);
+  }
+  ASSERT_GT(last - first, 100);
+  for (const double share : {0.02, 0.25, 0.5, 0.75, 0.98}) {
+    const auto [r, g, b] = drawing.At(x, first + int(share * (last - first)));
+    EXPECT_NEAR(r, share, 0.02);
+    EXPECT_NEAR(b, 1 - share, 0.02);
+  }
+  EXPECT_FALSE(DrawKey({.color_bar = ""}, {}).AnyIn(0, kKeySize.width)) << "there is nothing to show";
+  EXPECT_FALSE(DrawKey({}, {.bar = RedToBlue(), .entries = {}}).AnyIn(0, kKeySize.width)) << "nobody asked for it";
+}
+
+TEST(Legend, NamesWhatThereIsRoomFor) {
+  PictureKey key;
+  for (int i = 0; i < 100; ++i) key.entries.push_back({"Precentral", {0, 1, 0}});
+  const KeyDrawing drawing = DrawKey({.legend = true}, key);
+  int green = 0;
+  for (int y = 0; y < kKeySize.height; ++y) green += drawing.At(8, y) == std::array<float, 3>{0, 1, 0} ? 1 : 0;
+  EXPECT_GT(green, 20);
+  EXPECT_LT(green, 120);
+  EXPECT_FALSE(drawing.AnyIn(kKeySize.width / 2, kKeySize.width));
+}
+
+TEST(Panes, HaveSidesAndBarsOfTheirOwn) {
+  PictureGeometry axial{.world = World::kPatient, .unit = LengthUnit::kMillimetre};
+  axial.right = {-1, 0, 0};
+  axial.up = {0, 1, 0};
+  axial.forward = {0, 0, 1};
+  const std::vector<PictureGeometry> panes(3, axial);
+  const ImageSize size = {600, 200};
+  const KeyDrawing drawing = DrawKey({.scale_bar = true, .orientation_marker = true, .sides_only = true}, {}, panes, size);
+  for (int pane = 0; pane < 3; ++pane) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < 200; ++x) ASSERT_EQ(drawing.At(x, y), drawing.At(x + 200 * pane, y)) << x << ", " << y;
+    }
+  }
+  EXPECT_TRUE(drawing.AnyIn(0, 30)) << "R";
+  EXPECT_TRUE(drawing.AnyIn(170, 200)) << "L";
+}
+
+}  // namespace
+}  // namespace slabstream

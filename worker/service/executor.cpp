@@ -1,0 +1,413 @@
+#include "worker/service/executor.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/image/coverage_map.h"
+#include "common/image/image_view.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/threads/guarded.h"
+#include "common/wire/payload.h"
+
+namespace slabstream {
+namespace {
+
+const OcclusionMask kNothingHidden;
+constexpr ClientId kNobody = 0;  // for what belongs to no client
+
+std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
+
+// Runs `work` with as many threads as all workers of this process have: when pixels are combined or a picture is made, the other workers
+// have already rendered. Call on the thread that the arena belongs to.
+template <class Work>
+auto WithAllThreads(TaskArena& arena, Work&& work) {
+  if (const int threads = ThreadShare::OfProcess(); arena.threads() != threads) arena.Resize(threads);
+  return arena.Run(work);
+}
+
+// The pixels of `view` as runs: the payload, and their header in the message.
+Bytes EncodePixels(const ImageView& view, ColorCoding color, PartialImage& message) {
+  RunImage runs = EncodeRuns(view, color);
+  message.image = runs.header;
+  return Bytes(std::move(runs.payload));
+}
+
+// The same without a copy, if the pixels of `view` of `image` already lie in memory as their payload. Like lent pixels they may be read
+// until the message has been sent: pixels that were passed on are written again only after they have come back.
+std::optional<Bytes> PixelsInPlace(const LocalImage& image, const ImageView& view, PartialImage& message) {
+  const std::optional<RunImageHeader> header = DenseHeader(view);
+  if (!header) return std::nullopt;
+  std::optional<BlockPin> pin = PinOf(image.rgba);
+  if (!pin) return std::nullopt;
+  message.image = *header;
+  return Bytes(std::make_shared<BlockPin>(*std::move(pin)), {reinterpret_cast<const std::byte*>(view.rgba), PayloadBytes(*header)});
+}
+
+// The last group that a picture shows.
+GroupKey KeyOf(const FrameImage& message) { return {message.frame, message.attempt, std::max(message.groups_done, 1U) - 1}; }
+
+bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_width) {
+  if (bounds.empty()) return true;
+  const auto index = [&](std::int32_t x, std::int32_t y) { return std::uint64_t(y) * std::uint64_t(frame_width) + std::uint64_t(x); };
+  return pixels.begin <= index(bounds.x_begin, bounds.y_begin) && index(bounds.x_end - 1, bounds.y_end - 1) < pixels.end;
+}
+
+// The bounds to which an image grows that gets `pixels` of another one. To grow each time would cost more than to combine, and only written
+// parts take memory. So that is the whole frame or, of a very large one, all rows of these pixels: of a share no more will come. An image
+// that outgrows such rows will hold the frame.
+PixelBounds RoomFor(const PixelBounds& image, const PixelBounds& other, PixelRange pixels, const PixelBounds& frame) {
+  constexpr std::int64_t kMostPixels = std::int64_t{1} << 22;
+  const PixelBounds both = Union(image, other);
+  if (both.empty()) return both;
+  const bool outgrown = image.width() == frame.width() && image != both;
+  if (outgrown || frame.pixel_count() <= kMostPixels) return frame;
+  const auto width = std::uint64_t(frame.width());
+  const PixelBounds rows = {0, std::int32_t(pixels.begin / width), frame.width(), std::int32_t((pixels.end + width - 1) / width)};
+  return rows.pixel_count() <= kMostPixels ? Union(both, rows) : both;
+}
+
+// With another image of this worker. `fresh`: `image` does not exist yet.
+void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
+  const bool whole = Covers(pixels, other->bounds, action.frame.width());
+  if (fresh && whole && other.use_count() == 1) {
+    image = std::move(*other);  // already released, and this task is the last holder
+    return;
+  }
+  const ImageView view = whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width());
+  const PixelBounds room = RoomFor(image.bounds, view.bounds, pixels, action.frame);
+  if (fresh) image = MakeEmptyRows(view.format, room);
+  if (action.replace) Erase(image, pixels, action.frame.width());
+  Combine(image, view, action.side, room);
+}
+
+Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
+  const RunImageHeader& header = action.incoming->header;
+  if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;  // its size says how much memory is taken
+  Bytes payload = action.incoming->payload;
+  if (const Rare<PackedRuns>& packed = action.incoming->packed) {
+    Result<Bytes> unpacked = UnpackRuns(*packed, payload, PayloadBytes(header));
+    if (!unpacked.ok()) return unpacked.status();
+    payload = *std::move(unpacked);
+  }
+  if (!action.replace && Covers(pixels, header.bounds, action.frame.width())) {
+    const PixelBounds room = RoomFor(image.bounds, header.bounds, pixels, action.frame);
+    if (fresh) image = MakeEmptyRows(header.format, room);
+    return CombineRuns(image, header, payload.span(), action.frame, action.side, room);
+  }
+  Result<LocalImage> read = ReadRuns(header, payload.span(), action.frame);
+  if (!read.ok()) return read.status();
+  CombineImages(image, fresh, std::make_shared<LocalImage>(*std::move(read)), action, pixels);
+  return Status::Ok();
+}
+
+Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels, PeerMemory& memory) {
+  const IncomingImage& incoming = *action.incoming;
+  const Result<BorrowedImage> borrowed =
+      memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
+  if (!borrowed.ok()) return borrowed.status();
+  const ImageView& view = borrowed->view;
+  const PixelBounds room = RoomFor(image.bounds, view.bounds, pixels, action.frame);
+  if (fresh) image = MakeEmptyRows(view.format, room);
+  if (action.replace) Erase(image, pixels, action.frame.width());
+  const bool valid = CombineUnchecked(image, view, action.side, room);
+  // The owner reused the frame while it was read here: `image` may hold anything, and the group fails.
+  if (!borrowed->Intact()) return Status::DataLoss("a lent image was taken back while it was read");
+  return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
+}
+
+std::shared_ptr<const FrameLight> LightFrom(StoredBox& light, const StartRender& action) {
+  return MakeFrameLight(
+      [&] {
+        light.Assemble();
+        const StoredBox::Lease lease = light.Lend(action.client);
+        const VoxelBricks bricks = lease.data().bricks();
+        VoxelBlock values = MakeVoxelBlock(action.setup->light->description.geometry.bounds(), bricks.type());
+        bricks.Read(values.box, 0, values.bytes);
+        return values;
+      },
+      *action.setup);
+}
+
+}  // namespace
+
+Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
+    : outbox_(outbox),
+      frame_codec_(frame_codec),
+      make_renderer_(std::move(make_renderer)),
+      hook_(std::move(hook)),
+      threads_(threads),
+      chunk_thread_([this] { Break(); }),
+      combine_(threads, [this] { Break(); }),
+      finish_(threads, [this] { Break(); }),
+      render_(threads, [this] { Break(); }) {}
+
+void Executor::Break() {
+  broken_ = true;
+  outbox_.wakeup().Notify();
+}
+
+template <class Work>
+Status Executor::Guard(const char* task, Work&& work) {
+  return Guarded(task, [&] {
+    if (hook_) hook_(task);
+    return work();
+  });
+}
+
+template <class Work>
+bool Executor::TrySend(const char* task, const GroupKey& key, Work&& work) {
+  const Status status = Guard(task, work);
+  if (!status.ok()) outbox_.Post(WorkerEvent(SendFailed{key, status}));
+  return status.ok();
+}
+
+Executor::~Executor() {
+  for (const auto& [image, render] : renders_) {
+    if (const std::shared_ptr<RenderControl> control = render.lock()) control->Cancel();
+  }
+}
+
+void Executor::Perform(const OpenBox& action) {
+  std::vector<StoredBox::Copy> copies;
+  for (const OpenBox::Copy& copy : action.copies) copies.push_back({BoxOf(copy.from), copy.box});
+  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies), action.stored, action.filled));
+}
+
+void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }
+
+void Executor::Perform(StoreChunk&& action) {
+  const auto found = boxes_.find(action.padded);
+  std::shared_ptr<StoredBox> padded = found == boxes_.end() ? nullptr : found->second;
+  chunk_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
+    Status status = Guard("box", [&] {
+      return padded == nullptr ? Status::NotFound("chunk of a padded box that was dropped") : padded->Store(store.chunk, store.payload);
+    });
+    outbox_.Post(WorkerEvent(ChunkStored{store.padded, store.chunk.box, store.chunk.chunk, std::move(status)}));
+  });
+}
+
+void Executor::Perform(StartRender&& action) {
+  std::shared_ptr<StoredBox> padded = BoxOf(action.padded);
+  std::shared_ptr<StoredBox> light = action.light ? BoxOf(*action.light) : nullptr;
+  auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
+  auto control = std::make_shared<RenderControl>();
+  std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
+  renders_[action.image] = control;
+  ClientLane& lane = render_.Of(action.client);
+  lane.thread.Post([this, &lane, padded = std::move(padded), light = std::move(light), image = std::move(image),
+                    control = std::move(control), render = std::move(action)] {
+    outbox_.Post(WorkerEvent(lane.arena.Run([&] { return Render(render, *padded, light.get(), *control, lane, *image); })));
+  });
+}
+
+RenderDone Executor::Render(const StartRender& action, StoredBox& padded, StoredBox* light, const RenderControl& control, ClientLane& lane,
+                            LocalImage& image) {
+  RenderDone done{action.key, action.rank, action.image, {}, {}};
+  RankReport& report = done.report;
+  const std::int64_t begin = NowNs();
+  done.status = Guard("render", [&] {
+    if (padded.Assemble()) AddStage(report, Stage::kFetch, begin, NowNs());
+    const StoredBox::Lease lease = padded.Lend(action.client);
+    lease.data().SetLight(light == nullptr ? nullptr : LightFrom(*light, action));
+    std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
+    if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
+    const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
+    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.at(), *action.setup, hidden, control, report);
+    if (!rendered.ok()) return rendered.status();
+    image = std::move(*rendered);
+    report.image_bounds = image.bounds;
+    report.image_pixels = SamplePixels(image);
+    return Status::Ok();
+  });
+  if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
+  done.box_bytes = padded.bytes();
+  return done;
+}
+
+std::shared_ptr<RenderControl> Executor::ControlOf(ImageHandle image) const {
+  const auto render = renders_.find(image);
+  return render == renders_.end() ? nullptr : render->second.lock();
+}
+
+void Executor::Perform(const PauseRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Pause();
+}
+
+void Executor::Perform(const ResumeRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Resume();
+}
+
+void Executor::Perform(const CancelRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Cancel();
+}
+
+std::shared_ptr<StoredBox> Executor::BoxOf(const BoxKey& key) const {
+  const auto found = boxes_.find(key);
+  CHECK(found != boxes_.end()) << "the machine copies and renders from boxes that it holds";
+  return found->second;
+}
+
+std::shared_ptr<LocalImage> Executor::ImageOf(ImageHandle image) const {
+  const auto found = images_.find(image);
+  CHECK(found != images_.end()) << "image " << image << " does not exist";
+  return found->second;
+}
+
+void Executor::Perform(StartCombine&& action) {
+  std::shared_ptr<LocalImage>& image = images_[action.image];
+  const bool fresh = image == nullptr;
+  if (fresh) image = std::make_shared<LocalImage>();
+  std::shared_ptr<LocalImage> other = action.other == 0 ? nullptr : ImageOf(action.other);
+  ClientLane& lane = combine_.Of(action.client);
+  lane.thread.Post([this, &lane, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
+    CombineDone done{combine.key, combine.image, {}, {Stage::kCombine, NowNs(), 0}};
+    done.status = Guard("combine", [&] {
+      const PixelRange pixels = combine.pixels == PixelRange{} ? PixelRange{0, std::uint64_t(combine.frame.pixel_count())} : combine.pixels;
+      if (other != nullptr) {
+        WithAllThreads(lane.arena, [&] { CombineImages(*image, fresh, other, combine, pixels); });
+        return Status::Ok();
+      }
+      if (!combine.incoming) combine.incoming.emplace();
+      if (!fresh && image->format != combine.incoming->header.format) {
+        return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
+      }
+      return WithAllThreads(lane.arena, [&] {
+        return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
+                                        : CombineIncoming(*image, fresh, combine, pixels);
+      });
+    });
+    done.span.end_ns = NowNs();
+    outbox_.Post(WorkerEvent(std::move(done)));
+  });
+}
+
+void Executor::Perform(FindHidden&& action) {
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
+  combine_.Of(action.client).thread.Post([this, image = std::move(image), find = std::move(action)]() mutable {
+    HiddenFound found{find.key, find.image, {}};
+    const Status status = Guard("hidden tiles", [&] {
+      const PixelBounds frame = FrameBounds(*find.setup);
+      if (image->format != PixelFormat::kRgba) {  // a peer's mistake
+        return Status::InvalidArgument("hidden tiles: not an image that blends");
+      }
+      FillRows(*image);
+      found.hidden = FindHiddenTiles(*image, frame.width(), frame.height(), find.setup->termination, std::move(find.known));
+      return Status::Ok();
+    });
+    if (!status.ok()) LogWarning(status.message());  // what no mask hides is rendered
+    outbox_.Post(WorkerEvent(std::move(found)));
+  });
+}
+
+std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send) {
+  if (send.delivery.lend) {
+    if (std::optional<Bytes> spans = lent_.Lend(image, view, *send.to, send.message)) return spans;
+  }
+  return send.color == ColorCoding::kFloat32 ? PixelsInPlace(image, view, send.message) : std::nullopt;
+}
+
+void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
+  sent_.Add(send.message.key, send.rank, payload.size(), begin_ns, NowNs());
+  sent_.MoveInto(send.message.key, send.message.reports);
+  outbox_.Post(
+      OutgoingPartial{*send.to, Encode(send.message), std::move(payload), send.delivery.timed, send.message.acknowledge, send.message.key});
+}
+
+void Executor::Perform(SendPartial&& action) {
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
+  const auto view_of = [](const LocalImage& of, const SendPartial& send) { return ViewOf(of, send.message.pixels, send.frame.width()); };
+  std::optional<ImageView> view;
+  std::optional<Bytes> payload;
+  // Describing where pixels are takes less time than waking a thread for it.
+  ClientLane& lane = combine_.Of(action.client);
+  if (lane.thread.Idle()) {
+    bool posted = false;
+    const bool tried = TrySend("encode", action.message.key, [&] {
+      const std::int64_t begin = NowNs();
+      view = view_of(*image, action);
+      payload = PayloadInPlace(*image, *view, action);
+      posted = payload && !MayPack(action.delivery.bytes_per_second);
+      if (posted) Post(action, *std::move(payload), begin);
+    });
+    if (posted || !tried) return;
+  }
+  lane.thread.Post(
+      [=, this, &lane, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
+        TrySend("encode", send.message.key, [&] {
+          const std::int64_t begin = NowNs();
+          if (!view) {
+            view = view_of(*image, send);
+            payload = PayloadInPlace(*image, *view, send);
+          }
+          if (!payload) payload = WithAllThreads(lane.arena, [&] { return EncodePixels(*view, send.color, send.message); });
+          Post(send, PackForLink(*std::move(payload), send.delivery.bytes_per_second, send.message.packed), begin);
+        });
+      });
+}
+
+void Executor::Perform(const ForgetGroups& action) {
+  const auto over = [&](const GroupKey& key) { return action.Over(key); };
+  lent_.Forget(over);
+  sent_.Forget(over);
+}
+
+void Executor::Perform(const ResendImage& action) {
+  std::shared_ptr<const LentImage> lent = lent_.Find(action.refused.key, action.refused.step, action.refused.pixels);
+  if (lent == nullptr) return;
+  ClientLane& lane = combine_.Of(kNobody);
+  lane.thread.Post([this, &lane, lent = std::move(lent)] {
+    TrySend("encode", lent->message.key, [&] {
+      PartialImage message = lent->message;
+      message.shared.reset();
+      Bytes payload = WithAllThreads(lane.arena, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
+      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), false, 0, message.key});
+    });
+  });
+}
+
+void Executor::Perform(SendFrame&& action) {
+  std::shared_ptr<LocalImage> image = ImageOf(action.image);
+  const bool finished = action.message.groups_done == action.message.group_count;
+  ClientLane& lane = (finished ? finish_ : combine_).Of(action.client);
+  lane.thread.Post([this, &lane, image = std::move(image), send = std::move(action)]() mutable {
+    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, lane.arena); });
+  });
+}
+
+void Executor::MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena) {
+  const GroupKey key = KeyOf(send.message);
+  RankReport& report = send.message.reports.emplace_back();
+  report.worker = send.message.worker;
+  report.group = key.group;
+  const std::int64_t begin = NowNs();
+  std::int64_t resolved_ns = begin;
+  RunImage runs = WithAllThreads(arena, [&] {
+    const RendererKind& renderer = *send.setup->renderer;
+    LocalImage share;
+    const bool whole = send.pixels == WholeFrame(*send.setup);
+    if (!whole) share = CopyOf(ViewOf(frame, send.pixels, FrameBounds(*send.setup).width()));
+    LocalImage& image = whole ? frame : share;
+    // At the seams of shares that are resampled, pixels are sums, and codes of their parts would not add up.
+    const bool straight8 = send.straight8 && (whole || renderer.FrameIsPicture(*send.setup));
+    const ColorCoding color = straight8 ? ColorCoding::kStraight8 : ColorCoding::kFloat32;
+    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color);
+    FillRows(image);
+    const LocalImage picture = renderer.Finish(image, *send.setup);
+    resolved_ns = NowNs();
+    return EncodePicture(picture, color);
+  });
+  AddStage(report, Stage::kResolve, begin, resolved_ns);
+  EncodedRuns& encoded = send.message.picture.runs;
+  encoded.image = runs.header;
+  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, encoded);
+  AddStage(report, Stage::kEncode, resolved_ns, NowNs());
+  outbox_.Post(OutgoingFrame{key, std::move(send.message), payload, std::move(send.pictures)});
+}
+
+void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }
+
+}  // namespace slabstream

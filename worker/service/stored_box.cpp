@@ -1,0 +1,147 @@
+#include "worker/service/stored_box.h"
+
+#include <algorithm>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+StoredBox::StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled)
+    : key_(key), stored_(stored), copies_(std::move(copies)), filled_(std::move(filled)) {
+  CHECK(stored_ || filled_.empty());
+}
+
+Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
+  const std::lock_guard lock(mutex_);
+  if (chunk.box.empty() || !key_.box.Contains(chunk.box) || chunk.dataset != key_.dataset)
+    return Status::DataLoss("chunk of another padded box");
+  if (voxels_ != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
+  if (IsCellChunk(chunk.chunk)) {
+    return key_.types.layers.cells ? cells_.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
+  }
+  if (chunk.chunk >= ChunkCount(chunk.box, key_.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key_.types, chunk.chunk)) {
+    return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
+                            " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
+  }
+  const ChunkPart part = PartOfChunk(chunk.box, key_.types, chunk.chunk);
+  unpacked_.resize(chunk.raw_bytes);
+  if (Status status = UnpackChunk(chunk, payload.span(), unpacked_); !status.ok()) return status;
+  Write(part.layer, chunk.box, part.begin, unpacked_);
+  return Status::Ok();
+}
+
+BrickedVoxels& StoredBox::Arriving(Layer layer) {
+  std::optional<BrickedVoxels>& stored = arriving_.at(std::size_t(layer));
+  if (!stored) stored.emplace(key_.box, *key_.types.Of(layer));
+  return *stored;
+}
+
+PaddedVoxels& StoredBox::ArrivingStored() {
+  if (!arriving_stored_) arriving_stored_ = MakePaddedVoxels(key_.box, key_.types.volume);
+  return *arriving_stored_;
+}
+
+std::optional<BoxRoom> StoredBox::RoomFor(const Box& box) {
+  CHECK(stored_ && key_.box.Contains(box));
+  const std::lock_guard lock(mutex_);
+  if (voxels_ != nullptr) return std::nullopt;
+  const PaddedVoxels& voxels = ArrivingStored();
+  return BoxRoom{voxels.At(box.begin), voxels.row, voxels.slice, true};
+}
+
+void StoredBox::Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
+  if (!stored_ || layer != Layer::kVolume) return Arriving(layer).Write(box, begin, samples);
+  const PaddedVoxels& voxels = ArrivingStored();
+  const std::size_t sample_bytes = BytesPerSample(voxels.type), row_bytes = std::size_t(box.size().x) * sample_bytes;
+  while (!samples.empty()) {
+    const std::size_t row = begin / row_bytes, within = begin % row_bytes;
+    const auto y = std::int32_t(row % std::size_t(box.size().y)), z = std::int32_t(row / std::size_t(box.size().y));
+    const std::span<const std::byte> part = samples.first(std::min(row_bytes - within, samples.size()));
+    std::ranges::copy(part, voxels.At(box.begin + Index3{0, y, z}) + within);
+    samples = samples.subspan(part.size());
+    begin += part.size();
+  }
+}
+
+void StoredBox::CopyFrom(const BoxVoxels& from, Layer layer, const Box& box) {
+  const BoxVoxels::Samples samples = from.samples();  // holds them
+  const VoxelBricks source =
+      layer == Layer::kVolume ? samples.view() : VoxelBricks(*(layer == Layer::kLabels ? from.layers().labels : from.layers().overlay));
+  const Index3 size = box.size();
+  std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
+  for (std::int32_t z = 0; z < size.z; ++z) {
+    const std::uint64_t begin = std::uint64_t(z) * slice.size();
+    source.Read(box, begin, slice);
+    Write(layer, box, begin, slice);
+  }
+}
+
+bool StoredBox::Assemble() {
+  const std::lock_guard lock(mutex_);
+  if (voxels_ != nullptr) return false;
+  for (const Layer layer : kLayers) {
+    if (!key_.types.Of(layer)) continue;
+    if (!stored_ || layer != Layer::kVolume) Arriving(layer);
+    for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), layer, copy.box);
+  }
+  BoxLayers layers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()};
+  if (stored_) {
+    for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
+    FillPadding(ArrivingStored());
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), std::move(layers));
+  } else {
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_[0]), std::move(layers));
+  }
+  arriving_ = {};
+  arriving_stored_.reset();
+  filled_ = {};
+  cells_ = {};
+  unpacked_ = {};
+  return !std::exchange(copies_, {}).empty();
+}
+
+std::shared_ptr<BoxVoxels> StoredBox::Assembled() {
+  Assemble();  // a padded box may be copied from before it is rendered from
+  const std::lock_guard lock(mutex_);
+  return voxels_;
+}
+
+BoxData& StoredBox::DataFor(ClientId client) {
+  const std::lock_guard lock(mutex_);
+  auto best = derived_.end();
+  for (auto each = derived_.begin(); each != derived_.end(); ++each) {
+    if (each->lent) continue;
+    const auto rank = [client](const Derived& derived) { return std::pair(derived.client == client, derived.last_use); };
+    if (best == derived_.end() || rank(*best) < rank(*each)) best = each;
+  }
+  if (best == derived_.end()) best = derived_.emplace(derived_.end(), voxels_);
+  best->lent = true;
+  best->client = client;
+  ++leases_;
+  best->data.TakeVoxels();
+  return best->data;
+}
+
+void StoredBox::Return(BoxData& data) {
+  const std::lock_guard lock(mutex_);
+  data.LeaveVoxels();
+  for (Derived& each : derived_) {
+    if (&each.data != &data) continue;
+    each.lent = false;
+    each.last_use = leases_;  // it may have lasted for many of others
+    each.bytes = data.derived_bytes();
+  }
+  std::erase_if(derived_, [this](const Derived& each) { return !each.lent && leases_ - each.last_use >= kMostUnused; });
+}
+
+std::size_t StoredBox::bytes() const {
+  const std::lock_guard lock(mutex_);
+  std::size_t total = voxels_ == nullptr ? 0 : voxels_->bytes();
+  for (const Derived& each : derived_) total += each.bytes;
+  return total;
+}
+
+}  // namespace slabstream
