@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-// Instruction sets that this program has code for and this processor runs, best first: "avx512", "avx2", "sse2", "neon".
+// Instruction sets that this program has code for and this processor runs, best first: "avx512", "avx2", "sse4", "neon", "scalar".
 std::vector<std::string> SimdTargets();
 
 // Limits kernels to the one of SimdTargets() that the environment variable SLABSTREAM_SIMD names, or worse ones, if it is set: for
