@@ -7,6 +7,7 @@
 #include <mutex>
 #include <new>
 #include <optional>
+#include <shared_mutex>
 #include <span>
 #include <utility>
 
@@ -108,21 +109,20 @@ class DecodedSource : public VolumeSource {
     CHECK(level == 0 && !box.empty() && info_.finest().geometry.bounds().Contains(box)) << "a box outside the volume";
     if (stop.stop_requested()) return done(Status::Cancelled(path_ + ": reading was cancelled"));
     Status status;
-    const std::byte* samples = nullptr;
     {
-      const std::lock_guard lock(mutex_);
-      if (!decoded_) {
-        Result<RawVolume> raw = DecodeNow();
-        if (raw.ok()) decoded_ = *std::move(raw);
-        status = raw.status();
+      std::shared_lock reading(mutex_);  // while it is held, nobody takes what is decoded
+      while (status.ok() && !decoded_) {
+        reading.unlock();
+        status = Keep();
+        reading.lock();
       }
-      if (status.ok()) samples = decoded_->bytes.data();
+      if (status.ok()) {
+        const std::array<std::int64_t, 3> steps = {1, size.x, std::int64_t{size.x} * size.y};
+        const SampleType type = info_.exact.type;
+        CopySamples(type, decoded_->bytes.data() + NumberIn(size, box.begin) * BytesPerSample(type), steps, box.size(), out);
+      }
     }
-    if (!status.ok()) return done(status);
-    const std::array<std::int64_t, 3> steps = {1, size.x, std::int64_t{size.x} * size.y};
-    const SampleType type = info_.exact.type;
-    CopySamples(type, samples + NumberIn(size, box.begin) * BytesPerSample(type), steps, box.size(), out);
-    done(Status::Ok());
+    done(status);
   }
 
  private:
@@ -134,6 +134,15 @@ class DecodedSource : public VolumeSource {
       return Status::Unavailable(path_ + ": has changed since it was opened");
     }
     return std::move(decoded->raw);
+  }
+
+  // Decodes the volume, unless that is done.
+  Status Keep() {
+    const std::lock_guard lock(mutex_);
+    if (decoded_) return Status::Ok();
+    Result<RawVolume> raw = DecodeNow();
+    if (raw.ok()) decoded_ = *std::move(raw);
+    return raw.status();
   }
 
   Result<LevelInMemory> DoReadLevel(int level, ReadProgress* /*progress*/, const LevelWanted& wanted) override try {
@@ -179,7 +188,7 @@ class DecodedSource : public VolumeSource {
   const std::string path_;
   ReadOptions options_;
   const SourceInfo info_;
-  std::mutex mutex_;  // guards what follows; held while it is decoded
+  std::shared_mutex mutex_;  // guards what follows; held while it is decoded, and shared while it is copied
   std::optional<RawVolume> decoded_;
 };
 

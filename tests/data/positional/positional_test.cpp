@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <thread>
 #include <vector>
 
 #include "data/positional/file_source.h"
@@ -125,6 +127,29 @@ TEST(Positional, ReadsEveryFormatAndTypeAsTheWholeReaderDoes) {
     }
   }
   EXPECT_THAT(Opened(directory / "v.mhd")->info().files, ElementsAre(directory / "v.mhd", directory / "samples"));
+}
+
+// What is decoded as a whole is given away to whoever wants all of it, while others read boxes.
+TEST(Positional, BoxesOfADecodedVolumeAreRightWhileItIsTakenAway) {
+  const TemporaryDirectory directory;
+  const FileSpec spec{.size = {256, 256, 64}, .type = SampleType::kUint8};  // so large that copies overlap
+  std::vector<double> values(CountIn(spec.size));
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = double(i % 251);
+  const std::string path = directory / "v.nrrd";
+  WriteFile(path, NrrdHeader(spec, "raw") + EncodeSamples(spec.type, values, false));
+  const auto source = OpenDecoded(*FindFormat(path, {}), path, {}).value();
+  std::atomic<bool> reading = true;
+  std::thread taker([&] {
+    while (reading) EXPECT_TRUE(source->ReadLevel(0, nullptr, {}).ok());
+  });
+  const Box box{{0, 0, 0}, spec.size};
+  for (int i = 0; i < 50; ++i) {
+    std::vector<std::uint8_t> read(values.size());
+    EXPECT_TRUE(source->ReadNow(0, box, BoxRoom::Dense(box, reinterpret_cast<std::byte*>(read.data()), true)).ok());
+    EXPECT_TRUE(std::ranges::equal(read, values));
+  }
+  reading = false;
+  taker.join();
 }
 
 TEST(Positional, ReadsMapsAndArraysInAnyOrderOfAxes) {
