@@ -57,9 +57,9 @@ double PredictionError(const AnalyticCost& cost, const Measured& measured) {
   const Axis along = measured.plan.setup.camera.traversal_axis == Axis::kX ? Axis::kX : Axis::kY;
   const std::vector<Placement> placements = PlacementsOf(measured.plan);
   double predicted = 0, squares = 0;
-  for (const Placement& placement : placements) predicted += cost.Seconds(placement.box, {.along = along});
+  for (const Placement& placement : placements) predicted += cost(placement.box, {.along = along});
   for (std::size_t i = 0; i < placements.size(); ++i) {
-    const double seconds = cost.Seconds(placements[i].box, {.along = along});
+    const double seconds = cost(placements[i].box, {.along = along});
     if (seconds == 0) continue;  // all its cost is in the halo
     const double ratio = 1e-9 * double(measured.nanoseconds[i]) / measured.sum / (seconds / predicted);
     squares += (ratio - 1) * (ratio - 1);
@@ -110,7 +110,7 @@ std::vector<View> ViewsOf(const Subject& subject, const Options& options) {
 
 void Compare(const Subject& subject, const std::vector<View>& views, const Policy& policy, const Options& options) {
   const FrameSetup& setup = subject.setup;
-  const std::unique_ptr<AnalyticCost> cost = setup.renderer->MakeCost({subject.occupied.get(), subject.summary.get(), &setup.transfer});
+  const AnalyticCost cost = setup.renderer->MakeCost({subject.occupied.get(), subject.summary.get(), &setup.transfer});
   Outcome fixed, balanced;
   std::size_t boxes = 0;
   for (View view : views) {
@@ -124,7 +124,7 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
     MeasuredLayouts layouts(options.workers);
     std::shared_ptr<const Layout> layout = layouts.Next(resolved, subject.occupied);
     Measured measured = measure(layout);
-    fixed.Add(measured, view.whole, PredictionError(*cost, measured), 0);
+    fixed.Add(measured, view.whole, PredictionError(cost, measured), 0);
     boxes = measured.nanoseconds.size();
     double moved = 0;
     for (int frame = 0; frame < options.frames; ++frame) {
@@ -136,7 +136,7 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
       layout = next;
     }
     if (options.verbose && options.frames > 0) fmt::print("\n");
-    balanced.Add(measured, view.whole, PredictionError(*cost, measured), moved);
+    balanced.Add(measured, view.whole, PredictionError(cost, measured), moved);
   }
   fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, {}\n", subject.name, policy.decomposition, BalanceByOf(policy), policy.assignment, boxes,
              fixed.Text());
@@ -162,13 +162,7 @@ Status Run(const Options& options) {
   return Status::Ok();
 }
 
-}  // namespace
-}  // namespace slabstream
-
-int main(int argc, char** argv) {
-  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  Options options;
-  const BenchProgram app("How even partitions are, and how much more work they are than the whole volume", "balance_bench");
+void AddOptions(const Command& app, Options& options) {
   AddSubjectOptions(app, options.subject);
   const std::vector<std::string_view> decompositions = NameList(Decompositions());
   options.decompositions.assign(decompositions.begin(), decompositions.end());
@@ -184,5 +178,13 @@ int main(int argc, char** argv) {
   AddInteger(app, "--views", options.views, 1, 1000, "Azimuths, all round");
   AddInteger(app, "--repeats", options.repeats, 1, 1000, "Renderings of each box");
   app.AddFlag("--verbose", options.verbose, "Print the imbalance frame by frame; * where boxes changed");
-  return app.Run(argc, argv, [&options] { return Run(options); });
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  return slabstream::BenchMain(argc, argv, "balance_bench",
+                               "How even partitions are, and how much more work they are than the whole volume", slabstream::AddOptions,
+                               slabstream::Run);
 }

@@ -414,13 +414,7 @@ Status Run(const Options& options) {
   return Status::Ok();
 }
 
-}  // namespace
-}  // namespace slabstream
-
-int main(int argc, char** argv) {
-  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  Options options;
-  const BenchProgram app("Times combining among worker processes of this host", "combining_bench");
+void AddOptions(const Command& app, Options& options) {
   const auto scheme = [](const std::string&, const std::string& text) { return TextIf(ParseCombining(text).status(), text); };
   AddList(app, "--ranks", options.ranks, Integers<Rank>(1, 64), "Numbers of workers");
   AddList(app, "--size", options.sizes, Integers(8, 8192), "Pixels a side, multiples of 8");
@@ -436,5 +430,12 @@ int main(int argc, char** argv) {
   };
   AddParsed(app, "--compress", options.compression, compression, "Whether images are packed: auto, on or off").TypeName("NAME");
   AddInteger(app, "--repeats", options.repeats, 1, 100000, "Frames of each scheme");
-  return app.Run(argc, argv, [&options] { return Run(options); });
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  return slabstream::BenchMain(argc, argv, "combining_bench", "Times combining among worker processes of this host", slabstream::AddOptions,
+                               slabstream::Run);
 }

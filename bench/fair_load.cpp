@@ -105,15 +105,11 @@ Large Ask(Client& client, const LargeCase& of, const FairLoadOptions& options, c
 
 Status MeasureFairLoad(const FairLoadOptions& options) {
   const TemporaryDirectory temporary;
-  const ServiceProcesses service({.directory = temporary.path(),
-                                  .volume = options.volume,
-                                  .other_volume = kSmall,
-                                  .workers = options.workers,
-                                  .threads = options.threads});
+  const ServiceProcesses service({.directory = temporary.path(), .size = options.service, .other_volume = kSmall});
   Context context;
   Client small = service.Connect(context), large = service.Connect(context);
-  fmt::print("sphere {0}^3 at {1}x{1} beside sphere {2}^3 at {2}x{2}, {3} workers of {4} threads\n", options.volume, options.size, kSmall,
-             options.workers, options.threads);
+  fmt::print("sphere {0}^3 at {1}x{1} beside sphere {2}^3 at {2}x{2}, {3} workers of {4} threads\n", options.service.volume, options.size,
+             kSmall, options.service.workers, options.service.threads);
   Status status;
   int number = 0;
   CHECK(large.Render(LargeFrame(kLargeCases[0], options, number)).ok());  // the voxels travel once

@@ -2,15 +2,15 @@
 // how long the small pictures take, and what the large ones lose.
 #pragma once
 
+#include "bench/service_processes.h"
 #include "common/base/status.h"
 
 namespace slabstream {
 
 struct FairLoadOptions {
-  int volume = 512;              // voxels a side of the large requests' sphere
-  int size = 1024;               // pixels a side of their pictures
-  int workers = 2, threads = 1;  // threads: of each worker
-  int samples = 16;              // in each voxel length, of the intensity projection
+  ServiceSize service;  // with the large requests' sphere
+  int size = 1024;      // pixels a side of their pictures
+  int samples = 16;     // in each voxel length, of the intensity projection
 };
 
 // Large requests of three kinds (intensity projections of many samples; kd-trees; open policies) run alone. Then they run beside an endless

@@ -23,7 +23,8 @@ namespace {
 constexpr int kWarmUpFrames = 20;
 
 struct Options {
-  int volume = 64, size = 512, frames = 200, workers = 2, threads = 1;
+  ServiceSize service;
+  int size = 512, frames = 200;
   double zoom = 1;  // at 3 the object fills the picture
   bool straight8 = false;
   const RendererKind* renderer = &DefaultRenderer();
@@ -88,8 +89,7 @@ void PrintRow(const std::string& name, const Measured& measured) {
 
 // Call before this process has threads.
 Measured MeasureProcesses(const Options& options, const std::string& listen, const std::string& directory) {
-  const ServiceProcesses service(
-      {.directory = directory, .listen = listen, .volume = options.volume, .workers = options.workers, .threads = options.threads});
+  const ServiceProcesses service({.directory = directory, .listen = listen, .size = options.service});
   Context context;
   Client client = service.Connect(context);
   return Measure(client, "sphere", options);
@@ -97,8 +97,7 @@ Measured MeasureProcesses(const Options& options, const std::string& listen, con
 
 // With keys: pictures straight from workers, and through the coordinator. Call before this process has threads.
 std::pair<Measured, Measured> MeasureWithKeys(const Options& options, const std::string& directory) {
-  const ServiceProcesses service(
-      {.directory = directory, .volume = options.volume, .workers = options.workers, .threads = options.threads, .keys = true});
+  const ServiceProcesses service({.directory = directory, .size = options.service, .keys = true});
   Context context;
   Client direct = service.Connect(context), relayed = service.Connect(context, false);
   return {Measure(direct, "sphere", options), Measure(relayed, "sphere", options)};
@@ -113,34 +112,34 @@ Measured MeasureEmbedded(const Options& options, const std::shared_ptr<const Vol
 Status Run(const Options& options) {
   const TemporaryDirectory temporary;
   const std::string directory = temporary.path();
-  const auto sphere = std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kHollow, .size = options.volume}).value());
-  fmt::print("sphere {0}^3, {1}x{1}, zoom {2}, {3}, {4} workers of {5} threads, {6} frames\n", options.volume, options.size, options.zoom,
-             options.renderer->name(), options.workers, options.threads, options.frames);
+  const auto [volume, workers, threads] = options.service;
+  const auto sphere = std::make_shared<const Volume>(MakeSphere({.sphere_class = SphereClass::kHollow, .size = volume}).value());
+  fmt::print("sphere {0}^3, {1}x{1}, zoom {2}, {3}, {4} workers of {5} threads, {6} frames\n", volume, options.size, options.zoom,
+             options.renderer->name(), workers, threads, options.frames);
   PrintHead();
   const std::pair<const char*, std::string> transports[] = {{"tcp", "tcp://127.0.0.1:*"}, {"ipc", "ipc://" + directory + "/service"}};
   for (const auto& [name, listen] : transports) PrintRow(name, MeasureProcesses(options, listen, directory));
   const auto [direct, relayed] = MeasureWithKeys(options, directory);
   PrintRow("keys, direct", direct);
   PrintRow("keys, relayed", relayed);
-  PrintRow("embedded", MeasureEmbedded(options, sphere, options.workers, options.threads));
-  if (options.workers > 1) PrintRow("embedded, 1", MeasureEmbedded(options, sphere, 1, options.workers * options.threads));
+  PrintRow("embedded", MeasureEmbedded(options, sphere, workers, threads));
+  if (workers > 1) PrintRow("embedded, 1", MeasureEmbedded(options, sphere, 1, workers * threads));
   return Status::Ok();
+}
+
+void AddOptions(const Command& app, Options& options) {
+  AddServiceSize(app, options.service);
+  AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side");
+  AddInteger(app, "--frames", options.frames, 1, 100000, "Measured frames");
+  AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
+  app.AddFlag("--straight8", options.straight8, "Ask for the codes of a PNG of 8 bits, a quarter of the bytes");
+  AddRenderer(app, options.renderer);
 }
 
 }  // namespace
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
-  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  Options options;
-  const BenchProgram app("The latency of a frame beside its rendering", "latency_bench");
-  AddInteger(app, "--volume", options.volume, 2, 1024, "Voxels a side of the sphere");
-  AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side");
-  AddInteger(app, "--frames", options.frames, 1, 100000, "Measured frames");
-  AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
-  AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
-  AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
-  app.AddFlag("--straight8", options.straight8, "Ask for the codes of a PNG of 8 bits, a quarter of the bytes");
-  AddRenderer(app, options.renderer);
-  return app.Run(argc, argv, [&options] { return Run(options); });
+  return slabstream::BenchMain(argc, argv, "latency_bench", "The latency of a frame beside its rendering", slabstream::AddOptions,
+                               slabstream::Run);
 }

@@ -27,8 +27,11 @@ constexpr Duration kAnswerWait = std::chrono::milliseconds(200);
 constexpr Duration kReportInterval = std::chrono::seconds(10);
 
 struct Options {
-  int clients = 200, seconds = 600, workers = 2, threads = 1, volume = 64, size = 128, large = 8192;
+  ServiceSize service;
+  int clients = 200, seconds = 600, size = 128, large = 8192;
   int memory_mebi = 1024;  // of each process
+  bool fair = false;
+  int samples = FairLoadOptions{}.samples;
 };
 
 FrameRequest RequestOf(int size, int frame) {
@@ -87,11 +90,7 @@ class Load {
   Status Run() {
     const TemporaryDirectory temporary;
     const std::string memory = fmt::format("{}MiB", options_.memory_mebi);
-    const ServiceProcesses service({.directory = temporary.path(),
-                                    .volume = options_.volume,
-                                    .workers = options_.workers,
-                                    .threads = options_.threads,
-                                    .arguments_of_each = {"--memory", memory}});
+    const ServiceProcesses service({.directory = temporary.path(), .size = options_.service, .arguments_of_each = {"--memory", memory}});
     return Measure(service);
   }
 
@@ -100,8 +99,9 @@ class Load {
     Context context;
     std::vector<Client> clients;
     for (int i = 0; i < options_.clients; ++i) clients.push_back(service.Connect(context));
-    fmt::print("sphere {0}^3, {1} clients of {2}x{2} pixels, {3} workers of {4} threads, {5} MiB for each process\n", options_.volume,
-               options_.clients - 2, options_.size, options_.workers, options_.threads, options_.memory_mebi);
+    fmt::print("sphere {0}^3, {1} clients of {2}x{2} pixels, {3} workers of {4} threads, {5} MiB for each process\n",
+               options_.service.volume, options_.clients - 2, options_.size, options_.service.workers, options_.service.threads,
+               options_.memory_mebi);
 
     Counts good, large;
     std::vector<std::jthread> threads;
@@ -147,28 +147,26 @@ class Load {
   const Options options_;
 };
 
+Status Run(const Options& options) {
+  if (!options.fair) return Load(options).Run();
+  return MeasureFairLoad({.service = options.service, .size = options.large, .samples = options.samples});
+}
+
+void AddOptions(const Command& app, Options& options) {
+  AddInteger(app, "--clients", options.clients, 3, 1000, "Clients, with the one that never reads and the one that asks for large pictures");
+  AddInteger(app, "--seconds", options.seconds, 20, 86400, "Duration; a quarter of it without those two");
+  AddServiceSize(app, options.service);
+  AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side of most pictures");
+  AddInteger(app, "--large", options.large, 1, 16384, "Pixels a side of the large pictures");
+  app.AddFlag("--fair", options.fair, "Instead: small frames beside large requests of another client, of --volume and --large");
+  AddInteger(app, "--samples", options.samples, 1, 16, "With --fair: samples in each voxel length of the large intensity projection");
+  AddInteger(app, "--memory", options.memory_mebi, 256, 1 << 20, "MiB for the coordinator, and for each worker");
+}
+
 }  // namespace
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
-  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  Options options;
-  const BenchProgram app("A service under the load of many clients, one of which never reads", "load_bench");
-  AddInteger(app, "--clients", options.clients, 3, 1000, "Clients, with the one that never reads and the one that asks for large pictures");
-  AddInteger(app, "--seconds", options.seconds, 20, 86400, "Duration; a quarter of it without those two");
-  AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
-  AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
-  AddInteger(app, "--volume", options.volume, 2, 1024, "Voxels a side of the sphere");
-  AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side of most pictures");
-  AddInteger(app, "--large", options.large, 1, 16384, "Pixels a side of the large pictures");
-  bool fair = false;
-  int samples = FairLoadOptions{}.samples;
-  app.AddFlag("--fair", fair, "Instead: small frames beside large requests of another client, of --volume and --large");
-  AddInteger(app, "--samples", samples, 1, 16, "With --fair: samples in each voxel length of the large intensity projection");
-  AddInteger(app, "--memory", options.memory_mebi, 256, 1 << 20, "MiB for the coordinator, and for each worker");
-  return app.Run(argc, argv, [&] {
-    if (!fair) return Load(options).Run();
-    return MeasureFairLoad(
-        {.volume = options.volume, .size = options.large, .workers = options.workers, .threads = options.threads, .samples = samples});
-  });
+  return slabstream::BenchMain(argc, argv, "load_bench", "A service under the load of many clients, one of which never reads",
+                               slabstream::AddOptions, slabstream::Run);
 }

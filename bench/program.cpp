@@ -1,7 +1,7 @@
 #include "bench/program.h"
 
 #include "common/base/version.h"
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/count_drawn.h"
 #include "common/text/parse_number.h"
 
@@ -26,11 +26,13 @@ Result<BenchCase> ParseSubject(const SubjectOptions& options, const std::string&
 
 }  // namespace
 
-BenchProgram::BenchProgram(const std::string& description, const std::string& program)
-    : Program(description, program, std::string(Version())) {}
-
-int BenchProgram::Run(int argc, const char* const* argv, const std::function<Status()>& run) const {
-  return RunMain(name(), [&] { return ParseAndRun(*this, argc, argv, run); });
+int BenchMain(int argc, const char* const* argv, const std::string& name, const std::string& description,
+              const std::function<void(const Command&)>& add_options, const std::function<Status()>& run) {
+  return RunMain(name, [&] {
+    const Program program(description, name, std::string(Version()));
+    add_options(program);
+    return ParseAndRun(program, argc, argv, run);
+  });
 }
 
 Option AddRenderer(const Command& app, const RendererKind*& target, const std::string& help) {

@@ -22,12 +22,18 @@
 
 namespace slabstream {
 
-// A program of this folder.
-struct BenchProgram : Program {
-  BenchProgram(const std::string& description, const std::string& name);
-  // Parses the command line and runs; returns the exit status. For main alone.
-  int Run(int argc, const char* const* argv, const std::function<Status()>& run) const;
-};
+// The program `name`: parses the command line and runs `run`; returns the exit status. For main alone.
+int BenchMain(int argc, const char* const* argv, const std::string& name, const std::string& description,
+              const std::function<void(const Command&)>& add_options, const std::function<Status()>& run);
+
+// The same with `add_options(app, options)`, which adds the options of the command line, and `run(options)`.
+template <class Options>
+int BenchMain(int argc, const char* const* argv, const std::string& name, const std::string& description,
+              void (*add_options)(const Command& app, Options& options), Status (*run)(const Options& options)) {
+  Options options;
+  return BenchMain(
+      argc, argv, name, description, [&](const Command& app) { add_options(app, options); }, [&] { return run(options); });
+}
 
 // A list in one argument: "A,B". `parse` as in AddParsed.
 template <class T, class Parse>

@@ -5,6 +5,7 @@
 
 #include "client/service/service_state.h"
 #include "common/base/check.h"
+#include "common/cli/add_option.h"
 #include "common/files/program_beside.h"
 #include "common/volume/sphere.h"
 #include "data/volume_io/volume_writer.h"
@@ -30,19 +31,25 @@ Child StartCoordinator(const ServiceProcessesOptions& options) {
     CHECK(WriteVolume(MakeSphere({.sphere_class = SphereClass::kHollow, .size = size}).value(), file).ok());
     arguments.insert(arguments.end(), {"--data", name + "=" + file});
   };
-  add("sphere", options.volume);
+  add("sphere", options.size.volume);
   if (options.other_volume > 0) add("other", options.other_volume);
   return StartProgram(options, "slabstream-coordinator", arguments);
 }
 
 }  // namespace
 
+void AddServiceSize(const Command& app, ServiceSize& size) {
+  AddInteger(app, "--volume", size.volume, 2, 1024, "Voxels a side of the sphere");
+  AddInteger(app, "--workers", size.workers, 1, 64, "Workers");
+  AddInteger(app, "--threads", size.threads, 1, 64, "Render threads of each worker");
+}
+
 ServiceProcesses::ServiceProcesses(const ServiceProcessesOptions& options) : coordinator_(StartCoordinator(options)) {
   const std::string line = coordinator_.ReadLine(kPatience).value();
   endpoint_ = ValueIn(line, "client");
   if (options.keys) keys_ = KeysIn(options);
-  for (int i = 0; i < options.workers; ++i) {
-    std::vector<std::string> arguments = {"--threads", std::to_string(options.threads)};
+  for (int i = 0; i < options.size.workers; ++i) {
+    std::vector<std::string> arguments = {"--threads", std::to_string(options.size.threads)};
     if (options.keys) {
       arguments.insert(arguments.end(), {"--service", keys_ + "/worker.json"});
     } else {

@@ -8,15 +8,23 @@
 
 #include "client/client.h"
 #include "client/service/process.h"
+#include "common/cli/command.h"
 
 namespace slabstream {
 
+// What the command lines of these programs say about the service.
+struct ServiceSize {
+  int volume = 64;               // voxels a side of the sphere
+  int workers = 2, threads = 1;  // threads: of each worker
+};
+// --volume, --workers and --threads.
+void AddServiceSize(const Command& app, ServiceSize& size);
+
 struct ServiceProcessesOptions {
-  std::string directory;                       // for the volume, the log and ipc files
-  std::string listen = "tcp://127.0.0.1:*";    // where the coordinator listens
-  int volume = 64;                             // voxels a side of the sphere
+  std::string directory;                     // for the volume, the log and ipc files
+  std::string listen = "tcp://127.0.0.1:*";  // where the coordinator listens
+  ServiceSize size;
   int other_volume = 0;                        // voxels a side of a second sphere; 0: there is none
-  int workers = 2, threads = 1;                // threads: of each worker
   bool keys = false;                           // connections are encrypted; keys are made in the directory
   std::vector<std::string> arguments_of_each;  // further ones, of the coordinator and of each worker
 };

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "bench/program.h"
+#include "common/base/check.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/validate.h"
+#include "laboratory/measure/wake_up_probe.h"
 
 namespace slabstream {
 namespace {
@@ -23,14 +25,15 @@ std::string Microseconds(const Estimate& e) { return fmt::format("{:.1f} us [{:.
 std::string Percent(const Estimate& e) { return fmt::format("{:.1f} % [{:.1f}, {:.1f}]", e.median * 100, e.low * 100, e.high * 100); }
 
 void PrintMachine() {
-  const Calibration calibration = CalibrateThisHost(2).value();
-  const CombiningCosts& c = calibration.machine.combining;
+  WakeUpProbe probe;
+  CHECK(probe.Sample(kCalibrationSamples).ok());
+  const WakeUpEstimates wake_ups = probe.Estimates();
+  const CombiningCosts c = ThisHost(2).combining;
   fmt::print(
       "ns a pixel: scan {:.3f}, encode {:.3f}, combine {:.3f}, local {:.3f}, hidden {:.3f}; wake-up to a thread that is awake {}, asleep "
-      "{}; "
-      "two halves of a sphere slow each other down by {}\n",
+      "{}\n",
       c.scan_pixel * 1e9, c.encode_pixel * 1e9, c.combine_pixel * 1e9, c.local_pixel * 1e9, c.hidden_pixel * 1e9,
-      Microseconds(calibration.wake_ups.awake), Microseconds(calibration.wake_ups.asleep), Percent(calibration.memory_slowdown));
+      Microseconds(wake_ups.awake), Microseconds(wake_ups.asleep));
 }
 
 void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, const Options& options) {
@@ -65,17 +68,18 @@ Status Run(const Options& options) {
   return Status::Ok();
 }
 
-}  // namespace
-}  // namespace slabstream
-
-int main(int argc, char** argv) {
-  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
-  const BenchProgram app("Frames of the service beside simulated ones", "simulation_bench");
-  Options options;
+void AddOptions(const Command& app, Options& options) {
   app.AddTexts("CASE", options.cases, "Standard cases of `slabstream bench`, or FILE[:TRANSFER]").Required();
   AddInteger(app, "--size", options.size, 16, 2048, "Pixels a side");
   AddInteger(app, "--views", options.views, 1, 1000, "Azimuths over a turn");
   AddInteger(app, "--turns", options.turns, 1, 1000, "Frames of each view, measured and simulated");
   AddRenderer(app, options.renderer, "Instead of the case's");
-  return app.Run(argc, argv, [&options] { return Run(options); });
+}
+
+}  // namespace
+}  // namespace slabstream
+
+int main(int argc, char** argv) {
+  return slabstream::BenchMain(argc, argv, "simulation_bench", "Frames of the service beside simulated ones", slabstream::AddOptions,
+                               slabstream::Run);
 }

@@ -18,9 +18,9 @@ constexpr std::int64_t kMaxDeadlineMs = 86'400'000;
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(auto event) {
   const auto what = [](auto& known) -> decltype(ClientEvent::what) {
-    if constexpr (AnyOf<std::decay_t<decltype(known)>, FrameProgress, Picture, Status>) return std::move(known);
+    if constexpr (AnyOf<std::decay_t<decltype(known)>, FrameProgress, Picture, StatusReply, Status>) return std::move(known);
     if constexpr (requires { QuestionReply(std::move(known)); }) return QuestionReply(std::move(known));
-    return Status::Internal("the service answered another question");
+    return Status::Internal("nobody waits for the answer to an order");
   };
   return {event.request, std::visit(what, event.what)};
 }
@@ -76,7 +76,8 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
 template <class Message>
 RequestId Client::Impl::Ask(Message message, Duration patience) {
   const RequestId id = message.nonce = ++last_id;
-  questions[id] = {patience, MonotonicNow() + patience, AnyOf<Message, StatusQuery, ShutDown, KeysOrder, DataOrder>};
+  const bool order = requires { Order(message); };
+  questions[id] = {patience, MonotonicNow() + patience, order, Event::Asked(std::in_place_type<Message>).index()};
   // What the service would refuse to decode is refused here, by the same rules.
   if (const auto checked = Decode<ClientToCoordinator>(Encode(message), 0); !checked.ok()) {
     End(id, checked.status());
@@ -91,6 +92,8 @@ RequestId Client::Impl::Ask(Message message, Duration patience) {
 RequestId Client::Submit(Question question, Duration deadline) {
   return std::visit([&](auto& query) { return impl_->Ask(std::move(query), deadline); }, question);
 }
+
+RequestId Client::Submit(StatusQuery question, Duration timeout) { return impl_->Ask(question, timeout); }
 
 void Client::Cancel(RequestId request) {
   impl_->questions.erase(request);
@@ -123,8 +126,7 @@ Result<Reply> Client::Impl::Await(RequestId id) {
   Event::What end = std::move(std::ranges::find(events.rbegin(), events.rend(), id, &Event::request)->what);
   std::erase_if(events, [id](const Event& event) { return event.request == id; });
   if (auto* failure = std::get_if<Status>(&end)) return std::move(*failure);
-  if (auto* reply = std::get_if<Reply>(&end)) return std::move(*reply);
-  return Status::Internal("the service answered another question");
+  return std::get<Reply>(std::move(end));
 }
 
 Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) { return impl_->Await<Picture>(Submit(request, deadline)); }

@@ -34,7 +34,7 @@ struct Picture {
 
 struct ClientEvent {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, QuestionReply, Status> what;  // Status: the request failed
+  std::variant<FrameProgress, Picture, QuestionReply, StatusReply, Status> what;  // Status: the request failed
 };
 
 // Where a service is.
@@ -74,7 +74,8 @@ class Client {
   // A question about what a dataset holds; its nonce is filled in. It ends with a QuestionReply or a Status. If its dataset is not loaded,
   // it is loaded first.
   RequestId Submit(Question question, Duration deadline = kAnswerTime);
-  void Cancel(RequestId request);  // cancels a question, too: nothing more is heard of it
+  RequestId Submit(StatusQuery question, Duration timeout);  // about the service; ends with a StatusReply or a Status
+  void Cancel(RequestId request);                            // cancels a question, too: nothing more is heard of it
 
   // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
   // service stops answering, every open request gets an Unavailable event. A request that the service has lost, because it was started

@@ -7,6 +7,7 @@
 #include "client/decode_picture.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
+#include "common/threads/guarded.h"
 #include "common/wire/other_version.h"
 
 namespace slabstream {
@@ -131,7 +132,14 @@ void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
                                      refusal = Status(refused.status.code(), endpoint + ": " + refused.status.message());
                                    End(refused.nonce, refused.status);
                                  },
-                                 [&](auto& reply) { End(reply.nonce, std::move(reply)); },
+                                 [&](auto& reply) {
+                                   const auto asked = questions.find(reply.nonce);
+                                   if (asked == questions.end()) return;
+                                   Event::What answer = std::move(reply);
+                                   if (answer.index() != asked->second.answer)
+                                     answer = Status::Internal("the service answered another question");
+                                   End(asked->first, std::move(answer));
+                                 },
                                  [](VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
 }
@@ -144,13 +152,15 @@ void Client::Impl::OpenDirectPictures() {
 
 void Client::Impl::MatchPictures() {
   if (!direct) return;
-  if (open.empty()) return direct->Clear();  // what has come is of requests that were cancelled
   for (DirectPictures::Reply& reply : direct->TakeCome()) Handle(std::move(reply));
+  if (open.empty()) direct->DropUnclaimed();  // they are of requests that were cancelled
 }
 
 bool Client::Impl::ExpirePictures(Time now) {
-  const std::vector<FrameReply> lost = direct ? direct->TakeLost(now) : std::vector<FrameReply>();
-  for (const FrameReply& reply : lost) {
+  const std::vector<DirectPictures::Lost> lost = direct ? direct->TakeLost(now) : std::vector<DirectPictures::Lost>();
+  for (const auto& [reply, missing_bytes] : lost) {
+    received_bytes += missing_bytes;  // the service counts them as sent: they must not be unread for ever
+    TellReceived();
     const auto found = open.find(reply.request);
     if (found == open.end() || reply.groups_done < reply.group_count) continue;  // previews are not repeated
     found->second.message.pictures.reset();
@@ -182,7 +192,7 @@ void Client::Impl::Handle(DirectPictures::Reply complete) {
   FrameReply& reply = complete.message;
   const auto found = open.find(reply.request);
   if (found == open.end()) return;
-  Result<Picture> picture = DecodePicture(reply, complete.runs, found->second.message.frame.size);
+  Result<Picture> picture = Guarded("the picture", [&] { return DecodePicture(reply, complete.runs, found->second.message.frame.size); });
   if (!picture.ok()) {
     End(reply.request, picture.status());
     return;

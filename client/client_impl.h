@@ -35,13 +35,17 @@ struct Client::Impl {
   struct OpenQuestion {
     Duration patience{};
     Time deadline;
-    bool order = false;  // services answer those at once; a wakeup ends the wait for one
+    bool order = false;      // services answer those at once; a wakeup ends the wait for one
+    std::size_t answer = 0;  // what answers it, as Event::What counts
   };
 
+  using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder>;
   using OrderReply = std::variant<StatusReply, ShutDownReply, KeysReply, DataReply>;
 
   struct Event {
-    using What = Merged<std::variant<FrameProgress, Picture, Status>, QuestionReply, OrderReply>;
+    using OfFrames = std::variant<FrameProgress, Picture, Status>;
+    using What = Merged<OfFrames, QuestionReply, OrderReply>;
+    using Asked = Merged<OfFrames, Question, Order>;  // each question and order stands where What has its answer
     RequestId request = 0;
     What what;
   };

@@ -91,11 +91,16 @@ std::vector<DirectPictures::Reply> DirectPictures::TakeCome() {
   return come;
 }
 
-std::vector<FrameReply> DirectPictures::TakeLost(Time now) {
-  std::vector<FrameReply> lost;
+std::vector<DirectPictures::Lost> DirectPictures::TakeLost(Time now) {
+  std::vector<Lost> lost;
   std::erase_if(awaited_, [&](Awaited& awaited) {
     if (now < awaited.until) return false;
-    lost.push_back(std::move(awaited.reply.message));
+    std::uint64_t missing_bytes = 0;
+    for (std::size_t share = 0; share < awaited.reply.runs.size(); ++share) {
+      const PictureShare& wanted = awaited.reply.message.shares[share];
+      if (wanted.direct && awaited.reply.runs[share].empty()) missing_bytes += wanted.runs.encoded_bytes;
+    }
+    lost.push_back({std::move(awaited.reply.message), missing_bytes});
     return true;
   });
   return lost;
@@ -107,9 +112,13 @@ Time DirectPictures::NextLoss() const {
   return next;
 }
 
-void DirectPictures::Clear() {
+void DirectPictures::DropUnclaimed() {
   arrived_.clear();
   arrived_bytes_ = 0;
+}
+
+void DirectPictures::Clear() {
+  DropUnclaimed();
   awaited_.clear();
 }
 

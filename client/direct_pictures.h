@@ -45,9 +45,14 @@ class DirectPictures {
   void Await(Reply reply, Time until) { awaited_.push_back({std::move(reply), until}); }
   // The awaited replies of which all runs have come, in the order in which they were awaited.
   std::vector<Reply> TakeCome();
-  std::vector<FrameReply> TakeLost(Time now);
+  struct Lost {
+    FrameReply message;
+    std::uint64_t missing_bytes = 0;  // of the direct runs that have not come
+  };
+  std::vector<Lost> TakeLost(Time now);
   Time NextLoss() const;  // Time::max(): nothing is awaited
-  void Clear();           // nobody waits for anything any more
+  void DropUnclaimed();   // the runs that no awaited reply names
+  void Clear();           // the service is gone: nobody waits for anything any more
 
  private:
   struct Awaited {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/time.h"
+#include "common/threads/guarded.h"
 #include "common/wire/any_message.h"
 
 namespace slabstream {
@@ -39,10 +40,12 @@ void FileUpload::Add(Bytes bytes) {
 
 void FileUpload::Run(Context& context, const ServiceAddress& service) {
   Result<Socket> socket = Socket::Dealer(context, {.client_keys = service.keys});
-  Status status = socket.status();
-  if (status.ok()) status = socket->Connect(service.endpoint);
-  if (status.ok()) status = socket->Send({}, Encode(order_));
-  if (status.ok()) status = Serve(*socket);
+  const Status status = Guarded("the upload", [&]() -> Status {
+    Status so_far = socket.status();
+    if (so_far.ok()) so_far = socket->Connect(service.endpoint);
+    if (so_far.ok()) so_far = socket->Send({}, Encode(order_));
+    return so_far.ok() ? Serve(*socket) : so_far;
+  });
   if (!status.ok()) return events_.changed(status);
   (void)socket->Send({}, Encode(DropVolume{kUploadNonce}));  // it lingers as long as the destructor says
 }

@@ -12,7 +12,7 @@
 #include "client/client.h"
 #include "common/base/status.h"
 #include "common/memory/bytes.h"
-#include "common/wire/volume_messages.h"
+#include "common/wire/client_messages.h"
 
 namespace slabstream {
 

@@ -3,6 +3,10 @@
 
 repository="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 
+# What compiling and running all programs needs, by the first words of the lines of deploy/packages.
+# shellcheck disable=SC2034  # scripts use it
+compiling=(run build pictures build-pictures)
+
 say() { printf '== %s\n' "$*"; }
 fail() {
   printf '%s: %s\n' "$(basename "$0")" "$*" >&2

@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "common/base/check.h"
-#include "common/cli/parse.h"
+#include "common/text/split.h"
 
 namespace slabstream {
 namespace {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "client/pictures/picture_writer.h"
-#include "client/report/frame_json.h"
 #include "client/report/frame_spans.h"
 #include "client/report/frame_summary.h"
 #include "client/request/camera_file.h"
@@ -16,8 +15,6 @@ namespace slabstream {
 namespace {
 
 constexpr std::size_t kMaxTimelineEntries = 4096;
-
-double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
 
 Json TimelineJson(const FrameStatistics& statistics) {
   Json entries = Json::array();
@@ -36,10 +33,6 @@ Json TimelineJson(const FrameStatistics& statistics) {
 
 Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool timeline) {
   const FrameSummary summary = Summarize(statistics);
-  Json stages = Json::object();
-  for (int stage = 0; stage < kStageCount; ++stage) {
-    stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
-  }
   Json json = {{"latency_ms", Milliseconds(latency.count())},
                {"queued_ms", Milliseconds(statistics.queued_ns)},
                {"attempts", statistics.attempts},
@@ -49,7 +42,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                {"idle_share", summary.idle_share},
                {"levels", LevelsJson(statistics)},
                {"bytes", BytesJson(summary)},
-               {"stages_ms", std::move(stages)},
+               {"stages_ms", StagesJson(summary)},
                {"plan",
                 {{"renderer", statistics.renderer},
                  {"decomposition", statistics.decomposition},

@@ -16,6 +16,7 @@
 #include "client/report/dataset_text.h"
 #include "client/report/status_text.h"
 #include "common/base/log.h"
+#include "common/threads/guarded.h"
 #include "gateway/assets.h"
 #include "gateway/content_coding.h"
 #include "gateway/metrics.h"
@@ -27,8 +28,7 @@
 #include "gateway/request_fields.h"
 #include "gateway/request_trace.h"
 #include "gateway/service_link.h"
-#include "gateway/service_monitor.h"
-#include "gateway/target.h"
+#include "gateway/service_news.h"
 #include "gateway/uploads.h"
 #include "gateway/view_session.h"
 
@@ -56,8 +56,13 @@ class Gateway::Impl : public HttpApplication {
         routes_(Routes()) {}
 
   ~Impl() override {
-    RequestStop();
+    stopping_ = true;
+    asio::post(io_, [this] { Stop(); });
     if (thread_.joinable()) thread_.join();
+    monitor_.reset();
+    link_.reset();
+    movies_->Join();
+    encoders_.join();
   }
 
   Status Start() {
@@ -72,39 +77,31 @@ class Gateway::Impl : public HttpApplication {
         HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, limits, *this);
     if (!server.ok()) return server.status();
     server_ = *std::move(server);
-    port_ = server_->port();
     link_ = std::make_unique<ServiceLink>(context_, service_);
     pictures_.emplace(io_, encoders_, metrics_, *link_, options_.max_renders);
     questions_.emplace(io_, metrics_, *link_);
-    monitor_ = std::make_unique<ServiceMonitor>(context_, service_, [this](std::shared_ptr<const ServiceNews> news) {
-      asio::post(io_, [this, news = std::move(news)]() mutable { OnNews(std::move(news)); });
+    monitor_ = std::make_unique<ServiceLink>(context_, service_);
+    asio::post(io_, [this] {
+      AskStatus();
+      Beat();
     });
-    asio::post(io_, [this] { Beat(); });
-    thread_ = std::thread([this] { io_.run(); });
+    thread_ = std::thread([this] { Run(); });
     return Status::Ok();
   }
 
-  std::uint16_t port() const { return port_; }
+  // A request that finds no memory must not end the others: what its handler throws goes no further.
+  void Run() {
+    while (true) {
+      const Status ran = Guarded("a request", [this] { io_.run(); });
+      if (ran.ok()) return;
+      LogError(ran.message());
+    }
+  }
 
   std::string url(bool with_token) const {
-    const bool v6 = options_.listen.host.find(':') != std::string::npos;
-    const std::string host = v6 ? "[" + options_.listen.host + "]" : options_.listen.host;
-    const std::string origin =
-        !options_.proxy_origin.empty() ? options_.proxy_origin : fmt::format("{}://{}:{}", options_.tls ? "https" : "http", host, port_);
-    return origin + (with_token ? "/#token=" + options_.token : "/");
-  }
-
-  void RequestStop() {
-    if (stopping_.exchange(true)) return;
-    asio::post(io_, [this] { Stop(); });
-  }
-
-  void WaitUntilStopped() {
-    if (thread_.joinable()) thread_.join();
-    monitor_.reset();
-    link_.reset();
-    movies_->Join();
-    encoders_.join();
+    const std::string host = HostOf({.host = options_.listen.host, .port = server_->port()});
+    const std::string own = fmt::format("{}://{}", options_.tls ? "https" : "http", host);
+    return (options_.proxy_origin.empty() ? own : options_.proxy_origin) + (with_token ? "/#token=" + options_.token : "/");
   }
 
   // ---- HttpApplication
@@ -217,9 +214,7 @@ class Gateway::Impl : public HttpApplication {
         .handle = answer([this] { return news_->health == ServiceHealth::kGone ? ServiceGone() : JsonReply(StatusJson(news_->status)); })};
     routes["/api/v1/datasets"] = {.handle = answer([this] {
                                     if (news_->health == ServiceHealth::kGone) return ServiceGone();
-                                    Json datasets = Json::array();
-                                    for (const DatasetStatus& dataset : news_->status.datasets) datasets.push_back(DatasetJson(dataset));
-                                    return JsonReply({{"datasets", std::move(datasets)}});
+                                    return JsonReply({{"datasets", DatasetsJson(news_->status.datasets)}});
                                   })};
     const auto bind = [](auto& requests, auto method) {
       return [&requests, method](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
@@ -302,6 +297,34 @@ class Gateway::Impl : public HttpApplication {
     return answer;
   }
 
+  // How the service is, once a second, and more often while it is gone.
+  void AskStatus() {
+    constexpr Duration kPatience = std::chrono::seconds(2);
+    monitor_->Ask(StatusQuery{}, kPatience, [this](Result<ServiceLink::Answer> answer) {
+      asio::post(io_, [this, answer = std::move(answer)] {
+        if (!stopping_) OnStatus(answer);
+      });
+    });
+  }
+
+  void OnStatus(const Result<ServiceLink::Answer>& answer) {
+    // First: it must ask again even if there is no memory for what follows.
+    next_status_.expires_after(answer.ok() ? std::chrono::milliseconds(1000) : std::chrono::milliseconds(250));
+    next_status_.async_wait([this](boost::system::error_code error) {
+      if (!error && !stopping_) AskStatus();
+    });
+    auto news = std::make_shared<ServiceNews>(*news_);
+    news->health = ServiceHealth::kGone;
+    news->reason = answer.status().message();
+    if (answer.ok()) {
+      news->status = std::get<StatusReply>(*answer);
+      const bool alone = news->status.workers.empty();
+      news->health = alone ? ServiceHealth::kNoWorkers : ServiceHealth::kReady;
+      news->reason = alone ? "the service has no workers" : "";
+    }
+    OnNews(std::move(news));
+  }
+
   void OnNews(std::shared_ptr<const ServiceNews> news) {
     if (news->health != news_->health) {
       Log(news->health == ServiceHealth::kReady ? LogLevel::kInfo : LogLevel::kWarning,
@@ -313,20 +336,21 @@ class Gateway::Impl : public HttpApplication {
 
   // Once a second, even while the service does not answer: so pages notice when their connection has died without a word.
   void Beat() {
+    beat_.expires_after(std::chrono::seconds(1));
+    beat_.async_wait([this](boost::system::error_code error) {
+      if (!error && !stopping_) Beat();
+    });
     const Time now = MonotonicNow();
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) {
       session->SendStatus();
       uploads_->Touch(session->dataset(), now);
     }
     uploads_->RemoveUnseen(now);
-    beat_.expires_after(std::chrono::seconds(1));
-    beat_.async_wait([this](boost::system::error_code error) {
-      if (!error) Beat();
-    });
   }
 
   void Stop() {
     beat_.cancel();
+    next_status_.cancel();
     monitor_->RequestStop();
     link_->RequestStop();
     movies_->Stop();
@@ -347,13 +371,12 @@ class Gateway::Impl : public HttpApplication {
   Metrics metrics_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_;
-  asio::steady_timer beat_{io_};
+  asio::steady_timer beat_{io_}, next_status_{io_};
   const std::shared_ptr<TraceSender> traces_;  // null: nobody wants any
   asio::thread_pool encoders_;
   std::unique_ptr<HttpServer> server_;
-  std::uint16_t port_ = 0;
   std::unique_ptr<ServiceLink> link_;
-  std::unique_ptr<ServiceMonitor> monitor_;
+  std::unique_ptr<ServiceLink> monitor_;
   std::optional<PictureRequests> pictures_;
   std::optional<QuestionRequests> questions_;
   const std::unique_ptr<MovieRequests> movies_;
@@ -367,10 +390,7 @@ class Gateway::Impl : public HttpApplication {
 };
 
 Gateway::Gateway(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Gateway::~Gateway() {
-  RequestStop();
-  WaitUntilStopped();
-}
+Gateway::~Gateway() = default;
 
 Result<std::unique_ptr<Gateway>> Gateway::Start(Context& context, ServiceAddress service, GatewayOptions options) {
   auto impl = std::make_unique<Impl>(context, std::move(service), std::move(options));
@@ -378,9 +398,6 @@ Result<std::unique_ptr<Gateway>> Gateway::Start(Context& context, ServiceAddress
   return std::unique_ptr<Gateway>(new Gateway(std::move(impl)));
 }
 
-std::uint16_t Gateway::port() const { return impl_->port(); }
 std::string Gateway::url(bool with_token) const { return impl_->url(with_token); }
-void Gateway::RequestStop() { impl_->RequestStop(); }
-void Gateway::WaitUntilStopped() { impl_->WaitUntilStopped(); }
 
 }  // namespace slabstream

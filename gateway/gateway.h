@@ -4,10 +4,10 @@
 //   Gateway               who may ask; routes                                        io thread
 //   ViewSession           one view of one page                                       io thread
 //   ServiceLink           a client of the service: one for all requests over HTTP,   one each
-//                         one for each session, one for each movie
+//                         one for each session, one for each movie, and one that
+//                         asks how the service is, once a second
 //   PictureRequests, QuestionRequests, MovieRequests                               io thread
 //                         what is asked for over HTTP
-//   ServiceMonitor        asks how the service is, once a second                     its own
 //   encoders              compress pictures                                          one a core
 //   makers                make movies (turntable_movie.h)                            one for each movie
 //   TraceSender           sends traces of requests (request_trace.h)                 its own
@@ -44,16 +44,12 @@ struct GatewayOptions {
 
 class Gateway {
  public:
-  // Serves at once, on a thread of its own, whether the service answers or not. `context` must outlive it. InvalidArgument: options, among
-  // them an address off loopback without TLS or proxy; Unavailable: the address.
+  // Serves at once, on a thread of its own, until it is destroyed, whether the service answers or not. `context` must outlive it.
+  // InvalidArgument: options, among them an address off loopback without TLS or proxy; Unavailable: the address.
   static Result<std::unique_ptr<Gateway>> Start(Context& context, ServiceAddress service, GatewayOptions options);
   ~Gateway();
 
-  std::uint16_t port() const;
   std::string url(bool with_token) const;
-
-  void RequestStop();  // any thread, signal handlers too
-  void WaitUntilStopped();
 
  private:
   class Impl;

@@ -11,7 +11,7 @@
 #include "common/metrics/exposition.h"
 #include "common/otlp/trace_sender.h"
 #include "common/wire/client_messages.h"
-#include "gateway/service_monitor.h"
+#include "gateway/service_news.h"
 
 namespace slabstream {
 

@@ -13,8 +13,8 @@
 #include "client/pictures/picture_writer.h"
 #include "client/request/camera_file.h"
 #include "client/request/request_options.h"
-#include "common/base/printable.h"
 #include "common/cli/parse.h"
+#include "common/threads/guarded.h"
 #include "gateway/request_fields.h"
 
 namespace slabstream {
@@ -28,51 +28,34 @@ Result<PathText> ParsePath(const std::string& text, const PictureFields& fields)
       return Status::InvalidArgument(fmt::format("path excludes {}", field.name));
     }
   }
-  Result<PathText> path = ParseCameraPath(text);
-  if (!path.ok()) return Printable(path.status());
-  return path;
+  return ParseCameraPath(text);
 }
 
 Result<TurntableRequest> ParseTurntable(PictureFields fields) {
+  FieldReader read(std::move(fields));
   TurntableRequest request;
-  const Result<std::string> path_text = TakeOr(fields, "path", "");
-  if (!path_text.ok()) return path_text.status();
+  const std::string path_text = read.Get("path", "");
   std::optional<PathText> path;
-  if (!path_text->empty()) {
-    Result<PathText> parsed = ParsePath(*path_text, fields);
-    if (!parsed.ok()) return parsed.status();
-    path = *std::move(parsed);
-  }
-  const Result<std::string> frames_text = TakeOr(fields, "frames", ""), turns_text = TakeOr(fields, "turns", "1"),
-                            fps_text = TakeOr(fields, "fps", fmt::format("{:g}", MovieShape().frames_per_second));
-  for (const Result<std::string>* text : {&frames_text, &turns_text, &fps_text}) {
-    if (!text->ok()) return text->status();
-  }
-  Result<RenderRequest> render = ParseRenderFields(fields);
-  if (!render.ok()) return render.status();
-  request.render = *std::move(render);
-  const Result<int> turns = ParseInteger("turns", *turns_text, 0, kMaxTurns);
-  if (!turns.ok()) return Printable(turns.status());
-  const Result<double> fps = ParseNumber("fps", *fps_text, {kMinFramesPerSecond, kMaxFramesPerSecond});
-  if (!fps.ok()) return Printable(fps.status());
-  const std::string usual_frames = std::to_string(path && path->timed ? std::llround(path->seconds() * *fps) + 1 : kMovieFrames);
-  const Result<int> frames = ParseInteger("frames", frames_text->empty() ? usual_frames : *frames_text, 1, kMaxMovieFrames);
-  if (!frames.ok()) return Printable(frames.status());
-  request.frames = *frames;
-  request.move.turns = *turns;
+  if (!path_text.empty()) path = read.Value(ParsePath(path_text, read.rest()));
+  const std::string frames = read.Get("frames", ""), turns = read.Get("turns", "1"),
+                    fps = read.Get("fps", fmt::format("{:g}", MovieShape().frames_per_second));
+  request.render = read.Value(ParseRenderFields(read.rest()));
+  request.move.turns = read.Value(ParseInteger("turns", turns, 0, kMaxTurns));
+  request.frames_per_second = read.Value(ParseNumber("fps", fps, {kMinFramesPerSecond, kMaxFramesPerSecond}));
+  const std::int64_t usual_frames = path && path->timed ? std::llround(path->seconds() * request.frames_per_second) + 1 : kMovieFrames;
+  request.frames = read.Value(ParseInteger("frames", frames.empty() ? std::to_string(usual_frames) : frames, 1, kMaxMovieFrames));
   if (path) request.move.cameras = std::move(path->cameras);
-  request.frames_per_second = *fps;
   const auto [width, height] = request.render.frame.size;
   if (std::int64_t{width} * height > kMaxMoviePixels) {
-    return Status::InvalidArgument(fmt::format("--size {}x{} has {} pixels, frames of movies at most {}", width, height,
-                                               std::int64_t{width} * height, kMaxMoviePixels));
+    read.Refuse(fmt::format("--size {}x{} has {} pixels, frames of movies at most {}", width, height, std::int64_t{width} * height,
+                            kMaxMoviePixels));
   }
   if (request.render.frame.view.eye && request.move.turns > 0) {
-    return Status::InvalidArgument(
-        "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; turns=0 fixes the view");
+    read.Refuse("--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; turns=0 fixes the view");
   }
-  if (Status status = CheckShape(StreamFormat(), {request.render.frame.size, *fps}); !status.ok()) return status;
-  if (Status status = CheckCanDraw(request.render.format.annotations); !status.ok()) return status;
+  read.Check(CheckShape(StreamFormat(), {request.render.frame.size, request.frames_per_second}));
+  read.Check(CheckCanDraw(request.render.format.annotations));
+  if (!read.status().ok()) return read.status();
   return request;
 }
 
@@ -89,7 +72,7 @@ void MovieRequests::Turntable(PictureFields fields, ReplyFunction reply, const G
   const auto movie = std::make_shared<TurntableMovie>(io_, context_, service_, metrics_, *std::move(request));
   movies_.insert(movie);
   boost::asio::post(makers_, [this, movie] {
-    Status status = movie->Make();
+    Status status = Guarded("the movie", [&] { return movie->Make(); });
     boost::asio::post(io_, [this, movie, status = std::move(status)]() mutable {
       movies_.erase(movie);  // first: whoever has read a movie to its end may ask for the next
       movie->End(std::move(status));

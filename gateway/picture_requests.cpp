@@ -9,6 +9,7 @@
 #include "client/pictures/picture_writer.h"
 #include "client/request/picture_record.h"
 #include "common/classification/transfer_function.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {
@@ -42,7 +43,8 @@ void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> f
       boost::asio::post(encoders_, [this, type, encode, finish, held, trace] {
         const Time begin = MonotonicNow();
         const std::string renderer = held->pictures.front().statistics.renderer;
-        auto file = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
+        auto file =
+            std::make_shared<const Result<std::vector<std::byte>>>(Guarded("the picture", [&] { return encode(std::move(*held)); }));
         if (file->ok()) metrics_.CountPicture("file", (*file)->size(), MonotonicNow() - begin);
         if (trace != nullptr) trace->AddEncoding(begin);
         finish([type, file, renderer] { return FileReply(type, *file, renderer); });

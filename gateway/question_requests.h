@@ -1,9 +1,12 @@
 // Requests for what datasets hold. All calls on the io thread.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "client/request/picture_fields.h"
+#include "common/json/json.h"
+#include "gateway/request_fields.h"
 #include "gateway/requests_under_way.h"
 
 namespace slabstream {
@@ -24,7 +27,13 @@ class QuestionRequests {
 
  private:
   using MakeFunction = std::function<HttpReply(const QuestionReply&)>;
-  void Ask(std::string_view name, Question question, const MakeFunction& make, ReplyFunction reply, const Gone& gone);
+  // Replies with the mistake of `read` if there is one.
+  void Ask(std::string_view name, const FieldReader& read, Question question, const MakeFunction& make, ReplyFunction reply,
+           const Gone& gone);
+  // A question about a dataset alone, whose answer becomes JSON.
+  template <class Query, class Reply>
+  void AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), PictureFields fields, ReplyFunction reply,
+                    const Gone& gone);
 
   Metrics& metrics_;
   ServiceLink& link_;

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "client/request/key_of_picture.h"
+#include "common/base/log.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {
@@ -45,17 +47,16 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
 
 ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline,
                                         Handlers handlers) {
-  std::optional<Question> question;
+  std::optional<Inquiry> question;
   if (annotations.needs_key()) question = SummaryQuery{.dataset = frames.front().dataset, .transfer = frames.front().transfer};
-  return Post({.frames = std::move(frames),
-               .deadline = deadline,
-               .handlers = std::move(handlers),
-               .question = std::move(question),
-               .answered = {}});
+  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = std::move(question)});
 }
 
-ServiceLink::Ticket ServiceLink::Ask(Question question, Duration deadline, AnswerHandler done) {
-  return Post({.frames = {}, .deadline = deadline, .handlers = {}, .question = std::move(question), .answered = std::move(done)});
+ServiceLink::Ticket ServiceLink::Ask(Inquiry question, Duration deadline, AnswerHandler done) {
+  const auto answered = [done = std::move(done)](Result<Rendered> rendered) {
+    done(rendered.ok() ? Result<Answer>(*std::move(rendered->answer)) : Result<Answer>(rendered.status()));
+  };
+  return Post({.frames = {}, .deadline = deadline, .handlers = {.progress = {}, .done = answered}, .question = std::move(question)});
 }
 
 void ServiceLink::Cancel(Ticket ticket) {
@@ -71,18 +72,35 @@ void ServiceLink::Run() {
       const std::lock_guard lock(mutex_);
       if (stopping_) break;
     }
-    if (client_ == nullptr) Connect();
-    TakeOrders();
-    if (client_ == nullptr) {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, kConnectPause, [this] { return stopping_ || !tasks_.empty(); });
-    } else if (std::optional<ClientEvent> event = client_->Next(kIdle)) {
-      Handle(*std::move(event));
-    }
+    const Status done = Guarded("the link to the service", [this] { Turn(); });
+    if (!done.ok()) FailAll(done);
   }
   while (!open_.empty()) Forget(open_.begin());
   const std::lock_guard lock(mutex_);
   client_.reset();
+}
+
+void ServiceLink::Turn() {
+  if (client_ == nullptr) Connect();
+  TakeOrders();
+  if (client_ == nullptr) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kConnectPause, [this] { return stopping_ || !tasks_.empty(); });
+  } else if (std::optional<ClientEvent> event = client_->Next(kIdle)) {
+    Handle(*std::move(event));
+  }
+}
+
+void ServiceLink::FailAll(const Status& why) {
+  LogError(why.message());
+  while (!open_.empty()) {
+    OpenTask task = std::move(open_.begin()->second);
+    for (const RequestId id : task.requests) {
+      if (requests_.erase(id) > 0) client_->Cancel(id);
+    }
+    open_.erase(open_.begin());
+    (void)Guarded("the link to the service", [&] { task.handlers.done(why); });  // it may lack memory, too
+  }
 }
 
 void ServiceLink::Connect() {
@@ -110,8 +128,6 @@ void ServiceLink::TakeOrders() {
   for (Task& task : tasks) {
     if (client_ != nullptr) {
       Begin(std::move(task));
-    } else if (task.answered) {
-      task.answered(Status::Unavailable(reason_.message()));
     } else {
       task.handlers.done(Status::Unavailable(reason_.message()));
     }
@@ -121,10 +137,12 @@ void ServiceLink::TakeOrders() {
 void ServiceLink::Begin(Task task) {
   OpenTask& open = open_[task.ticket];
   open.handlers = std::move(task.handlers);
-  open.answered = std::move(task.answered);
   open.rendered.pictures.resize(task.frames.size());
   for (const FrameRequest& frame : task.frames) open.requests.push_back(client_->Submit(frame, task.deadline));
-  if (task.question) open.requests.push_back(client_->Submit(*std::move(task.question), task.deadline));
+  if (task.question) {
+    const auto submit = [&](auto& question) { return client_->Submit(std::move(question), task.deadline); };
+    open.requests.push_back(std::visit(submit, *task.question));
+  }
   open.left = open.requests.size();
   for (const RequestId request : open.requests) requests_[request] = task.ticket;
   if (!task.frames.empty()) open.first = std::move(task.frames.front());
@@ -135,13 +153,6 @@ void ServiceLink::Handle(ClientEvent event) {
   if (request == requests_.end()) return;
   const auto found = open_.find(request->second);
   OpenTask& task = found->second;
-  if (task.answered) {
-    const AnswerHandler answered = std::move(task.answered);
-    requests_.erase(request);
-    open_.erase(found);
-    auto* failed = std::get_if<Status>(&event.what);
-    return answered(failed != nullptr ? Result<QuestionReply>(std::move(*failed)) : std::get<QuestionReply>(std::move(event.what)));
-  }
   if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
     if (task.handlers.progress) task.handlers.progress(*progress);
     return;
@@ -153,13 +164,16 @@ void ServiceLink::Handle(ClientEvent event) {
     Forget(found);
     return done(std::move(status));
   }
-  if (auto* answer = std::get_if<QuestionReply>(&event.what)) {
-    task.rendered.key = KeyOf(task.first, std::get<SummaryReply>(*answer));
-  } else {
-    auto& picture = std::get<Picture>(event.what);
-    if (!picture.final) return;
+  if (auto* picture = std::get_if<Picture>(&event.what)) {
+    if (!picture->final) return;
     const auto place = std::ranges::find(task.requests, event.request) - task.requests.begin();
-    task.rendered.pictures[std::size_t(place)] = std::move(picture);
+    task.rendered.pictures[std::size_t(place)] = std::move(*picture);
+  } else if (auto* status = std::get_if<StatusReply>(&event.what)) {
+    task.rendered.answer = std::move(*status);
+  } else if (task.rendered.pictures.empty()) {
+    task.rendered.answer = std::get<QuestionReply>(std::move(event.what));
+  } else {
+    task.rendered.key = KeyOf(task.first, std::get<SummaryReply>(std::get<QuestionReply>(event.what)));
   }
   requests_.erase(request);
   if (--task.left > 0) return;

@@ -23,10 +23,13 @@ namespace slabstream {
 class ServiceLink {
  public:
   using Ticket = std::uint64_t;
-  using AnswerHandler = std::function<void(Result<QuestionReply>)>;
+  using Inquiry = std::variant<Question, StatusQuery>;
+  using Answer = std::variant<QuestionReply, StatusReply>;
+  using AnswerHandler = std::function<void(Result<Answer>)>;
   struct Rendered {
     std::vector<Picture> pictures;  // one for each frame
     PictureKey key;                 // the key of the first frame, if it was asked for
+    std::optional<Answer> answer;   // to a question without frames
   };
   struct Handlers {
     std::function<void(const FrameProgress&)> progress;  // may be empty
@@ -43,7 +46,7 @@ class ServiceLink {
   // handlers are called on the link's thread. Unavailable: the service does not answer.
   Ticket Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline, Handlers handlers);
   // Any thread. As Render; `done` is called on the link's thread, once, unless the ticket was cancelled before.
-  Ticket Ask(Question question, Duration deadline, AnswerHandler done);
+  Ticket Ask(Inquiry question, Duration deadline, AnswerHandler done);
   // Any thread. The handlers may still be called if they are about to be.
   void Cancel(Ticket ticket);
   // Any thread, returns at once: the link's thread begins to end. Then the destructor hardly waits.
@@ -55,20 +58,20 @@ class ServiceLink {
     std::vector<FrameRequest> frames;
     Duration deadline{};
     Handlers handlers;
-    std::optional<Question> question;  // instead of frames, or about the key of the first one
-    AnswerHandler answered;
+    std::optional<Inquiry> question;  // instead of frames, or about the key of the first one
   };
   struct OpenTask {
     Handlers handlers;
     std::vector<RequestId> requests;  // one for each frame, and that of the question
     FrameRequest first;               // frame
     Rendered rendered;
-    std::size_t left = 0;    // requests that are not finished
-    AnswerHandler answered;  // instead of `handlers`, if there is a question alone
+    std::size_t left = 0;  // requests that are not finished
   };
 
   Ticket Post(Task task);
   void Run();
+  void Turn();
+  void FailAll(const Status& why);  // ends every open task
   void Connect();
   void TakeOrders();
   void Begin(Task task);

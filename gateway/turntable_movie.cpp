@@ -96,7 +96,7 @@ Status TurntableMovie::StartEncoder() {
 }
 
 Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
-  link.Ask(std::move(query), kAnswerDeadline, [this](Result<QuestionReply> reply) {
+  link.Ask(std::move(query), kAnswerDeadline, [this](Result<ServiceLink::Answer> reply) {
     const std::lock_guard lock(mutex_);
     answer_ = std::move(reply);
     changed_.notify_one();
@@ -104,9 +104,9 @@ Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return abandoned_ || answer_; });
   if (abandoned_) return Status::Cancelled("nobody reads it");
-  const Result<QuestionReply> reply = *std::exchange(answer_, std::nullopt);
+  const Result<ServiceLink::Answer> reply = *std::exchange(answer_, std::nullopt);
   if (!reply.ok()) return reply.status();
-  return std::get<ViewReply>(*reply);
+  return std::get<ViewReply>(std::get<QuestionReply>(*reply));
 }
 
 Result<ServiceLink::Rendered> TurntableMovie::Take(int index) {

@@ -68,7 +68,7 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   std::condition_variable changed_;
   std::unique_ptr<MovieEncoder> encoder_;                  // made and ended by Make's thread
   std::map<int, Result<ServiceLink::Rendered>> pictures_;  // pictures that have come, and were not taken yet
-  std::optional<Result<QuestionReply>> answer_;            // an answer that has come, and was not taken yet
+  std::optional<Result<ServiceLink::Answer>> answer_;      // an answer that has come, and was not taken yet
   bool abandoned_ = false;
 };
 

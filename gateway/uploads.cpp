@@ -5,31 +5,25 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <cctype>
-#include <charconv>
+#include <optional>
 #include <utility>
 
 #include "common/base/printable.h"
 #include "common/http/address.h"
-#include "gateway/request_fields.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::size_t kMostNameBytes = 128;
 
-Result<std::uint64_t> TakeCount(PictureFields& fields, const std::string& name, std::string_view purpose, std::uint64_t least) {
-  const Result<std::string> text = Take(fields, name, purpose);
-  if (!text.ok()) return text.status();
-  std::uint64_t count = 0;
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), count);
-  if (error == std::errc() && end == text->data() + text->size() && count >= least && count <= kMaxSentFileBytes) return count;
-  return Status::InvalidArgument(
-      fmt::format("{} is '{}', must be a whole number from {} to {}", name, Printable(text->substr(0, 32)), least, kMaxSentFileBytes));
-}
-
-Status NothingElse(const PictureFields& fields) {
-  if (fields.empty()) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("there is no option '{}'", Printable(fields.front().name.substr(0, 64))));
+std::uint64_t NeedCount(FieldReader& read, const std::string& name, std::string_view purpose, std::uint64_t least) {
+  const std::string text = read.Need(name, purpose);
+  const std::optional<std::uint64_t> count = ParseNumber<std::uint64_t>(text);
+  if (count && *count >= least && *count <= kMaxSentFileBytes) return *count;
+  read.Refuse(
+      fmt::format("{} is '{}', must be a whole number from {} to {}", name, Printable(text.substr(0, 32)), least, kMaxSentFileBytes));
+  return least;
 }
 
 // A name that no dataset has: that of the file without its endings, and a number if need be.
@@ -58,16 +52,17 @@ std::string FileNameForService(std::string_view name) {
 
 void Uploads::Handle(PictureFields fields, std::string body, const std::vector<std::string>& taken, ReplyFunction reply, const Gone& gone) {
   if (most_bytes_ == 0) return reply(Failure(403, "this gateway takes no files: it was started with --max-upload 0"));
-  if (std::ranges::find(fields, "file", &PictureField::name) != fields.end()) return Begin(std::move(fields), taken, reply);
-  const Result<std::string> id = Take(fields, "upload", "what the request with `file` and `bytes` has answered");
-  if (!id.ok()) return reply(Failure(id.status()));
-  const Place upload = uploads_.find(*id);
+  FieldReader read(std::move(fields));
+  if (read.Has("file")) return Begin(std::move(read), taken, reply);
+  const std::string id = read.Need("upload", "what the request with `file` and `bytes` has answered");
+  if (!read.status().ok()) return reply(Failure(read.status()));
+  const Place upload = uploads_.find(id);
   if (upload == uploads_.end()) {
     constexpr auto kMinutes = std::chrono::duration_cast<std::chrono::minutes>(kUnseen).count();
     return reply(Failure(404, fmt::format("there is no such upload: it failed, or was removed after {} minutes unseen", kMinutes)));
   }
   upload->second.used = MonotonicNow();
-  if (std::ranges::find(fields, "drop", &PictureField::name) != fields.end()) {
+  if (read.Has("drop")) {
     const ReplyFunction waiting = std::move(upload->second.waiting);
     uploads_.erase(upload);
     if (waiting) waiting(Failure(404, "the upload was dropped"));
@@ -78,21 +73,20 @@ void Uploads::Handle(PictureFields fields, std::string body, const std::vector<s
     uploads_.erase(upload);
     return reply(Failure(why));
   }
-  const Result<std::uint64_t> begin = TakeCount(fields, "begin", "where in the file the body begins", 0);
-  if (!begin.ok()) return reply(Failure(begin.status()));
-  if (const Status all = NothingElse(fields); !all.ok()) return reply(Failure(all));
-  Continue(upload, *begin, std::move(body), std::move(reply), gone);
+  const std::uint64_t begin = NeedCount(read, "begin", "where in the file the body begins", 0);
+  read.NothingElse();
+  if (!read.status().ok()) return reply(Failure(read.status()));
+  Continue(upload, begin, std::move(body), std::move(reply), gone);
 }
 
-void Uploads::Begin(PictureFields fields, const std::vector<std::string>& taken, const ReplyFunction& reply) {
-  const Result<std::string> file = Take(fields, "file", "the name of the file");
-  if (!file.ok()) return reply(Failure(file.status()));
-  const Result<std::uint64_t> bytes = TakeCount(fields, "bytes", "the size of the file", 1);
-  if (!bytes.ok()) return reply(Failure(bytes.status()));
-  if (const Status all = NothingElse(fields); !all.ok()) return reply(Failure(all));
-  if (*bytes > most_bytes_) {
+void Uploads::Begin(FieldReader read, const std::vector<std::string>& taken, const ReplyFunction& reply) {
+  const std::string file = read.Need("file", "the name of the file");
+  const std::uint64_t bytes = NeedCount(read, "bytes", "the size of the file", 1);
+  read.NothingElse();
+  if (!read.status().ok()) return reply(Failure(read.status()));
+  if (bytes > most_bytes_) {
     metrics_.CountRefusal("upload");
-    return reply(Failure(413, fmt::format("the file has {} bytes; this gateway takes at most {} (--max-upload)", *bytes, most_bytes_)));
+    return reply(Failure(413, fmt::format("the file has {} bytes; this gateway takes at most {} (--max-upload)", bytes, most_bytes_)));
   }
   if (uploads_.size() >= kMaxUploadsKept) {
     metrics_.CountRefusal("uploads");
@@ -100,13 +94,13 @@ void Uploads::Begin(PictureFields fields, const std::vector<std::string>& taken,
   }
   Result<std::string> id = MakeToken();
   if (!id.ok()) return reply(Failure(id.status()));
-  const std::string name = FileNameForService(*file);
+  const std::string name = FileNameForService(file);
   Upload upload;
   upload.dataset = DatasetNameFor(name, [&](const std::string& dataset) {
     return std::ranges::find(taken, dataset) != taken.end() ||
            std::ranges::any_of(uploads_, [&](const auto& other) { return other.second.dataset == dataset; });
   });
-  upload.bytes = *bytes;
+  upload.bytes = bytes;
   upload.used = MonotonicNow();
   const auto here = [this, id = *id, alive = std::weak_ptr<bool>(alive_)](auto method) {
     return [this, id, alive, method](auto what) {
@@ -115,7 +109,7 @@ void Uploads::Begin(PictureFields fields, const std::vector<std::string>& taken,
       });
     };
   };
-  upload.sender = std::make_unique<FileUpload>(context_, service_, upload.dataset, SentFile{name, *bytes},
+  upload.sender = std::make_unique<FileUpload>(context_, service_, upload.dataset, SentFile{name, bytes},
                                                FileUpload::Events{.sent = here(&Uploads::OnSent), .changed = here(&Uploads::OnChanged)});
   const HttpReply answer = JsonReply({{"upload", *id}, {"dataset", upload.dataset}});
   uploads_.emplace(*std::move(id), std::move(upload));
@@ -129,6 +123,10 @@ void Uploads::Continue(Place upload, std::uint64_t begin, std::string body, Repl
   if (begin > to.received || (begin < to.received && end > to.received) || end > to.bytes) {
     return reply(
         Failure(400, fmt::format("bytes {} to {} of a file of {} bytes, of which {} are here", begin, end, to.bytes, to.received)));
+  }
+  if (begin == to.received && !body.empty() && to.sent < to.received) {
+    return reply(Failure(
+        429, fmt::format("bytes {} to {} are still on their way: send the next part when they are answered", to.sent, to.received)));
   }
   if (begin == to.received && !body.empty()) {
     to.received = end;

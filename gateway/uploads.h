@@ -9,7 +9,6 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,6 +22,7 @@
 #include "common/base/time.h"
 #include "gateway/metrics.h"
 #include "gateway/reply.h"
+#include "gateway/request_fields.h"
 
 namespace slabstream {
 
@@ -62,7 +62,7 @@ class Uploads {
   };
   using Place = std::map<std::string, Upload>::iterator;  // by ID
 
-  void Begin(PictureFields fields, const std::vector<std::string>& taken, const ReplyFunction& reply);
+  void Begin(FieldReader read, const std::vector<std::string>& taken, const ReplyFunction& reply);
   void Continue(Place upload, std::uint64_t begin, std::string body, ReplyFunction reply, const Gone& gone);
   void OnSent(const std::string& id, std::uint64_t bytes);
   void OnChanged(const std::string& id, const Status& status);

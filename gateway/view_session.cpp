@@ -8,6 +8,7 @@
 #include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
 #include "common/base/version.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {
@@ -209,8 +210,13 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
   if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
   Rendering rendering = *std::exchange(rendering_, std::nullopt);
   if (!rendered.ok()) {
-    if (rendered.status().code() == StatusCode::kUnavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
-    SendError(rendering.view.seq, rendered.status());
+    const bool unavailable = rendered.status().code() == StatusCode::kUnavailable;
+    // A service that is there has a reason that people must see, such as a store that does not answer; the picture is tried again.
+    if (!unavailable || (news_->health != ServiceHealth::kGone && told_unavailable_ != rendering.view.seq)) {
+      SendError(rendering.view.seq, rendered.status());
+      told_unavailable_ = rendering.view.seq;
+    }
+    if (unavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
     return Do(machine_.OnRefused(MonotonicNow()));
   }
   RenderedView view = JoinPictures(std::move(rendered->pictures), rendering.size);
@@ -230,7 +236,7 @@ void ViewSession::Encode(bool final, int quality) {
   given_up_ = std::make_shared<std::atomic<bool>>(false);
   const std::uint64_t number = ++encoding_;
   asio::post(around_.encoders, [self = shared_from_this(), view = rendered_, final, quality, given_up = given_up_, number]() mutable {
-    Result<EncodedView> encoded = EncodeView(*view, final, quality, *given_up);
+    Result<EncodedView> encoded = Guarded("the picture", [&] { return EncodeView(*view, final, quality, *given_up); });
     view.reset();
     auto& io = self->around_.io;
     asio::post(io,

@@ -10,14 +10,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "common/http/http.h"
 #include "gateway/frame_message.h"
 #include "gateway/metrics.h"
 #include "gateway/page_message.h"
 #include "gateway/service_link.h"
-#include "gateway/service_monitor.h"
+#include "gateway/service_news.h"
 #include "gateway/view_machine.h"
 
 namespace slabstream {
@@ -79,6 +78,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;
   Time sent_at_{};
+  std::uint64_t told_unavailable_ = 0;  // seq of the view of whose failure the page knows
 };
 
 }  // namespace slabstream

@@ -1,11 +1,14 @@
-// Writes the codecs of messages, the tables of a request's fields and the walk over them, as the schema says: write_codecs SCHEMA FOLDER
+// Writes the structs and codecs of messages, the tables of a request's fields and the walk over them, as the schema says:
+// write_codecs SCHEMA FOLDER
 //
-// SCHEMA is what `protoc --include_imports --descriptor_set_out` writes. For each file of messages FOLDER gets NAME_codec.cpp, with
+// SCHEMA is what `protoc --include_imports --include_source_info --descriptor_set_out` writes. For each file of messages FOLDER gets
+// NAME_codec.cpp, with
 //   void Write(const Ping& in, v1::Ping& out);
 //   void Read(const v1::Ping& in, Ping& out, Checker& check);
 // of each message, out of the parts in common/wire/codec.h; codecs.h, which declares them; and request_walk.h with request_fields.cpp
-// (common/wire/field_about.h). Structs and members have the names of messages and fields, unless the schema says otherwise (about.proto).
-// A file whose text stays the same is not touched.
+// (common/wire/field_about.h). A file with the option `structs` also gets NAME_structs.h: the structs of its messages, with the schema's
+// comments. Structs and members have the names of messages and fields, unless the schema says otherwise (about.proto). A file whose text
+// stays the same is not touched.
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -234,7 +237,7 @@ class Output {
   std::string text_ = "// Made by proto/write_codecs.cpp.\n";
 };
 
-// Those whose codec is made here; of a message with a codec of its own none, unless it says which fields that leaves.
+// Fields whose codec is made here; of a message with a codec of its own none, unless it says which fields that leaves.
 std::vector<const FieldDescriptor*> FieldsOf(const Descriptor& message) {
   std::vector<const FieldDescriptor*> fields;
   for (int i = 0; i < message.field_count(); ++i) {
@@ -243,6 +246,104 @@ std::vector<const FieldDescriptor*> FieldsOf(const Descriptor& message) {
   if (IsOwn(message) && int(fields.size()) == message.field_count()) fields.clear();
   return fields;
 }
+
+// The messages that a message has in it, however deep, and itself at the end.
+void Collect(const Descriptor& message, std::vector<const Descriptor*>& found) {
+  if (std::ranges::count(found, &message) > 0) return;
+  for (const FieldDescriptor* field : FieldsOf(message)) {
+    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) Collect(*field->message_type(), found);
+  }
+  if (!FieldsOf(message).empty()) found.push_back(&message);
+}
+
+// ---- structs
+
+// Lines of a comment in the schema.
+std::vector<std::string> CommentOf(const auto& element) {
+  google::protobuf::SourceLocation place;
+  element.GetSourceLocation(&place);
+  std::istringstream text(place.leading_comments + place.trailing_comments);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);) lines.push_back("//" + line);
+  return lines;
+}
+
+// A line of code with its comment: one line of it stands behind the code.
+void AddWithComment(const auto& element, const std::string& code, Output& file) {
+  const std::vector<std::string> comment = CommentOf(element);
+  if (comment.size() == 1) return file.Line("  {}  {}", code, comment.front());
+  for (const std::string& line : comment) file.Line("  {}", line);
+  file.Line("  {}", code);
+}
+
+std::string MemberTypeOf(const FieldDescriptor& field) {
+  if (!WireOf(field).type().empty()) return WireOf(field).type();
+  if (field.real_containing_oneof() != nullptr || MemberOf(field).find_first_of(".[") != std::string::npos) Reject(field, "needs a type");
+  const auto* message = field.message_type();
+  const auto* choices = field.enum_type();
+  const bool text = field.cpp_type() == FieldDescriptor::CPPTYPE_STRING;
+  const std::string type = message != nullptr   ? StructOf(*message)
+                           : choices != nullptr ? choices->name()
+                           : text               ? "std::string"
+                                                : TypeOf(field);
+  if (field.is_repeated()) return fmt::format("std::vector<{}>", type);
+  return field.has_optional_keyword() ? fmt::format("std::optional<{}>", type) : type;
+}
+
+// The least value that may travel, or nothing.
+std::string InitialOf(const FieldDescriptor& field) {
+  const v1::Wire& wire = WireOf(field);
+  if (!wire.initial().empty()) return wire.initial();
+  if (!wire.type().empty() || field.is_repeated() || field.has_optional_keyword()) return "{}";
+  if (field.enum_type() != nullptr) return Enumerator(*field.enum_type(), 1);
+  if (field.message_type() != nullptr || field.cpp_type() == FieldDescriptor::CPPTYPE_STRING) return "{}";
+  if (field.cpp_type() == FieldDescriptor::CPPTYPE_BOOL) return "false";
+  return fmt::format("{}", std::max(wire.least(), 0.0));
+}
+
+void AddStruct(const Descriptor& message, Output& file) {
+  for (const std::string& line : CommentOf(message)) file.Line("{}", line);
+  file.Line("struct {} {{", StructOf(message));
+  std::string before;
+  for (int i = 0; i < message.field_count(); ++i) {
+    const FieldDescriptor& field = *message.field(i);
+    const std::string member = MemberOf(field).substr(0, MemberOf(field).find_first_of(".["));
+    if (member != before) AddWithComment(field, fmt::format("{} {} = {};", MemberTypeOf(field), member, InitialOf(field)), file);
+    before = member;
+  }
+  file.Line("  friend bool operator==(const {0}&, const {0}&) = default;\n}};\n", StructOf(message));
+}
+
+void AddEnumClass(const EnumDescriptor& choices, Output& file) {
+  for (const std::string& line : CommentOf(choices)) file.Line("{}", line);
+  file.Line("enum class {} : std::uint8_t {{", choices.name());
+  for (int number = 1; number < choices.value_count(); ++number) {
+    const std::string name = Enumerator(choices, number).substr(choices.name().size() + 2);
+    AddWithComment(*choices.value(number), fmt::format("{} = {},", name, number), file);
+  }
+  file.Line("}};\n");
+}
+
+Output StructsOf(const FileDescriptor& schema) {
+  const v1::Structs& structs = schema.options().GetExtension(v1::structs);
+  const auto made = [&](const std::string& name) { return std::ranges::count(structs.by_hand(), name) == 0; };
+  Output file;
+  file.Line("#pragma once\n#include <cstdint>\n#include <optional>\n#include <string>\n#include <vector>\n");
+  for (const std::string& header : structs.include()) file.Line("#include \"{}\"", header);
+  file.Line("\nnamespace slabstream {{\n");
+  for (int i = 0; i < schema.enum_type_count(); ++i) {
+    if (made(schema.enum_type(i)->name())) AddEnumClass(*schema.enum_type(i), file);
+  }
+  std::vector<const Descriptor*> messages;
+  for (int i = 0; i < schema.message_type_count(); ++i) Collect(*schema.message_type(i), messages);
+  for (const Descriptor* message : messages) {
+    if (message->file() == &schema && made(message->name())) AddStruct(*message, file);
+  }
+  file.Line("}}  // namespace slabstream");
+  return file;
+}
+
+// ---- codecs
 
 void AddCodec(const Descriptor& message, Output& file) {
   const std::vector<const FieldDescriptor*> fields = FieldsOf(message);
@@ -296,15 +397,6 @@ Output Declarations(const std::vector<const Descriptor*>& messages, const Descri
   }
   file.Line("}}  // namespace slabstream");
   return file;
-}
-
-// The messages that a message has in it, however deep, and itself at the end.
-void Collect(const Descriptor& message, std::vector<const Descriptor*>& found) {
-  if (std::ranges::count(found, &message) > 0) return;
-  for (const FieldDescriptor* field : FieldsOf(message)) {
-    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) Collect(*field->message_type(), found);
-  }
-  if (!FieldsOf(message).empty()) found.push_back(&message);
 }
 
 std::string Quoted(const std::string& text) {
@@ -392,7 +484,9 @@ bool WriteAll(const std::string& schema_file, const std::string& folder) {
     if (file.package() != "slabstream.v1" || name == "about.proto" || name == "envelope.proto") continue;
     const FileDescriptor& schema = *pool.FindFileByName(file.name());
     for (int i = 0; i < schema.message_type_count(); ++i) messages.push_back(schema.message_type(i));
-    if (!CodecsOf(schema).Save(fmt::format("{}/{}_codec.cpp", folder, name.substr(0, name.find('.'))))) return false;
+    const std::string path = fmt::format("{}/{}", folder, name.substr(0, name.find('.')));
+    if (!CodecsOf(schema).Save(path + "_codec.cpp")) return false;
+    if (schema.options().HasExtension(v1::structs) && !StructsOf(schema).Save(path + "_structs.h")) return false;
   }
   Collect(*pool.FindMessageTypeByName("slabstream.v1.FrameRequest"), request);
   return Declarations(messages, envelope).Save(folder + "/codecs.h") && RequestWalk(request).Save(folder + "/request_walk.h") &&

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 #include <set>
 #include <utility>
 
@@ -115,7 +114,6 @@ Timeline FrameSimulation::Run() {
     CHECK_LT(service_.now(), origin_ + kAlarm) << "a frame does not end: its schedule cannot be carried out";
   }
   timeline_.end = now();
-  if (timeline_.end > 0) timeline_.render_share = render_seconds_ / (timeline_.end * double(timeline_.workers));
   return std::move(timeline_);
 }
 
@@ -208,18 +206,8 @@ void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
 
 // ---------------------------------------------------------------- work
 
-auto FrameSimulation::CostOf(const Job& job, const StartRender& action) const -> Cost {
-  const std::uint32_t frame = FrameOf(action.key);
-  return {{inputs_[frame].boxes[action.placement.id].seconds * Slowness(frame, job.node), machine_.threads}};
-}
-
-// Depends on seed, frame and worker alone.
-double FrameSimulation::Slowness(std::uint32_t frame, Node node) const {
-  const Stragglers& stragglers = machine_.stragglers;
-  if (stragglers.probability <= 0) return 1;
-  std::seed_seq seed{std::uint32_t(stragglers.seed), std::uint32_t(stragglers.seed >> 32), frame, node};
-  std::mt19937 engine(seed);
-  return double(engine()) < stragglers.probability * 0x1p32 ? stragglers.factor : 1;
+auto FrameSimulation::CostOf(const Job&, const StartRender& action) const -> Cost {
+  return {{inputs_[FrameOf(action.key)].boxes[action.placement.id].seconds}};
 }
 
 auto FrameSimulation::CostOf(const Job&, const StartCombine& action) -> Cost {
@@ -250,14 +238,14 @@ auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
   job.pixels = amount.filled;
   job.bytes = MessageBytes(action.message.key, amount);
   // The thread that owns the sockets announces a lent image itself if that is quicker, as in workers.
-  return {{costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled + costs.cipher_byte * job.bytes, 1,
+  return {{costs.scan_pixel * amount.scanned + costs.encode_pixel * amount.filled + costs.cipher_byte * job.bytes,
            costs.lent && service_.Idle(job.node, Lane::kCombine)}};
 }
 
 auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {
   const FrameInput& input = inputs_[frame_of_.at(action.message.frame)];
   const double cipher = input.picture_bytes * machine_.picture.cipher_byte;
-  return {{(input.finish_seconds + cipher) / action.message.share_count, std::max(machine_.threads, machine_.picture_threads)}};
+  return {{(input.finish_seconds + cipher) / action.message.share_count}};
 }
 
 void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
@@ -268,7 +256,6 @@ void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
   timeline_.frames[frame].stage_seconds[std::size_t(stage)] += now() - begin;
   frames_.at(frame).account.Add(task.worker, task.lane, begin, now());
   if (options_.keep_spans) timeline_.spans.push_back({frame, key.group, task.worker, task.lane, RankOf(job), stage, begin, now()});
-  if (stage == Stage::kRender) render_seconds_ += now() - begin;
 }
 
 WorkerEvent FrameSimulation::Answer(Job& job) {

@@ -65,14 +65,13 @@ class FrameSimulation : private Conditions {
   void Perform(const PlanRequest& action) override;
 
   using Cost = std::optional<WorkCost>;
-  Cost CostOf(const Job& job, const StartRender& action) const;
+  Cost CostOf(const Job&, const StartRender& action) const;
   Cost CostOf(const Job&, const StoreChunk&) const { return {}; }
   Cost CostOf(const Job&, const StartCombine& action);
   Cost CostOf(const Job&, const FindHidden& action) const;
   Cost CostOf(Job& job, const SendPartial& action);
   Cost CostOf(const Job&, const SendFrame& action) const;
   double MessageBytes(const GroupKey& key, const UnionCoverage::Amount& amount) const;
-  double Slowness(std::uint32_t frame, Node node) const;
   void BeginGroup(const GroupAssignment& assignment);
   // When the last byte arrives of a message that leaves at `sent`. Fills in the message's times.
   double Travel(SimulatedMessage message, double sent);
@@ -88,8 +87,7 @@ class FrameSimulation : private Conditions {
 
   std::uint32_t submitted_ = 0, planned_ = 0, received_ = 0;  // frames
   std::map<FrameId, std::uint32_t> frame_of_;
-  std::map<std::uint32_t, Frame> frames_;  // frames that are under way
-  double render_seconds_ = 0;
+  std::map<std::uint32_t, Frame> frames_;              // frames that are under way
   double coordinator_passed_ = 0, client_passed_ = 0;  // they are done with the pictures so far
   Timeline timeline_;
 };

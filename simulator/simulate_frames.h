@@ -24,7 +24,7 @@ namespace slabstream {
 
 // The cost and the image of one box, in one view.
 struct RenderCost {
-  double seconds = 0;                     // time of one thread of a worker of speed 1
+  double seconds = 0;                     // of one thread of a worker
   const CoverageMap* coverage = nullptr;  // what its image covers, in the frame's grid; null: it shows nothing
   double voxel_bytes = 0;                 // bytes that its worker must fetch before it renders; 0: it holds them
 };

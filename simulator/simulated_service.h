@@ -24,7 +24,7 @@ namespace slabstream {
 
 class SimulatedService {
  public:
-  // Both outlive the object. It uses the machine's speeds, the cores, the wake-ups, serial_share and message_seconds.
+  // Both outlive the object. It uses the machine's cores, the wake-ups and message_seconds.
   SimulatedService(const MachineModel& machine, Conditions& conditions);
 
   EventQueue& queue() { return queue_; }

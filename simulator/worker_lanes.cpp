@@ -31,9 +31,8 @@ void WorkerLanes::EndNow(Node worker, Lane lane, std::uint32_t job, double now) 
 void WorkerLanes::Pause(Node worker, Lane lane, std::uint32_t job, double now) {
   LaneState& state = StateOf(worker, lane);
   if (!state.running || state.task.job != job) return;
-  const double left = processors_.Stop(HostOf(worker), NumberOf(worker, lane), now), all = SecondsOf(state.task);
   paused_.push_back(state.task);
-  paused_.back().cost.seconds *= all > 0 ? left / all : 0;
+  paused_.back().cost.seconds = processors_.Stop(HostOf(worker), NumberOf(worker, lane), now);
   BeginNext(NumberOf(worker, lane), now);
 }
 
@@ -76,21 +75,13 @@ void WorkerLanes::BeginNext(std::size_t lane, double now) {
   Begin(lane, now);
 }
 
-// Only the first thread does the serial share of the work.
 void WorkerLanes::Begin(std::size_t lane, double now) {
   LaneTask& task = lanes_[lane].task;
   task.begin = now;
   lanes_[lane].running = true;
-  processors_.Start(HostOf(task.worker), lane, SecondsOf(task), task.cost.threads, now);
-}
-
-double WorkerLanes::SecondsOf(const LaneTask& task) const {
-  const auto& [seconds, threads, direct] = task.cost;
-  return seconds * (1 + (threads - 1) * machine_.serial_share) / threads / SpeedOf(task.worker);
+  processors_.Start(HostOf(task.worker), lane, task.cost.seconds, now);
 }
 
 std::uint32_t WorkerLanes::HostOf(Node worker) const { return worker / std::uint32_t(std::max(machine_.workers_a_host, 1)); }
-
-double WorkerLanes::SpeedOf(Node worker) const { return machine_.speeds.empty() ? 1 : machine_.speeds[worker % machine_.speeds.size()]; }
 
 }  // namespace slabstream

@@ -20,9 +20,8 @@ namespace slabstream {
 using Node = std::uint32_t;  // a worker process of a simulation: 0, 1, ... in the order in which they began
 
 struct WorkCost {
-  double seconds = 0;        // time of one thread of a worker of speed 1
-  std::int32_t threads = 1;  // threads that share the work
-  bool direct = false;       // the thread that owns the sockets does it itself: nothing is handed over
+  double seconds = 0;   // if nothing slows it down
+  bool direct = false;  // the thread that owns the sockets does it itself: nothing is handed over
 };
 
 struct LaneTask {
@@ -78,8 +77,6 @@ class WorkerLanes {
   std::uint32_t HostOf(Node worker) const;
   void Begin(std::size_t lane, double now);
   void BeginNext(std::size_t lane, double now);  // if anything waits
-  double SecondsOf(const LaneTask& task) const;  // if nothing slows it down
-  double SpeedOf(Node worker) const;
 
   const MachineModel& machine_;
   Threads& threads_;

@@ -1,10 +1,8 @@
 #include "client/api/slabstream/client.h"
 
-#include <algorithm>
 #include <atomic>
 #include <limits>
 #include <mutex>
-#include <span>
 #include <variant>
 
 #include "client/client.h"

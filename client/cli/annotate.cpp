@@ -11,6 +11,7 @@
 
 #include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
+#include "client/request/picture_record.h"
 #include "common/cli/program.h"
 #include "common/view/camera.h"
 
@@ -45,24 +46,20 @@ PictureGeometry Geometry(const JsonValue& value) {
   static constexpr std::array<World, 3> kWorlds = {World::kVoxels, World::kScene, World::kPatient};
   static constexpr std::array<std::string_view, 3> kWorldNames = {NameOf(kWorlds[0]), NameOf(kWorlds[1]), NameOf(kWorlds[2])};
   PictureGeometry geometry;
+  static constexpr std::array<std::string_view, 2> kProjections = {NameOf(Projection::kOrthographic), NameOf(Projection::kPerspective)};
+  const auto into = [](Vec3& to) { return [&to](const JsonValue& v) { to = Vector(v); }; };
   value.Fields({{"world", [&](const JsonValue& v) { geometry.world = kWorlds.at(v.OneOf(kWorldNames)); }},
                 {"unit", [&](const JsonValue& v) { geometry.unit = LengthUnit(v.OneOf(kLengthUnitNames) + 1); }},
                 {"projection",
                  [&](const JsonValue& v) {
-                   static constexpr std::array<std::string_view, 2> kNames = {"orthographic", "perspective"};
-                   geometry.projection = v.OneOf(kNames) == 1 ? Projection::kPerspective : Projection::kOrthographic;
+                   geometry.projection = v.OneOf(kProjections) == 1 ? Projection::kPerspective : Projection::kOrthographic;
                  }},
-                {"right", [&](const JsonValue& v) { geometry.right = Vector(v); }},
-                {"up", [&](const JsonValue& v) { geometry.up = Vector(v); }},
-                {"forward", [&](const JsonValue& v) { geometry.forward = Vector(v); }},
-                {"target", [&](const JsonValue& v) { geometry.target = Vector(v); }},
-                {"target_depth",
-                 [&](const JsonValue& v) {
-                   geometry.target_depth = v.Number({-kMost, kMost});
-                 }},
-                {"pixel_size", [&](const JsonValue& v) {
-                   geometry.pixel_size = v.Number({0, kMost, true});
-                 }}});
+                {"right", into(geometry.right)},
+                {"up", into(geometry.up)},
+                {"forward", into(geometry.forward)},
+                {"target", into(geometry.target)},
+                {"target_depth", JsonValue::Into(geometry.target_depth, {-kMost, kMost})},
+                {"pixel_size", JsonValue::Into(geometry.pixel_size, {0, kMost, true})}});
   return geometry;
 }
 
@@ -78,19 +75,13 @@ void ReadKey(const JsonValue& value, PictureKey& key) {
       read.colors.push_back({numbers[0], Color(numbers, 1)});
     };
     v.Fields({{"colors", [&](const JsonValue& colors) { colors.Each(color, 1); }},
-              {"low",
-               [&](const JsonValue& end) {
-                 read.low = end.Number({-kMost, kMost});
-               }},
-              {"high", [&](const JsonValue& end) {
-                 read.high = end.Number({-kMost, kMost});
-               }}});
+              {"low", JsonValue::Into(read.low, {-kMost, kMost})},
+              {"high", JsonValue::Into(read.high, {-kMost, kMost})}});
     if (read.colors.empty() || !(read.low < read.high)) v.Complain("has no colours, or its ends do not rise");
   };
   const auto entry = [&](const JsonValue& v) {
     PictureKey::Entry& read = key.entries.emplace_back();
-    v.Fields({{"name", [&](const JsonValue& name) { read.name = name.Text(); }},
-              {"color", [&](const JsonValue& color) { read.color = Color(Numbers(color, 3), 0); }}});
+    v.Fields({{"name", JsonValue::Into(read.name)}, {"color", [&](const JsonValue& color) { read.color = Color(Numbers(color, 3), 0); }}});
     if (const Status status = CheckTitle("the name", read.name); !status.ok()) v.Complain(status.message());
   };
   value.Fields({{"bar", bar}, {"entries", [&](const JsonValue& v) { v.Each(entry); }}});
@@ -100,13 +91,7 @@ Result<Order> ParseOrder(const std::string& text) {
   const Result<Json> json = ParseJson(text);
   if (!json.ok()) return json.status();
   Order order;
-  Annotations& annotations = order.format.annotations;
   std::optional<std::string> mistake;
-  const auto line = [](const JsonValue& v) {
-    std::string read = v.Text();
-    if (const Status status = CheckTitle("the text", read); !status.ok()) v.Complain(status.message());
-    return read;
-  };
   const auto size = [&](const JsonValue& v) {
     const std::vector<double> sides = Numbers(v, 2);
     for (const double side : sides) {
@@ -123,25 +108,15 @@ Result<Order> ParseOrder(const std::string& text) {
     order.file = PictureFileTypeOf("picture." + v.Text());
     if (!order.file) v.Complain("is no ending of pictures");
   };
-  JsonValue(*json, "", mistake)
-      .Fields({{"size", size},
-               {"background", background},
-               {"file", file},
-               {"depth", [&](const JsonValue& v) { order.format.png_bits = v.Integer(8, 16) == 16 ? 16 : 8; }},
-               {"quality", [&](const JsonValue& v) { order.format.quality = v.Integer(1, 100); }},
-               {"dpi", [&](const JsonValue& v) { order.format.dots_per_inch = v.Integer(1, kMaxDotsPerInch); }},
-               {"font_size",
-                [&](const JsonValue& v) {
-                  annotations.font_size = v.Number({kMinFontSize, kMaxFontSize});
-                }},
-               {"panes", [&](const JsonValue& v) { v.Each([&](const JsonValue& pane) { order.panes.push_back(Geometry(pane)); }, 1); }},
-               {"title", [&](const JsonValue& v) { annotations.title = line(v); }},
-               {"scale_bar", [&](const JsonValue& v) { annotations.scale_bar = v.Boolean(); }},
-               {"orientation_marker", [&](const JsonValue& v) { annotations.orientation_marker = v.Boolean(); }},
-               {"sides_only", [&](const JsonValue& v) { annotations.sides_only = v.Boolean(); }},
-               {"color_bar", [&](const JsonValue& v) { annotations.color_bar = line(v); }},
-               {"legend", [&](const JsonValue& v) { annotations.legend = v.Boolean(); }},
-               {"key", [&](const JsonValue& v) { ReadKey(v, order.key); }}});
+  auto fields = FormatFields(order.format);
+  fields.insert(fields.end(),
+                {{"size", size},
+                 {"background", background},
+                 {"file", file},
+                 {"panes", [&](const JsonValue& v) { v.Each([&](const JsonValue& pane) { order.panes.push_back(Geometry(pane)); }, 1); }},
+                 {"sides_only", JsonValue::Into(order.format.annotations.sides_only)},
+                 {"key", [&](const JsonValue& v) { ReadKey(v, order.key); }}});
+  JsonValue(*json, "", mistake).Fields(fields);
   if (mistake) return Status::InvalidArgument(*mistake);
   if (order.size.width == 0 || order.panes.empty()) return Status::InvalidArgument("size or panes are missing");
   return order;

@@ -10,6 +10,7 @@
 namespace slabstream {
 
 void ByteProgress::Show(std::uint64_t done, std::uint64_t all) {
+  if (guard_.interrupted()) stop_.request_stop();
   if (!done_before_) done_before_ = done;
   const int percent = int(100 * done / all);
   if (std::exchange(percent_, percent) == percent) return;

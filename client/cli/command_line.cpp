@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "client/cli/annotate.h"
-#include "client/cli/commands.h"
 #include "client/cli/completion.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"

@@ -11,11 +11,18 @@
 namespace slabstream {
 
 std::span<const DeclareCommand> ClientCommands();
+// What `--help` of each command shows: the options that most users want, where a command has many, and examples, which manual pages show,
+// too. The program and its commands are declared already.
+void DeclareHelpPages(const CommandLine& line);
 
 Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
 Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
+Status RunMeshInfo(const InfoOptions& options);     // `info`, if the path ends as an unstructured grid's does (LooksLikeMesh)
+Status RunPictureInfo(const InfoOptions& options);  // `info`, if the path ends as a picture's does (IsPicturePath)
+Status RunValue(const ValueOptions& options);
+Status RunMeasure(const MeasureOptions& options);
 Status RunTransfer(const TransferOptions& options);
 Status RunConvert(const ConvertOptions& options);
 Status RunIndex(const IndexingOptions& options);

@@ -1,6 +1,5 @@
 #include "client/cli/completion.h"
 
-#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <memory>

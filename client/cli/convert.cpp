@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "client/cli/commands.h"
-#include "client/cli/convert_source.h"
-#include "client/cli/convert_to_zarr.h"
+#include "client/cli/convert_parts.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
-#include "client/cli/progress_display.h"
+#include "client/cli/progress_text.h"
 #include "common/base/log.h"
 #include "common/files/files.h"
 #include "common/volume/memory_budget.h"

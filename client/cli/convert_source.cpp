@@ -1,4 +1,4 @@
-#include "client/cli/convert_source.h"
+#include "client/cli/convert_parts.h"
 
 #include <fmt/format.h>
 

@@ -1,22 +1,15 @@
-#include "client/cli/convert_to_zarr.h"
+#include "client/cli/convert_parts.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <memory>
-#include <stop_token>
-#include <vector>
 
 #include "client/cli/byte_progress.h"
-#include "client/cli/convert_source.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
-#include "client/cli/progress_display.h"
-#include "common/transport/socket.h"
-#include "common/volume/memory_budget.h"
+#include "client/cli/progress_text.h"
 #include "data/open/read_volume.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 
@@ -61,20 +54,14 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   const VolumeDescription& volume = opened->source->info().levels[0].description;
   const std::uint64_t held = options.memory > 0 ? opened->memory : 0;
 
-  Wakeup wakeup;
-  const InterruptGuard guard(wakeup);
-  std::stop_source stop;
   ByteProgress shown(bar, "writing " + options.output);
-  const auto progress = [&](const OmeZarrProgress& now) {
-    if (guard.interrupted()) stop.request_stop();
-    shown.Show(now.done_bytes, now.all_bytes);
-  };
+  const auto progress = [&](const OmeZarrProgress& now) { shown.Show(now.done_bytes, now.all_bytes); };
   const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
                                       .slices = opened->source->info().slices,
                                       .memory = Share(memory, held).writing,
                                       .source = ShownSource(options.source),
-                                      .stop = stop.get_token(),
+                                      .stop = shown.stop(),
                                       .progress = progress});
   if (status.code() == StatusCode::kCancelled) {
     return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.output, shown.percent()));

@@ -45,13 +45,7 @@ Status RunData(const DataOptions& options) {
   if (!connection.ok()) return connection.status();
   const Result<std::vector<DatasetStatus>> datasets = connection->client().OrderData(order);
   if (!datasets.ok()) return datasets.status();
-  if (options.json) {
-    Json list = Json::array();
-    for (const DatasetStatus& dataset : *datasets) list.push_back(DatasetJson(dataset));
-    std::cout << list.dump(2) << '\n';
-  } else {
-    std::cout << DatasetTableText(*datasets);
-  }
+  std::cout << (options.json ? DatasetsJson(*datasets).dump(2) + "\n" : DatasetTableText(*datasets));
   return Status::Ok();
 }
 

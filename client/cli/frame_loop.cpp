@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "client/cli/interrupt.h"
-#include "client/cli/progress_display.h"
-#include "client/report/picture_warnings.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/progress_text.h"
 #include "common/cli/program.h"
 
 namespace slabstream {
@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 class FrameLoop {
  public:
   FrameLoop(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options)
-      : client_(client), jobs_(jobs), options_(options), display_(options.progress, int(jobs.size()), options.label) {}
+      : client_(client), jobs_(jobs), options_(options), bar_(options.progress, double(jobs.size())) {}
 
   Status Run() {
     const InterruptGuard interrupt(client_.wakeup());
@@ -77,7 +77,8 @@ class FrameLoop {
     if (found == open_.end()) return Status::Ok();
     const std::size_t index = found->second;
     if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
-      display_.Show(int(index), *progress, jobs_[index].source);
+      const double part = progress->group_count == 0 ? 0 : double(progress->groups_done) / progress->group_count;
+      Show(index, part, Describe(*progress, jobs_[index].source));
       return Status::Ok();
     }
     if (const auto* failure = std::get_if<Status>(&event.what)) {
@@ -88,7 +89,7 @@ class FrameLoop {
     // A preview is put at once, so that it cannot come after the final picture.
     if (!picture.final) return options_.pictures == nullptr ? Status::Ok() : options_.pictures->Put(picture, jobs_[index]);
     open_.erase(found);
-    display_.FrameDone(int(index));
+    FrameDone(index);
     failed_in_a_row_ = 0;
     const std::string& lowered = picture.statistics.lowered;
     if (!lowered.empty() && !std::exchange(told_lowered_, true)) PrintWarning(lowered);
@@ -100,13 +101,23 @@ class FrameLoop {
     return Status::Ok();
   }
 
+  // `part`: of a frame that is not done.
+  void Show(std::size_t index, double part, const std::string& what) {
+    const std::string label = options_.label.empty() ? "" : options_.label + ": ";
+    bar_.Show(frames_done_ + part, fmt::format("{}frame {} of {}: {}", label, index + 1, jobs_.size(), what));
+  }
+  void FrameDone(std::size_t index) {
+    ++frames_done_;
+    Show(index, 0, "done");
+  }
+
   // Ok: the loop goes on without this frame.
   Status PassOver(std::size_t index, const Status& failure) {
     constexpr int kMostInARow = 2;
     if (options_.failures == nullptr || index == 0 || records_.empty() || ++failed_in_a_row_ > kMostInARow) return failure;
     options_.failures->emplace_back(
         failure.code(), fmt::format("frame {} of {} ({}): {}", index + 1, jobs_.size(), jobs_[index].output, failure.message()));
-    display_.FrameDone(int(index));
+    FrameDone(index);
     if (options_.pictures != nullptr) waiting_.emplace(index, std::nullopt);
     return Status::Ok();
   }
@@ -157,7 +168,8 @@ class FrameLoop {
   Client& client_;
   const std::vector<FrameJob>& jobs_;
   const FrameLoopOptions& options_;
-  ProgressDisplay display_;
+  ProgressBar bar_;
+  int frames_done_ = 0;
   std::map<std::size_t, FrameRecord> records_;             // of pictures, by the job's index
   int failed_in_a_row_ = 0;                                // frames since the last picture
   bool told_lowered_ = false;                              // once; it is much the same of all frames

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/frame_job.h"
 #include "client/cli/picture_sink.h"
 #include "client/client.h"
 #include "common/base/status.h"

@@ -1,9 +1,8 @@
-#include "client/cli/help_pages.h"
-
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "client/cli/commands.h"
 #include "common/cli/help_formatter.h"
 
 namespace slabstream {

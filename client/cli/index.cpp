@@ -3,15 +3,12 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <utility>
 
 #include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
-#include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/catalogue.h"
 #include "data/open/open_source.h"
@@ -71,15 +68,9 @@ Status RunIndex(const IndexingOptions& options) {
   if (!index.ok()) return index.status();
 
   ProgressBar bar(options.progress, 1);
-  Wakeup wakeup;
-  const InterruptGuard guard(wakeup);
-  std::stop_source stop;
   ByteProgress shown(bar, "reading " + source->path);
-  const auto progress = [&](const IndexProgress& now) {
-    if (guard.interrupted()) stop.request_stop();
-    shown.Show(now.done_bytes, now.all_bytes);
-  };
-  const Status read = ReadIntoIndex(**opened, {.memory = memory / 4, .stop = stop.get_token(), .progress = progress}, *index);
+  const auto progress = [&](const IndexProgress& now) { shown.Show(now.done_bytes, now.all_bytes); };
+  const Status read = ReadIntoIndex(**opened, {.memory = memory / 4, .stop = shown.stop(), .progress = progress}, *index);
   // What was read until an error or Ctrl-C is worth keeping, unless the files are not those that were read.
   const Result<std::string> name_then = name_now();
   if (!name_then.ok() || *name_then != *name) {

@@ -19,12 +19,11 @@
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/mesh_info.h"
-#include "client/cli/picture_info.h"
 #include "client/cli/progress_bar.h"
-#include "client/cli/progress_display.h"
+#include "client/cli/progress_text.h"
 #include "client/pictures/picture_header.h"
 #include "client/report/value_text.h"
+#include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
 #include "common/json/json.h"
@@ -281,11 +280,6 @@ std::vector<std::uint64_t> CountLabels(const Layers& layers) {
   return counts;
 }
 
-std::string ColorText(const std::array<float, 3>& color) {
-  const auto byte = [](float channel) { return int(std::lround(255 * channel)); };
-  return fmt::format("#{:02x}{:02x}{:02x}", byte(color[0]), byte(color[1]), byte(color[2]));
-}
-
 std::string LayersText(const Layers& layers) {
   std::string text;
   if (layers.labels != nullptr) {
@@ -314,9 +308,9 @@ Json LayersJson(const Layers& layers) {
     const std::vector<std::uint64_t> counts = CountLabels(layers);
     json["labels"] = Json::array();
     for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
-      const Label& label = layers.table->labels[i];
-      json["labels"].push_back(
-          {{"value", label.value}, {"name", label.name}, {"color", ColorText(label.color)}, {"voxels", counts[i + 1]}});
+      Json label = LabelJson(layers.table->labels[i]);
+      label["voxels"] = counts[i + 1];
+      json["labels"].push_back(std::move(label));
     }
   }
   if (layers.overlay != nullptr) {

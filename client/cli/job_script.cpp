@@ -117,34 +117,34 @@ exit "$status"
 
 }  // namespace
 
-std::string TextOf(const JobScript& script) {
+std::string JobScript(const SlurmOptions& options, const std::string& dataset, const std::string& programs) {
   std::string text(kPreamble);
   const auto directive = [&text](std::string_view line) { text += fmt::format("#SBATCH {}\n", line); };
   directive("--job-name=slabstream");
-  directive(fmt::format("--array=0-{}", script.nodes - 1));
+  directive(fmt::format("--array=0-{}", options.nodes - 1));
   directive("--nodes=1");
-  directive(fmt::format("--ntasks={}", script.workers_per_node));
-  if (script.threads > 0) {
-    directive(fmt::format("--cpus-per-task={}", script.threads));
+  directive(fmt::format("--ntasks={}", options.workers_per_node));
+  if (options.threads > 0) {
+    directive(fmt::format("--cpus-per-task={}", options.threads));
   } else {
     directive("--exclusive");
     directive("--mem=0");
   }
-  if (!script.time.empty()) directive("--time=" + script.time);
-  directive(fmt::format("--signal=TERM@{}", script.notice_seconds));
+  if (!options.time.text.empty()) directive("--time=" + options.time.text);
+  directive(fmt::format("--signal=TERM@{}", options.notice_seconds));
   directive("--requeue");
   directive("--open-mode=append");
-  for (const std::string& line : script.directives) directive(line);
+  for (const std::string& line : options.directives) directive(line);
   text += "set -u\n\n";
 
-  text += fmt::format("programs={}\n", ShellWord(script.programs));
+  text += fmt::format("programs={}\n", ShellWord(programs));
   text += fmt::format("folder={}/slabstream-$SLURM_ARRAY_JOB_ID # one for each job; whoever reads it controls the service\n",
-                      script.folder.empty() ? "$SLURM_SUBMIT_DIR" : ShellWord(script.folder));
+                      options.folder.empty() ? "$SLURM_SUBMIT_DIR" : ShellWord(options.folder));
   text += "data=(";
-  for (const std::string& data : script.data) text += fmt::format("{}--data {}", text.ends_with('(') ? "" : " ", ShellWord(data));
-  text += fmt::format(")\ndataset={}\nworkers={}\n", ShellWord(script.dataset), script.workers_per_node);
-  text += fmt::format("threads={}\n", script.threads > 0 ? std::to_string(script.threads) : "$((SLURM_CPUS_ON_NODE / workers))");
-  text += fmt::format("drain={}s # for workers to finish their work after a notice\n", script.notice_seconds - script.notice_seconds / 4);
+  for (const std::string& data : options.data) text += fmt::format("{}--data {}", text.ends_with('(') ? "" : " ", ShellWord(data));
+  text += fmt::format(")\ndataset={}\nworkers={}\n", ShellWord(dataset), options.workers_per_node);
+  text += fmt::format("threads={}\n", options.threads > 0 ? std::to_string(options.threads) : "$((SLURM_CPUS_ON_NODE / workers))");
+  text += fmt::format("drain={}s # for workers to finish their work after a notice\n", options.notice_seconds - options.notice_seconds / 4);
   text += "patience=600 # seconds without a coordinator after which workers end\n";
   return text + std::string(kBody);
 }

@@ -1,5 +1,4 @@
-#include "client/cli/measure.h"
-
+// `measure`: lengths and angles in a dataset's world, values along a line, and of the voxels in a box or of each label.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
 #include "client/report/value_text.h"
 #include "client/report/volume_text.h"
@@ -47,52 +47,6 @@ std::optional<double> AngleDegrees(const Vec3& a, const Vec3& vertex, const Vec3
   if (Length(u) == 0 || Length(v) == 0) return std::nullopt;
   return std::atan2(Length(Cross(u, v)), Dot(u, v)) * 180 / std::numbers::pi;
 }
-
-// What is measured in one dataset, as JSON.
-class Measurer {
- public:
-  Measurer(Client& client, std::string dataset, const VolumeGeometry& geometry)
-      : client_(client), dataset_(std::move(dataset)), spacing_(geometry.spacing), unit_(PluralOf(UnitOf(geometry))) {}
-
-  Json Distance(const Points& p) const {
-    return {
-        {"measure", "distance"}, {"from", VectorJson(p[0])}, {"to", VectorJson(p[1])}, {"length", Length(p[1] - p[0])}, {"unit", unit_}};
-  }
-
-  static Json Angle(const Points& p) {
-    return {{"measure", "angle"},
-            {"points", {VectorJson(p[0]), VectorJson(p[1]), VectorJson(p[2])}},
-            {"degrees", *AngleDegrees(p[0], p[1], p[2])}};
-  }
-
-  // `samples` as in MeasureOptions.
-  Result<Json> Profile(const Points& p, int samples) {
-    const double voxels = Length(p[1] - p[0]) / std::min({spacing_.x, spacing_.y, spacing_.z});
-    if (samples == 0) samples = int(std::clamp(std::ceil(voxels) + 1, 2.0, double(kMaxSamplePoints)));
-    const Result<std::vector<VolumeSample>> found = client_.SampleAt(dataset_, PointsAlong(p[0], p[1], samples));
-    if (!found.ok()) return found.status();
-    Json profile = {{"measure", "profile"}, {"unit", unit_}};
-    profile.update(ProfileJson(*found));
-    return profile;
-  }
-
-  Result<Json> Box(const ClipBox& box, const std::string& text) {
-    const Result<StatisticsReply> found = client_.StatisticsIn(dataset_, box);
-    if (!found.ok()) return found.status();
-    const BoxStatistics& all = found->statistics;
-    Json statistics = {{"measure", "box"}, {"box", text}};
-    statistics.update(BoxStatisticsJson(all));
-    statistics["volume"] = double(all.voxels + all.non_finite) * spacing_.x * spacing_.y * spacing_.z;
-    statistics["unit"] = fmt::format("{}^3", unit_);
-    return statistics;
-  }
-
- private:
-  Client& client_;
-  const std::string dataset_;
-  const Vec3 spacing_;
-  const std::string_view unit_;
-};
 
 std::string LeastOrLargest(const Json& value) { return value.is_null() ? "none" : ValueText(value.get<double>()); }
 std::string NumberText(const Json& value) { return value.is_null() ? "none" : fmt::format("{:.6g}", value.get<double>()); }
@@ -159,6 +113,43 @@ Result<Measures> Parse(const MeasureOptions& options) {
   return measures;
 }
 
+// What is measured in one dataset, as a list in JSON; not its labels.
+Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeometry& geometry, const MeasureOptions& options,
+                     const Measures& measures) {
+  const Vec3 spacing = geometry.spacing;
+  const std::string_view unit = PluralOf(UnitOf(geometry));
+  Json found = Json::array();
+  for (const Points& p : measures.distances) {
+    found.push_back(
+        {{"measure", "distance"}, {"from", VectorJson(p[0])}, {"to", VectorJson(p[1])}, {"length", Length(p[1] - p[0])}, {"unit", unit}});
+  }
+  for (const Points& p : measures.angles) {
+    found.push_back({{"measure", "angle"},
+                     {"points", {VectorJson(p[0]), VectorJson(p[1]), VectorJson(p[2])}},
+                     {"degrees", *AngleDegrees(p[0], p[1], p[2])}});
+  }
+  for (const Points& p : measures.profiles) {
+    const double voxels = Length(p[1] - p[0]) / std::min({spacing.x, spacing.y, spacing.z});
+    const int samples = options.samples > 0 ? options.samples : int(std::clamp(std::ceil(voxels) + 1, 2.0, double(kMaxSamplePoints)));
+    const Result<std::vector<VolumeSample>> along = client.SampleAt(dataset, PointsAlong(p[0], p[1], samples));
+    if (!along.ok()) return along.status();
+    Json profile = {{"measure", "profile"}, {"unit", unit}};
+    profile.update(ProfileJson(*along));
+    found.push_back(std::move(profile));
+  }
+  for (std::size_t i = 0; i < measures.boxes.size(); ++i) {
+    const Result<StatisticsReply> inside = client.StatisticsIn(dataset, measures.boxes[i]);
+    if (!inside.ok()) return inside.status();
+    const BoxStatistics& all = inside->statistics;
+    Json statistics = {{"measure", "box"}, {"box", options.boxes[i]}};
+    statistics.update(BoxStatisticsJson(all));
+    statistics["volume"] = double(all.voxels + all.non_finite) * spacing.x * spacing.y * spacing.z;
+    statistics["unit"] = fmt::format("{}^3", unit);
+    found.push_back(std::move(statistics));
+  }
+  return found;
+}
+
 }  // namespace
 
 Status RunMeasure(const MeasureOptions& options) {
@@ -168,20 +159,8 @@ Status RunMeasure(const MeasureOptions& options) {
   if (!connection.ok()) return connection.status();
   const Result<SummaryReply> summary = connection->client().Summarize(connection->dataset());
   if (!summary.ok()) return summary.status();
-  Measurer measurer(connection->client(), connection->dataset(), summary->description.geometry);
-  Json found = Json::array();
-  for (const Points& p : measures->distances) found.push_back(measurer.Distance(p));
-  for (const Points& p : measures->angles) found.push_back(Measurer::Angle(p));
-  for (const Points& p : measures->profiles) {
-    Result<Json> profile = measurer.Profile(p, options.samples);
-    if (!profile.ok()) return profile.status();
-    found.push_back(*std::move(profile));
-  }
-  for (std::size_t i = 0; i < measures->boxes.size(); ++i) {
-    Result<Json> box = measurer.Box(measures->boxes[i], options.boxes[i]);
-    if (!box.ok()) return box.status();
-    found.push_back(*std::move(box));
-  }
+  Result<Json> found = Measure(connection->client(), connection->dataset(), summary->description.geometry, options, *measures);
+  if (!found.ok()) return found.status();
   StatisticsReply labels;
   if (options.labels) {
     Result<StatisticsReply> reply = connection->client().StatisticsIn(connection->dataset(), *ParseClipBox("--box", ":,:,:"), true);
@@ -189,12 +168,12 @@ Status RunMeasure(const MeasureOptions& options) {
     labels = *std::move(reply);
     Json json = {{"measure", "labels"}};
     json.update(LabelStatisticsJson(labels));
-    if (options.json) found.push_back(std::move(json));
+    if (options.json) found->push_back(std::move(json));
   }
   if (options.json) {
-    std::cout << found.dump(2) << "\n";
+    std::cout << found->dump(2) << "\n";
   } else {
-    Print(found);
+    Print(*found);
     if (options.labels) std::cout << (options.csv ? LabelStatisticsCsv(labels) : LabelStatisticsText(labels));
   }
   return Status::Ok();

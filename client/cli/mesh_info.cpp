@@ -1,5 +1,4 @@
-#include "client/cli/mesh_info.h"
-
+// `info` of unstructured grids: their cells, size and arrays.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
 #include "client/report/value_text.h"
 #include "client/request/json_value.h"

@@ -24,8 +24,6 @@
 
 namespace slabstream {
 
-class RendererKind;
-
 inline constexpr int kMaxLocalWorkers = 256;  // EmbeddedOptions takes no more
 
 // Where the frames are rendered.
@@ -91,6 +89,29 @@ struct InfoOptions {
   LayerFiles layers;
   FrameRequest request;  // its transfer function alone
   bool json = false;
+};
+
+struct ValueOptions {
+  ConnectionOptions connection;
+  std::string source;               // a name of the catalogue; a path with local_workers > 0
+  LayerFiles layers;                // with local_workers > 0
+  std::vector<std::string> points;  // as ParsePoint takes them; 1 ... kMaxSamplePoints
+  bool json = false;
+};
+
+// Texts as measure.cpp parses them; points are X,Y,Z of the world, separated by ':'.
+struct MeasureOptions {
+  ConnectionOptions connection;
+  std::string source;                  // a name of the catalogue; a path with local_workers > 0
+  std::vector<std::string> distances;  // two points
+  std::vector<std::string> angles;     // three points; the angle is at the second one
+  std::vector<std::string> profiles;   // two points
+  std::vector<std::string> boxes;      // as ParseClipBox takes them
+  bool labels = false;                 // the voxels of each label
+  LayerFiles layers;                   // the labels, with local_workers > 0
+  int samples = 0;                     // samples of each profile, [2, kMaxSamplePoints]; 0: one for each voxel that the line passes
+  bool json = false;
+  bool csv = false;  // for labels, and for nothing else
 };
 
 struct TransferOptions {

@@ -1,5 +1,4 @@
-#include "client/cli/picture_info.h"
-
+// `info` of pictures: what the file states, and how the picture was made.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "client/cli/commands.h"
 #include "client/pictures/picture_header.h"
 #include "client/request/picture_record.h"
 

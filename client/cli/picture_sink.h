@@ -1,11 +1,20 @@
 // Where the finished pictures of a sequence of frames go: each into a file of its own (picture_files.h), or all into a movie (movie.h).
 #pragma once
 
-#include "client/cli/frame_job.h"
+#include <string>
+
 #include "client/client.h"
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 
 namespace slabstream {
+
+// One of a sequence of frames.
+struct FrameJob {
+  FrameRequest request;
+  std::string output;  // the file that the picture goes into; empty: none
+  std::string source;  // SOURCE as it was typed, for records of pictures
+};
 
 // RenderFrames calls Put from threads of its own, and Finish after the last Put has returned.
 class PictureSink {

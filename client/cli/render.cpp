@@ -10,20 +10,20 @@
 #include <optional>
 #include <utility>
 
+#include "client/cli/about_pictures.h"
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/movie.h"
 #include "client/cli/picture_files.h"
-#include "client/cli/picture_keys.h"
 #include "client/cli/picture_orders.h"
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "client/cli/trace_spans.h"
-#include "client/cli/warn_of_picture.h"
 #include "client/movie/camera_moves.h"
 #include "client/movie/turntable.h"
+#include "client/report/frame_summary.h"
 #include "client/request/camera_file.h"
 #include "common/cli/program.h"
 #include "common/files/files.h"
@@ -35,19 +35,16 @@
 namespace slabstream {
 namespace {
 
-double Milliseconds(Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
-
 // Before work begins: checks that the directories of all files exist.
 Status CheckPaths(const FrameOptions& options, const std::string& output) {
-  if (Status status = CheckCanWrite("--output", output); !status.ok()) return status;
-  if (Status status = CheckCanDraw(options.format.annotations); !status.ok()) return status;
-  if (!options.stats_path.empty()) {
-    if (Status status = CheckCanWrite("--stats", options.stats_path); !status.ok()) return status;
+  Status status = CheckCanWrite("--output", output);
+  if (status.ok()) status = CheckCanDraw(options.format.annotations);
+  const std::pair<const char*, const std::string&> others[] = {
+      {"--stats", options.stats_path}, {"--save-camera", options.camera_path}, {"--trace", options.trace_path}};
+  for (const auto& [option, path] : others) {
+    if (status.ok() && !path.empty()) status = CheckCanWrite(option, path);
   }
-  if (!options.camera_path.empty()) {
-    if (Status status = CheckCanWrite("--save-camera", options.camera_path); !status.ok()) return status;
-  }
-  return options.trace_path.empty() ? Status::Ok() : CheckCanWrite("--trace", options.trace_path);
+  return status;
 }
 
 // Connects to the service for the volumes of all jobs, and fills in their datasets.
@@ -246,8 +243,8 @@ Status RenderOne(const PictureOrder& order, const std::string& label) {
   if (!frames.ok()) return frames.status();
   const ImageSize size = frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms ({}, frame {:.0f} ms)\n", order.output, size.width, size.height,
-                           Milliseconds(MonotonicNow() - start), frames->front().statistics.renderer,
-                           Milliseconds(frames->front().latency));
+                           Milliseconds((MonotonicNow() - start).count()), frames->front().statistics.renderer,
+                           Milliseconds(frames->front().latency.count()));
   Send(frame, "render", start, *frames, {});
   return Status::Ok();
 }
@@ -296,7 +293,7 @@ Status RunTurntable(const TurntableOptions& given) {
   const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)
                                                          : fmt::format("into {}", options.output.movie);
   std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
-                           size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
+                           size.height, Milliseconds((MonotonicNow() - start).count()), Milliseconds(frames->front().latency.count()));
   Send(options.frame, "turntable", start, *frames, failures);
   return ReportAll(who, failures);
 }

@@ -1,16 +1,13 @@
 // `slice`: a plane through a volume, or a slab of it (slice_request.h).
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iostream>
 #include <utility>
 
+#include "client/cli/about_pictures.h"
 #include "client/cli/commands.h"
-#include "client/cli/picture_keys.h"
 #include "client/cli/service_connection.h"
-#include "client/cli/warn_of_picture.h"
 #include "client/pictures/picture_writer.h"
-#include "client/report/picture_warnings.h"
 #include "common/files/files.h"
 
 namespace slabstream {

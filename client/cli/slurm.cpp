@@ -38,27 +38,22 @@ Result<std::string> FolderOfPrograms() {
 }  // namespace
 
 Status RunSlurm(const SlurmOptions& options) {
-  JobScript script{.nodes = options.nodes,
-                   .workers_per_node = options.workers_per_node,
-                   .threads = options.threads,
-                   .time = options.time.text,
-                   .notice_seconds = options.notice_seconds};
+  SlurmOptions script = options;
   if (!options.time.text.empty() && options.notice_seconds >= options.time.seconds) {
     return Status::InvalidArgument(fmt::format("--notice {} is not below the {} seconds of --time {}", options.notice_seconds,
                                                options.time.seconds, options.time.text));
   }
-  for (const std::string& line : options.directives) {
-    const Result<std::string> directive = ParseDirective("--sbatch", line);
+  for (std::string& line : script.directives) {
+    Result<std::string> directive = ParseDirective("--sbatch", line);
     if (!directive.ok()) return directive.status();
-    script.directives.push_back(*directive);
+    line = *std::move(directive);
   }
 
   FoundData found = FindData(options.data);  // mistakes show here, not when the job starts
   CheckFiles(found);
   if (!found.errors.empty()) return ReportAll("slabstream slurm", found.errors);
   if (found.datasets.empty()) return Status::InvalidArgument("--data " + options.data.front() + ": no volume file in this folder");
-  script.dataset = found.datasets.begin()->first;
-  for (const std::string& data : options.data) script.data.push_back(WithAbsolutePath(data));
+  for (std::string& data : script.data) data = WithAbsolutePath(data);
   if (!options.folder.empty()) {
     std::error_code error;
     if (!fs::is_directory(options.folder, error)) return Status::NotFound(fmt::format("--folder '{}' is no folder", options.folder));
@@ -66,8 +61,7 @@ Status RunSlurm(const SlurmOptions& options) {
   }
   const Result<std::string> programs = FolderOfPrograms();
   if (!programs.ok()) return programs.status();
-  script.programs = *programs;
-  std::cout << TextOf(script) << std::flush;
+  std::cout << JobScript(script, found.datasets.begin()->first, *programs) << std::flush;
   return Status::Ok();
 }
 

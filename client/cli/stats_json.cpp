@@ -1,6 +1,5 @@
 #include "client/cli/stats_json.h"
 
-#include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
 #include "common/json/json.h"
 #include "data/volume_io/read_options.h"
@@ -8,13 +7,7 @@
 namespace slabstream {
 namespace {
 
-double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
-
 Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
-  Json stages = Json::object();
-  for (int stage = 0; stage < kStageCount; ++stage) {
-    stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
-  }
   Json json = {{"output", frame.output},
                {"latency_ms", Milliseconds(frame.latency.count())},
                {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
@@ -23,7 +16,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
                {"workers", frame.statistics.workers},
                {"levels", LevelsJson(frame.statistics)},
                {"bytes", BytesJson(summary)},
-               {"stages_ms", stages},
+               {"stages_ms", StagesJson(summary)},
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share}};
   if (!frame.statistics.lowered.empty()) json["lowered"] = frame.statistics.lowered;

@@ -13,7 +13,7 @@
 #include "client/pictures/picture_writer.h"
 #include "common/classification/color_maps.h"
 #include "common/image/local_image.h"
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/resolved_request.h"
 
 namespace slabstream {

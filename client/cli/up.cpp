@@ -41,24 +41,6 @@ using std::chrono::seconds;
 constexpr Duration kStartTimeout = seconds(30);  // until the coordinator listens, and again until all workers are registered
 constexpr Duration kPatience = seconds(5);       // for an orderly end, then again before SIGKILL
 
-// While it lives, SIGINT and SIGTERM stay pending until they are asked for, also in threads started meanwhile.
-class BlockedSignals {
- public:
-  BlockedSignals() { ::sigprocmask(SIG_BLOCK, &signals_, &before_); }
-  ~BlockedSignals() { ::sigprocmask(SIG_SETMASK, &before_, nullptr); }
-  BlockedSignals(const BlockedSignals&) = delete;
-  BlockedSignals& operator=(const BlockedSignals&) = delete;
-
-  bool Wait(milliseconds timeout) const {
-    const timespec time{timeout.count() / 1000, timeout.count() % 1000 * 1000000};
-    return ::sigtimedwait(&signals_, nullptr, &time) > 0;
-  }
-
- private:
-  const sigset_t signals_ = StopSignals();
-  sigset_t before_;
-};
-
 // As --memory takes it.
 std::string MemoryArgument(std::uint64_t bytes) { return fmt::format("{}MiB", bytes >> 20); }
 
@@ -73,7 +55,7 @@ class LocalService {
   }
 
   // Until every worker is registered. Cancelled: a signal came.
-  Status Start(const BlockedSignals& signals) {
+  Status Start() {
     if (Status status = StartCoordinator(); !status.ok()) return status;
     if (Status status = StartWorkers(); !status.ok()) return status;
     Result<ServiceConnection> connection = Connect();
@@ -85,7 +67,7 @@ class LocalService {
       for (std::size_t i = 0; i < children_.size(); ++i) {
         if (const auto end = children_[i].process->Ended()) return StartFailure(i, *end);
       }
-      if (signals.Wait(milliseconds(50))) return Status::Cancelled("interrupted");
+      if (StopComesWithin(milliseconds(50))) return Status::Cancelled("interrupted");
       if (MonotonicNow() > deadline) {
         return Status::DeadlineExceeded(fmt::format("{} of {} workers registered within {} s; logs are in {}", reply->workers.size(),
                                                     options_.workers, seconds(30).count(), state_.log_directory));
@@ -95,8 +77,8 @@ class LocalService {
 
   // Until a signal comes (Ok) or the coordinator ends. Starts workers again that end unexpectedly, and says so on stderr. One that exits
   // with status 0 was told to end. No worker is started once the coordinator has ended, so whoever ends the service waits for none.
-  Status Watch(const BlockedSignals& signals) {
-    while (!signals.Wait(milliseconds(200))) {
+  Status Watch() {
+    while (!StopComesWithin(milliseconds(200))) {
       if (const auto end = children_.front().process->Ended()) {
         if (end->exit_status == 0) return Status::Ok();  // `slabstream down`, from another terminal
         return Status::Unavailable(fmt::format("the coordinator {}; its last log line: {}", end->description, LastLogLine(LogOf(0))));
@@ -337,9 +319,9 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
   if (!keys_folder.ok()) return keys_folder.status();
   const bool new_keys = !keys_folder->empty() && !std::filesystem::exists(*keys_folder, error);
 
-  const BlockedSignals signals;
+  BlockStopSignals();
   LocalService service(options, memory, log_directory, *keys_folder);
-  if (Status status = service.Start(signals); !status.ok()) {
+  if (Status status = service.Start(); !status.ok()) {
     service.Stop(status.code() == StatusCode::kDeadlineExceeded);  // which names the logs
     if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
@@ -350,7 +332,7 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
     service.Stop(true);
     return told;
   }
-  Status status = service.Watch(signals);
+  Status status = service.Watch();
   // The workers of a detached service outlive a coordinator that crashed, until `down` has told of it.
   if (status.ok() || !options.detach) service.Stop(!status.ok());
   return status;

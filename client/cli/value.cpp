@@ -1,10 +1,10 @@
-#include "client/cli/value.h"
-
+// `value`: what a dataset or a file holds at points of its world.
 #include <fmt/format.h>
 
 #include <iostream>
 #include <utility>
 
+#include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
 #include "client/report/volume_text.h"
 #include "client/request/values.h"

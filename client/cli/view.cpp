@@ -127,10 +127,8 @@ Status OpenBrowser(const std::string& url) {
 
 // Until Ctrl-C (Ok), or one of the children ends.
 Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
-  const sigset_t signals = StopSignals();
   while (true) {
-    const timespec pause{0, 200'000'000};
-    if (::sigtimedwait(&signals, nullptr, &pause) > 0) return Status::Ok();
+    if (StopComesWithin(std::chrono::milliseconds(200))) return Status::Ok();
     if (const auto end = gateway.child().Ended()) return Status::Unavailable("the gateway " + end->description);
     if (!service) continue;
     if (const auto end = service->child().Ended()) return Status::Unavailable("the service " + end->description);

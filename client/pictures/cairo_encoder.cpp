@@ -6,12 +6,9 @@
 #include <ft2build.h>
 #include FT_FREETYPE_H
 
-#include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <memory>
 #include <new>
-#include <vector>
 
 #include "client/pictures/picture_encoder.h"
 

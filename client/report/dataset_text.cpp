@@ -28,6 +28,25 @@ Json LevelJson(const VolumeDescription& level) {
   return {{"size", {size.x, size.y, size.z}}, {"spacing", {spacing.x, spacing.y, spacing.z}}, {"voxel_bytes", level.voxel_bytes()}};
 }
 
+Json DatasetJson(const DatasetStatus& dataset) {
+  Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
+  if (dataset.state == DatasetState::kReady) {
+    const VolumeGeometry& geometry = dataset.description.geometry;
+    entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
+    entry["type"] = NameOf(dataset.description.type);
+    entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
+    entry["memory_bytes"] = dataset.memory_bytes;
+    entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
+    entry["cells"] = dataset.cells;
+    entry["levels"] = Json::array();
+    for (const VolumeDescription& level : LevelsOf(dataset)) entry["levels"].push_back(LevelJson(level));
+    entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
+  }
+  if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
+  entry["since_ms"] = dataset.since_ms;
+  return entry;
+}
+
 }  // namespace
 
 std::string_view NameOf(DatasetState state) {
@@ -47,23 +66,10 @@ std::string AgeText(std::uint64_t milliseconds) {
   return hours < 48 ? fmt::format("{:.1f} h", hours) : fmt::format("{:.1f} d", hours / 24);
 }
 
-Json DatasetJson(const DatasetStatus& dataset) {
-  Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
-  if (dataset.state == DatasetState::kReady) {
-    const VolumeGeometry& geometry = dataset.description.geometry;
-    entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
-    entry["type"] = NameOf(dataset.description.type);
-    entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
-    entry["memory_bytes"] = dataset.memory_bytes;
-    entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
-    entry["cells"] = dataset.cells;
-    entry["levels"] = Json::array();
-    for (const VolumeDescription& level : LevelsOf(dataset)) entry["levels"].push_back(LevelJson(level));
-    entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
-  }
-  if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
-  entry["since_ms"] = dataset.since_ms;
-  return entry;
+Json DatasetsJson(const std::vector<DatasetStatus>& datasets) {
+  Json json = Json::array();
+  for (const DatasetStatus& dataset : datasets) json.push_back(DatasetJson(dataset));
+  return json;
 }
 
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {

@@ -15,7 +15,7 @@ std::string_view NameOf(DatasetState state);  // "ready"
 // "12 s", "5 min", "3.5 h", "2.1 d".
 std::string AgeText(std::uint64_t milliseconds);
 
-Json DatasetJson(const DatasetStatus& dataset);
+Json DatasetsJson(const std::vector<DatasetStatus>& datasets);
 
 // A table: a line for each dataset, and one for the heads of the columns.
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets);

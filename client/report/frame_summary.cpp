@@ -62,4 +62,22 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
   return summary;
 }
 
+Json LevelsJson(const FrameStatistics& statistics) {
+  Json levels = Json::array();
+  for (const auto& [level, boxes, voxels] : statistics.levels) levels.push_back({{"level", level}, {"boxes", boxes}, {"voxels", voxels}});
+  return levels;
+}
+
+Json BytesJson(const FrameSummary& summary) {
+  return {{"voxels", summary.voxel_bytes}, {"stored", summary.stored_bytes}, {"images", summary.image_bytes}};
+}
+
+Json StagesJson(const FrameSummary& summary) {
+  Json stages = Json::object();
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    stages[std::string(ToString(Stage(stage)))] = Milliseconds(summary.stage_ns[std::size_t(stage)]);
+  }
+  return stages;
+}
+
 }  // namespace slabstream

@@ -1,6 +1,8 @@
-// The figures of one frame that people compare, computed from its reports. Pure.
+// The figures of one frame that people compare, computed from its reports, and what JSON says of them: in --stats, over HTTP and beside the
+// viewer's pictures. Pure.
 #pragma once
 
+#include "common/json/json.h"
 #include "common/stats/report.h"
 #include "common/wire/client_messages.h"
 
@@ -19,5 +21,14 @@ struct FrameSummary {
 };
 
 FrameSummary Summarize(const FrameStatistics& statistics);
+
+constexpr double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
+
+// [{"level": 2, "boxes": 8, "voxels": 2097152}], finest first.
+Json LevelsJson(const FrameStatistics& statistics);
+// {"voxels", "stored", "images"}
+Json BytesJson(const FrameSummary& summary);
+// {"render": milliseconds, ...}, of all stages.
+Json StagesJson(const FrameSummary& summary);
 
 }  // namespace slabstream

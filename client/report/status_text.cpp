@@ -72,7 +72,7 @@ Json KeysJson(const std::vector<AdmittedKey>& keys) {
 }
 
 Json StatusJson(const StatusReply& reply) {
-  Json workers = Json::array(), datasets = Json::array(), renderers = Json::array();
+  Json workers = Json::array(), renderers = Json::array();
   for (const WorkerStatus& worker : reply.workers) {
     workers.push_back({{"worker", worker.worker},
                        {"pid", worker.pid},
@@ -86,7 +86,6 @@ Json StatusJson(const StatusReply& reply) {
                        {"silent_ms", worker.silent_ms},
                        {"memory_bytes", worker.memory_bytes}});
   }
-  for (const DatasetStatus& dataset : reply.datasets) datasets.push_back(DatasetJson(dataset));
   for (const auto& [name, title, abilities, parameters] : reply.renderers) {
     renderers.push_back({{"name", name}, {"title", title}, {"abilities", abilities}, {"parameters", parameters}});
   }
@@ -115,7 +114,7 @@ Json StatusJson(const StatusReply& reply) {
           {"workers_lost", reply.workers_lost},
           {"memory_bytes", reply.memory_bytes},
           {"workers", std::move(workers)},
-          {"datasets", std::move(datasets)},
+          {"datasets", DatasetsJson(reply.datasets)},
           {"web", std::move(web)},
           {"renderers", std::move(renderers)}};
 }

@@ -40,14 +40,6 @@ std::string TextOfValue(const VolumeSample& sample) {
   return "value " + ValueText(*sample.value);
 }
 
-Json LabelJson(const Label& label) {
-  const auto channel = [](float share) { return int(std::lround(share * 255)); };
-  const auto& [red, green, blue] = label.color;
-  return {{"value", label.value},
-          {"name", label.name},
-          {"color", fmt::format("#{:02x}{:02x}{:02x}", channel(red), channel(green), channel(blue))}};
-}
-
 std::uint64_t AllVoxels(const BoxStatistics& box) { return box.voxels + box.non_finite; }
 
 std::string Quoted(const std::string& field) {
@@ -77,6 +69,13 @@ Json JointHistogramJson(const std::string& dataset, const JointHistogramReply& r
           {"slopes", kJointSlopes},
           {"counts", reply.histogram.counts}};
 }
+
+std::string ColorText(const std::array<float, 3>& color) {
+  const auto byte = [](float channel) { return int(std::lround(255 * channel)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(color[0]), byte(color[1]), byte(color[2]));
+}
+
+Json LabelJson(const Label& label) { return {{"value", label.value}, {"name", label.name}, {"color", ColorText(label.color)}}; }
 
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary) {
   Json labels = Json::array();

@@ -1,6 +1,7 @@
 // What a dataset holds, as the command line and the gateway show it.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,10 @@ Json HistogramJson(const std::string& dataset, const SummaryReply& summary);
 // {"dataset", "range", "steepest", "values", "slopes", "counts"}
 Json JointHistogramJson(const std::string& dataset, const JointHistogramReply& reply);
 
-// {"dataset", "labels": [{"value", "name", "color": "#rrggbb"}, ...]}
+std::string ColorText(const std::array<float, 3>& color);  // "#rrggbb"
+// {"value", "name", "color": "#rrggbb"}
+Json LabelJson(const Label& label);
+// {"dataset", "labels": [LabelJson, ...]}
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 
 // {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"; "interpolated"}. Null: there is

@@ -48,6 +48,22 @@ class JsonValue {
   bool Boolean() const;
   std::size_t OneOf(std::span<const std::string_view> names) const;  // its index
 
+  // Functions that read a value into `to`.
+  static Read Into(std::string& to) {
+    return [&to](const JsonValue& value) { to = value.Text(); };
+  }
+  static Read Into(bool& to) {
+    return [&to](const JsonValue& value) { to = value.Boolean(); };
+  }
+  template <class T>
+  static Read Into(T& to, const NumberRange& range) {
+    return [&to, range](const JsonValue& value) { to = value.Number(range); };
+  }
+  template <class T>
+  static Read Into(T& to, int min, int max) {
+    return [&to, min, max](const JsonValue& value) { to = value.Integer(min, max); };
+  }
+
  private:
   const Json* json_;
   std::string place_;

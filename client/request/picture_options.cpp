@@ -18,7 +18,6 @@
 #include "common/view/default_view.h"
 #include "common/view/named_view.h"
 #include "common/view/world_limits.h"
-#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <utility>
 
@@ -34,31 +33,14 @@ Json FormatJson(const PictureFormat& format) {
 }
 
 void ReadFormat(const JsonValue& value, PictureFormat& format) {
-  const auto color = [&](const JsonValue& v) {
+  auto fields = FormatFields(format);
+  fields.emplace_back("background", [&](const JsonValue& v) {
     std::vector<float> channels;
     v.Each([&](const JsonValue& channel) { channels.push_back(float(channel.Number({0, 1}))); }, 4);
     if (channels.size() != 4) return v.Complain(v.Shown() + " must be four numbers");
     format.background = {channels[0], channels[1], channels[2], channels[3]};
-  };
-  const auto line = [](const JsonValue& v) {
-    std::string text = v.Text();
-    if (const Status status = CheckTitle("the text", text); !status.ok()) v.Complain(status.message());
-    return text;
-  };
-  value.Fields({{"depth", [&](const JsonValue& v) { format.png_bits = v.Integer(8, 16); }},
-                {"background", color},
-                {"quality", [&](const JsonValue& v) { format.quality = v.Integer(1, 100); }},
-                {"dpi", [&](const JsonValue& v) { format.dots_per_inch = v.Integer(1, kMaxDotsPerInch); }},
-                {"font_size",
-                 [&](const JsonValue& v) {
-                   format.annotations.font_size = v.Number({kMinFontSize, kMaxFontSize});
-                 }},
-                {"title", [&](const JsonValue& v) { format.annotations.title = line(v); }},
-                {"color_bar", [&](const JsonValue& v) { format.annotations.color_bar = line(v); }},
-                {"legend", [&](const JsonValue& v) { format.annotations.legend = v.Boolean(); }},
-                {"scale_bar", [&](const JsonValue& v) { format.annotations.scale_bar = v.Boolean(); }},
-                {"orientation_marker", [&](const JsonValue& v) { format.annotations.orientation_marker = v.Boolean(); }}});
-  if (format.png_bits != 8 && format.png_bits != 16) value.Complain(fmt::format("depth {} is neither 8 nor 16", format.png_bits));
+  });
+  value.Fields(fields);
 }
 
 // Options of a command line, in their order.
@@ -126,8 +108,7 @@ void AddFormat(OptionList& out, const PictureFormat& format) {
 }
 
 void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
-  value.Fields({{"labels", [&](const JsonValue& v) { SetLabelFiles(v.Text(), files); }},
-                {"overlay", [&](const JsonValue& v) { files.overlay = v.Text(); }}});
+  value.Fields({{"labels", [&](const JsonValue& v) { SetLabelFiles(v.Text(), files); }}, {"overlay", JsonValue::Into(files.overlay)}});
 }
 
 // Names of catalogues have no slashes, and hardly ever the ending of a volume file.
@@ -141,6 +122,29 @@ bool IsPlain(std::string_view word) {
 }
 
 }  // namespace
+
+std::vector<std::pair<std::string, JsonValue::Read>> FormatFields(PictureFormat& format) {
+  Annotations& annotations = format.annotations;
+  const auto line = [](std::string& text) {
+    return [&text](const JsonValue& v) {
+      text = v.Text();
+      if (const Status status = CheckTitle("the text", text); !status.ok()) v.Complain(status.message());
+    };
+  };
+  const auto depth = [&format](const JsonValue& v) {
+    format.png_bits = v.Integer(8, 16);
+    if (format.png_bits != 8 && format.png_bits != 16) v.Complain(fmt::format("depth {} is neither 8 nor 16", format.png_bits));
+  };
+  return {{"depth", depth},
+          {"quality", JsonValue::Into(format.quality, 1, 100)},
+          {"dpi", JsonValue::Into(format.dots_per_inch, 1, kMaxDotsPerInch)},
+          {"font_size", JsonValue::Into(annotations.font_size, {kMinFontSize, kMaxFontSize})},
+          {"title", line(annotations.title)},
+          {"color_bar", [&annotations, line](const JsonValue& v) { line(annotations.color_bar.emplace())(v); }},
+          {"legend", JsonValue::Into(annotations.legend)},
+          {"scale_bar", JsonValue::Into(annotations.scale_bar)},
+          {"orientation_marker", JsonValue::Into(annotations.orientation_marker)}};
+}
 
 Json GeometryJson(const PictureGeometry& geometry) {
   return {{"world", NameOf(geometry.world)},       {"unit", NameOf(geometry.unit)},         {"projection", NameOf(geometry.projection)},
@@ -178,8 +182,8 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
   std::string request;
   std::optional<std::string> mistake;
   const JsonValue value(*json, "record", mistake);
-  value.Fields({{"program", [&](const JsonValue& v) { record.program = v.Text(); }},
-                {"source", [&](const JsonValue& v) { record.source = v.Text(); }},
+  value.Fields({{"program", JsonValue::Into(record.program)},
+                {"source", JsonValue::Into(record.source)},
                 {"layers", [&](const JsonValue& v) { ReadLayerFiles(v, record.layers); }},
                 {"request", [&](const JsonValue&) { request = (*json)["request"].dump(); }},
                 {"picture", [&](const JsonValue& v) { ReadFormat(v, record.format); }},

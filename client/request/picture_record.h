@@ -34,6 +34,8 @@ struct PictureRecord {
   Json json;  // the whole record
 };
 
+// The fields of the record's "picture", but for the background: they set those of `format`.
+std::vector<std::pair<std::string, JsonValue::Read>> FormatFields(PictureFormat& format);
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);
 

@@ -7,6 +7,10 @@
 namespace slabstream {
 
 // The text as one word of bash, in quotes.
-std::string ShellWord(std::string_view text);
+inline std::string ShellWord(std::string_view text) {
+  std::string word = "'";
+  for (const char c : text) c == '\'' ? word += "'\\''" : word += c;
+  return word + "'";
+}
 
 }  // namespace slabstream

@@ -12,6 +12,7 @@
 #include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/cli/parse.h"
+#include "common/text/split.h"
 #include "common/view/world_limits.h"
 
 namespace slabstream {

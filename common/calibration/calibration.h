@@ -81,7 +81,6 @@ inline constexpr double kHidden = 0.1e-9;   // a pixel of the frame, searched fo
 //   simulation_bench CASE  (laboratory/measure/calibrate.h; plan, message and client are estimates)
 namespace service {
 inline constexpr double kAwake = 25e-6, kAsleep = 60e-6, kDoze = 500e-6;  // WakeUps
-inline constexpr double kSerialShare = 0.02;  // share of rendering and of making a picture that one thread does alone
 // What the coordinator does for a plan, a message and a client.
 inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;
 // Processor time of a byte at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench).

@@ -13,6 +13,7 @@
 #include "common/base/status.h"
 #include "common/cli/command.h"
 #include "common/cli/parse.h"
+#include "common/text/split.h"
 
 namespace slabstream {
 

@@ -13,12 +13,15 @@
 namespace slabstream {
 namespace {
 
-// What roff would take for its own: backslashes, dots and quotes that begin a line. A minus is one that can be typed.
+// What roff would take for its own: backslashes, dots and quotes that begin a line. A minus is one that can be typed. A line may end after
+// a comma, also within a word such as FILE,labels=FILE.
 std::string Escaped(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
     if ((c == '.' || c == '\'') && (escaped.empty() || escaped.back() == '\n')) escaped += "\\&";
     escaped += c == '\\' ? "\\e" : c == '-' ? "\\-" : std::string(1, c);
+    if (c == ',' && i + 1 < text.size() && text[i + 1] != ' ') escaped += "\\:";
   }
   return escaped;
 }

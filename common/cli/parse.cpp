@@ -27,16 +27,6 @@ std::string RangeText(const NumberRange& range) { return fmt::format("{}{}, {}]"
 
 }  // namespace
 
-std::vector<std::string_view> Split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (std::size_t begin = 0;;) {
-    const std::size_t end = text.find(separator, begin);
-    parts.push_back(text.substr(begin, end - begin));
-    if (end == std::string_view::npos) return parts;
-    begin = end + 1;
-  }
-}
-
 Result<double> ParseNumber(std::string_view option, std::string_view text, const NumberRange& range) {
   const std::optional<double> value = Convert<double>(text);
   if (!value || std::isnan(*value)) return Status::InvalidArgument(fmt::format("{} '{}' is not a number", option, text));

@@ -12,9 +12,6 @@
 
 namespace slabstream {
 
-// The parts between separators, at least one; each may be empty.
-std::vector<std::string_view> Split(std::string_view text, char separator);
-
 // A closed range, or open below.
 struct NumberRange {
   double min = 0, max = 0;

@@ -1,7 +1,10 @@
 #include "common/cli/program.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -19,7 +22,6 @@
 #include "common/base/printable.h"
 #include "common/base/process_limits.h"
 #include "common/cli/add_option.h"
-#include "common/files/open_files.h"
 #include "common/memory/large_buffers.h"
 #include "common/text/url.h"
 #include "common/threads/background_tasks.h"
@@ -27,6 +29,17 @@
 namespace slabstream {
 
 namespace {
+
+// Lets this process have as many files, sockets included, open as the system allows; returns how many.
+std::uint64_t AllowOpenFiles() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return 0;
+  if (limit.rlim_cur < limit.rlim_max) {
+    const rlimit more = {limit.rlim_max, limit.rlim_max};
+    if (::setrlimit(RLIMIT_NOFILE, &more) == 0) limit = more;
+  }
+  return limit.rlim_cur;
+}
 
 // The command that was typed last: `keys rotate` of `slabstream`.
 Command LastCommand(const Command& program) {

@@ -1,4 +1,4 @@
-// The ways to divide a volume into boxes. Each is one file and one line in Decompositions().
+// The ways to divide a volume into boxes. Each is a function and one line in Decompositions().
 //
 // All of them take any number of boxes, and make fewer if there is no room for as many. Which boxes are empty depends on the volume; users
 // of the partition find out.

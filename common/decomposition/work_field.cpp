@@ -7,6 +7,7 @@
 
 #include "common/base/check.h"
 #include "common/calibration/calibration.h"
+#include "common/volume/indices.h"
 
 namespace slabstream {
 
@@ -81,7 +82,8 @@ double WorkField::Sum(const Box& box) const {
   return std::max(sum, 0.0) * step_;
 }
 
-double WorkField::StepsOf(const Index3& begin, const Index3& end) const {
+double WorkField::StepsOf(const Box& cells) const {
+  const auto& [begin, end] = cells;
   const auto at = [&](std::int32_t x, std::int32_t y, std::int32_t z) { return sums_[NumberIn(corners_, {x, y, z})]; };
   return at(end.x, end.y, end.z) - at(begin.x, end.y, end.z) - at(end.x, begin.y, end.z) - at(end.x, end.y, begin.z) +
          at(begin.x, begin.y, end.z) + at(begin.x, end.y, begin.z) + at(end.x, begin.y, begin.z) - at(begin.x, begin.y, begin.z);
@@ -90,22 +92,19 @@ double WorkField::StepsOf(const Index3& begin, const Index3& end) const {
 Box WorkField::Hull(const Box& box) const {
   const Box part = Intersection(box, {{0, 0, 0}, size_});
   if (part.empty() || uniform()) return part;
-  const auto cell = [](std::int32_t voxel) { return voxel / kOccupancyCell; };
-  Index3 begin = {cell(part.begin.x), cell(part.begin.y), cell(part.begin.z)};
-  Index3 end = {cell(part.end.x - 1) + 1, cell(part.end.y - 1) + 1, cell(part.end.z - 1) + 1};
-  if (StepsOf(begin, end) == 0) return {};
+  Box cells = CubesTouched(part, kOccupancyCell);
+  if (StepsOf(cells) == 0) return {};
   for (const Axis axis : kAxes) {
     const auto empty = [&](std::int32_t first, std::int32_t last) {
-      Index3 from = begin, to = end;
-      from[axis] = first;
-      to[axis] = last;
-      return StepsOf(from, to) == 0;
+      Box slices = cells;
+      slices.begin[axis] = first;
+      slices.end[axis] = last;
+      return StepsOf(slices) == 0;
     };
-    while (empty(begin[axis], begin[axis] + 1)) ++begin[axis];
-    while (empty(end[axis] - 1, end[axis])) --end[axis];
+    while (empty(cells.begin[axis], cells.begin[axis] + 1)) ++cells.begin[axis];
+    while (empty(cells.end[axis] - 1, cells.end[axis])) --cells.end[axis];
   }
-  const auto voxel = [](const Index3& c) { return Index3{c.x * kOccupancyCell, c.y * kOccupancyCell, c.z * kOccupancyCell}; };
-  return Intersection({voxel(begin), voxel(end)}, part);
+  return Intersection({kOccupancyCell * cells.begin, kOccupancyCell * cells.end}, part);
 }
 
 std::int32_t PlaneAt(const WorkField& work, const Box& box, Axis axis, std::int64_t part, std::int64_t whole) {

@@ -36,8 +36,8 @@ class WorkField {
  private:
   explicit WorkField(const Index3& size) : size_(size) {}
   void SumUp(std::span<const double> steps);
-  double Before(const Index3& corner) const;                     // steps in [0, corner)
-  double StepsOf(const Index3& begin, const Index3& end) const;  // steps in a box of whole cells
+  double Before(const Index3& corner) const;  // steps in [0, corner)
+  double StepsOf(const Box& cells) const;     // steps in a box of whole cells
 
   Index3 size_;
   Index3 corners_;            // cells + 1

@@ -22,7 +22,7 @@
 #include <variant>
 
 #include "common/base/limited_log.h"
-#include "common/cli/parse.h"
+#include "common/text/split.h"
 
 namespace slabstream {
 namespace {

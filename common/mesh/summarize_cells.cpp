@@ -1,3 +1,4 @@
+#include "common/mesh/summarize_cells.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +7,10 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/mesh/lattice.h"
 #include "common/mesh/mesh_cell.h"
 #include "common/parallel/parallel.h"
 #include "common/parallel/per_thread.h"
+#include "common/volume/indices.h"
 
 namespace slabstream {
 namespace {
@@ -45,13 +46,8 @@ MacrocellRanges RangesOf(const Mesh& mesh, const Index3& size) {
         centre[axis] = std::clamp(std::int32_t(std::lround((double(bounds.low[axis]) + double(bounds.high[axis])) / 2)), 0, size[axis] - 1);
       }
       ++part.cells[NumberIn(counts, centre / kBrick)];
-      const Box voxels = VoxelsTouched(bounds, size);
-      const Index3 first = voxels.begin / kBrick, end = CubesOver(voxels.end, kBrick);
-      for (std::int32_t z = first.z; z < end.z; ++z) {
-        for (std::int32_t y = first.y; y < end.y; ++y) {
-          for (std::int32_t x = first.x; x < end.x; ++x) Widen(part.bricks[NumberIn(counts, {x, y, z})], values);
-        }
-      }
+      const Box bricks = CubesTouched(VoxelsTouched(bounds, size), kBrick);
+      for (const Index3& brick : IndicesIn(bricks)) Widen(part.bricks[NumberIn(counts, brick)], values);
     }
   });
   MacrocellRanges all = none;

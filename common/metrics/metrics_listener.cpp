@@ -144,8 +144,7 @@ MetricsListener::MetricsListener(std::unique_ptr<Impl> impl) : impl_(std::move(i
 MetricsListener::~MetricsListener() = default;
 
 std::string MetricsListener::url() const {
-  const bool v6 = impl_->listen.host.find(':') != std::string::npos;
-  return fmt::format("http://{}{}{}:{}/metrics", v6 ? "[" : "", impl_->listen.host, v6 ? "]" : "", impl_->listen.port);
+  return ToString(HttpUrl{.host = impl_->listen.host, .port = impl_->listen.port, .target = "/metrics"});
 }
 
 }  // namespace slabstream

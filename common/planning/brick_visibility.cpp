@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "common/volume/indices.h"
+
 namespace slabstream {
 namespace {
 
@@ -26,14 +28,8 @@ BrickVisibility::BrickVisibility(const VolumeSummary& summary, const BrickRangeL
 
 bool BrickVisibility::AnyVisible(const Box& box) const {
   if (bricks_.empty() && layers_.empty()) return any_value_visible_;
-  const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
-  for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
-    for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
-      const std::size_t row = NumberIn(summary_.brick_counts, {0, y, z});
-      for (std::int32_t x = brick_of(box.begin.x); x <= brick_of(box.end.x - 1); ++x) {
-        if (AnyVisible(row + std::size_t(x))) return true;
-      }
-    }
+  for (const Index3& brick : IndicesIn(CubesTouched(box, kBrick))) {
+    if (AnyVisible(NumberIn(summary_.brick_counts, brick))) return true;
   }
   return false;
 }
@@ -55,14 +51,13 @@ OccupancyGrid BrickVisibility::VisibleCells() const {
   static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
   OccupancyGrid grid{summary_.description.geometry.size, {}};
   const Index3 cells = OccupancyCells(grid.size);
-  grid.cells.reserve(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
-  for (Index3 cell; cell.z < cells.z; ++cell.z) {
-    for (cell.y = 0; cell.y < cells.y; ++cell.y) {
-      for (cell.x = 0; cell.x < cells.x; ++cell.x) {
-        const Box box = OccupancyCellBox(cell, grid.size);
-        grid.cells.push_back(AnyVisible(box) ? FullCell(box) : CellOccupancy{});
-      }
-    }
+  grid.cells.reserve(CountIn(cells));
+  const bool known = !(bricks_.empty() && layers_.empty());
+  std::vector<bool> visible(known ? CountIn(summary_.brick_counts) : 0);
+  for (std::size_t brick = 0; brick < visible.size(); ++brick) visible[brick] = AnyVisible(brick);
+  for (const Index3& cell : IndicesIn(cells)) {
+    const bool shows = known ? visible[NumberIn(summary_.brick_counts, cell / (kBrick / kOccupancyCell))] : any_value_visible_;
+    grid.cells.push_back(shows ? FullCell(OccupancyCellBox(cell, grid.size)) : CellOccupancy{});
   }
   return grid;
 }

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "common/base/check.h"
+#include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/clipped_cells.h"
-#include "common/planning/cost_estimator.h"
 #include "common/planning/layer_bricks.h"
 #include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
@@ -254,21 +254,21 @@ struct LayoutMaker::State {
     });
   }
 
-  const CostEstimator& Costs() {
-    if (!costs)
-      costs.emplace(*request.volume->renderer(), CostBasis{&fields.Grid(), request.summary, &request.volume->transfer()},
-                    request.known.cost);
-    return *costs;
-  }
-
   // Seconds of a box in views along x and along y: views turn about z.
   static constexpr std::size_t kViews = 2;
+  static constexpr std::array<CostView, kViews> kCostViews = {{{.along = Axis::kX}, {.along = Axis::kY}}};
   using ByView = std::array<double, kViews>;
-  ByView PredictedSeconds(const Box& box) {
-    return {Costs().Analytic(box, {.along = Axis::kX}), Costs().Analytic(box, {.along = Axis::kY})};
+  // As if no frame had been measured.
+  const AnalyticCost& Analytic() {
+    if (!analytic) analytic = request.volume->renderer()->MakeCost({&fields.Grid(), request.summary, &request.volume->transfer()});
+    return analytic;
   }
 
-  double MeanSeconds(const Box& box) { return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2; }
+  // Mean over views: measured, if earlier frames were.
+  double MeanSeconds(const Box& box) {
+    if (request.known.cost != nullptr) return request.known.cost->Sum(box);
+    return (Analytic()(box, kCostViews[0]) + Analytic()(box, kCostViews[1])) / kViews;
+  }
 
   // An index says which boxes are rendered, and what of them is read. It does not say where they are: boxes are those that would be
   // made without it.
@@ -330,15 +330,22 @@ struct LayoutMaker::State {
   };
   Predicted Predict(const Layout& layout) {
     Predicted predicted;
-    std::vector<ByView> times, slots(request.slots);
-    ByView sum{};
+    std::vector<std::uint32_t> owners;
     for (std::size_t box = 0; box < layout.owners.size(); ++box) {
       if (layout.owners[box] == kNoSlot) continue;
       predicted.shares.push_back({layout.partition.boxes()[box]});
-      times.push_back(PredictedSeconds(layout.partition.boxes()[box]));
+      owners.push_back(layout.owners[box]);
+    }
+    std::vector<ByView> times(owners.size()), slots(request.slots);
+    const AnalyticCost& cost = Analytic();
+    // The frame waits for this.
+    ParallelFor(std::size_t{0}, kViews * times.size(),
+                [&](std::size_t i) { times[i / kViews][i % kViews] = cost(predicted.shares[i / kViews].box, kCostViews[i % kViews]); });
+    ByView sum{};
+    for (std::size_t i = 0; i < times.size(); ++i) {
       for (std::size_t view = 0; view < kViews; ++view) {
-        slots[layout.owners[box]][view] += times.back()[view];
-        sum[view] += times.back()[view];
+        slots[owners[i]][view] += times[i][view];
+        sum[view] += times[i][view];
       }
     }
     for (std::size_t view = 0; view < kViews; ++view) {
@@ -355,17 +362,20 @@ struct LayoutMaker::State {
   // A sequence of layouts: each is cut by the predicted times of the last one's boxes.
   struct Refined {
     explicit Refined(const OccupancyGrid& grid) : cost(grid) {}
+    // The best one is as even as it gets: nothing is left to gain.
+    bool even() const { return frame <= 1.01 * shared_out; }
+
     MeasuredCost cost;
     Layout best;
-    double frame = std::numeric_limits<double>::infinity();  // of the best one
+    double frame = std::numeric_limits<double>::infinity(), shared_out = 0;  // of the best one
   };
-  void Refine(const ResolvedPolicy& policy, int groups, int shape, const Partition* resized, Refined& refined) {
-    const WorkField field = refined.cost.Field();
-    Layout layout = Assign(MakePartition(policy, groups, field, resized, shape), policy);
+  void Refine(const ResolvedPolicy& policy, Partition partition, Refined& refined) {
+    Layout layout = Assign(std::move(partition), policy);
     const Predicted predicted = Predict(layout);
     refined.cost.Learn(predicted.shares, 1);
     if (predicted.frame >= refined.frame) return;
     refined.frame = predicted.frame;
+    refined.shared_out = predicted.shared_out;
     refined.best = std::move(layout);
   }
 
@@ -373,14 +383,23 @@ struct LayoutMaker::State {
   Layout MakeByPredictedCost(const ResolvedPolicy& policy, int groups) {
     constexpr int kCuts = 2, kResizings = 3;
     std::optional<Refined> best;
-    for (int shape = 0; shape < policy.decomposition->shapes && (shape == 0 || !stopped()); ++shape) {
+    std::vector<std::vector<Box>> begun;  // the first cut of each shape: shapes of few boxes are often the same
+    for (int shape = 0; shape < policy.decomposition->shapes && (shape == 0 || !(stopped() || best->even())); ++shape) {
       Refined refined(fields.Grid());
-      for (int cut = 0; cut < kCuts && (cut == 0 || !stopped()); ++cut) Refine(policy, groups, shape, nullptr, refined);
+      Partition made = MakePartition(policy, groups, refined.cost.Field(), nullptr, shape);
+      const std::span<const Box> boxes = made.boxes();
+      if (std::ranges::any_of(begun, [&](const std::vector<Box>& other) { return std::ranges::equal(other, boxes); })) continue;
+      begun.emplace_back(boxes.begin(), boxes.end());
+      Refine(policy, std::move(made), refined);
+      for (int cut = 1; cut < kCuts && !stopped() && !refined.even(); ++cut) {
+        Refine(policy, MakePartition(policy, groups, refined.cost.Field(), nullptr, shape), refined);
+      }
       if (!best || refined.frame < best->frame) best.emplace(std::move(refined));
     }
-    for (int i = 0; i < kResizings && !stopped(); ++i) {
-      const Partition of = best->best.partition;
-      Refine(policy, groups, 0, &of, *best);
+    for (int i = 0; i < kResizings && !stopped() && !best->even(); ++i) {
+      Partition made = MakePartition(policy, groups, best->cost.Field(), &best->best.partition);
+      if (std::ranges::equal(made.boxes(), best->best.partition.boxes())) break;
+      Refine(policy, std::move(made), *best);
     }
     return std::move(best->best);
   }
@@ -408,7 +427,7 @@ struct LayoutMaker::State {
 
   const LayoutRequest request;
   WorkFields fields;
-  std::optional<CostEstimator> costs;
+  AnalyticCost analytic;  // made at its first use
   std::optional<LeastExtinction> extinction;
 };
 

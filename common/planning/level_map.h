@@ -16,7 +16,7 @@ struct LevelMap {
   // Levels of the dataset, finest first; not empty. The voxels of the first one are the frame's grid.
   std::vector<int> levels = {0};
   Index3 side;                        // side in voxels of that grid, by axis; the last zones may be cut off
-  Index3 counts;                      // zones by axis
+  Index3 counts;                      // zones by axis (IndicesIn)
   std::vector<std::uint8_t> of_zone;  // index into `levels`, or kOutside; x fastest. Empty: all is drawn from the first level
 
   bool one_level() const { return of_zone.empty(); }
@@ -26,15 +26,6 @@ struct LevelMap {
     return {begin, Min(begin + side, size)};
   }
   std::uint8_t Of(const Index3& number) const { return of_zone[NumberIn(counts, number)]; }
-  // Calls function(number) for each zone, x fastest.
-  template <class Function>
-  void ForEachZone(Function&& function) const {
-    for (Index3 at; at.z < counts.z; ++at.z) {
-      for (at.y = 0; at.y < counts.y; ++at.y) {
-        for (at.x = 0; at.x < counts.x; ++at.x) function(at);
-      }
-    }
-  }
   friend bool operator==(const LevelMap&, const LevelMap&) = default;
 };
 

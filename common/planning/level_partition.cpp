@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "common/volume/indices.h"
+
 namespace slabstream {
 namespace {
 
@@ -81,31 +83,21 @@ class Divider {
     return zones;
   }
 
-  template <class Function>
-  void Visit(const Box& zones, Function&& function) const {
-    for (Index3 zone = zones.begin; zone.z < zones.end.z; ++zone.z) {
-      for (zone.y = zones.begin.y; zone.y < zones.end.y; ++zone.y) {
-        for (zone.x = zones.begin.x; zone.x < zones.end.x; ++zone.x) function(zone, map_.Of(zone));
-      }
-    }
-  }
-
   // The plane between zones that leaves the fewest zones among those of another level; of equal ones, the one that halves best. None: all
   // zones are of one level.
   std::optional<Cut> BetweenLevels(const Box& box) const {
     const Box zones = ZonesIn(box);
     const std::size_t kinds = map_.levels.size() + 1;
-    const auto kind = [&](std::uint8_t level) { return level == LevelMap::kOutside ? kinds - 1 : level; };
+    const auto kind = [&](const Index3& zone) { return map_.Of(zone) == LevelMap::kOutside ? kinds - 1 : map_.Of(zone); };
     Counts all(kinds);
-    Visit(zones, [&](const Index3&, std::uint8_t level) { ++all[kind(level)]; });
+    for (const Index3& zone : IndicesIn(zones)) ++all[kind(zone)];
     if (Minority(all) == 0) return std::nullopt;
     std::optional<Cut> best;
     auto least = std::tuple(std::numeric_limits<std::int64_t>::max(), std::int64_t{0});
     for (const Axis axis : kAxes) {
       const auto count = std::size_t(zones.size()[axis]);
       Counts slices(count * kinds), below(kinds), above = all;
-      Visit(zones,
-            [&](const Index3& zone, std::uint8_t level) { ++slices[std::size_t(zone[axis] - zones.begin[axis]) * kinds + kind(level)]; });
+      for (const Index3& zone : IndicesIn(zones)) ++slices[std::size_t(zone[axis] - zones.begin[axis]) * kinds + kind(zone)];
       for (std::size_t i = 0; i + 1 < count; ++i) {
         for (std::size_t level = 0; level < kinds; ++level) {
           below[level] += slices[i * kinds + level];

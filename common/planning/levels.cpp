@@ -17,6 +17,7 @@
 #include "common/view/default_view.h"
 #include "common/view/world_limits.h"
 #include "common/volume/grid_map.h"
+#include "common/volume/indices.h"
 #include "common/volume/light_volume.h"
 
 namespace slabstream {
@@ -60,13 +61,13 @@ LevelMap ZonesOf(const Index3& size) {
 template <class Function>
 void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetup& setup, Function&& function) {
   const GridMap to_camera = MapBetween(grid, WorldGeometryOf(setup));
-  map.ForEachZone([&](const Index3& zone) {
+  for (const Index3& zone : IndicesIn(map.counts)) {
     const Box box = map.BoxOf(zone, grid.size);
     const Camera::ImageExtent extent = ExtentOf(box, to_camera, setup.camera);
     const bool shown =
         InPicture(extent, setup.camera) && setup.clip.MayKeep(CoveringVoxels(box, to_camera, setup.description.geometry.size));
     function(shown ? setup.unit * WidthAt(extent, setup.camera) : 0);
-  });
+  }
 }
 
 // The width of the least pixel that shows something of the volume; 0: none does.
@@ -81,9 +82,9 @@ double LeastWidth(const VolumeGeometry& grid, const FrameSetup& setup) {
 // Zones that touch at a side are of levels next to each other: the coarser one gives way.
 void Even(LevelMap& map) {
   for (bool changed = true; std::exchange(changed, false);) {
-    map.ForEachZone([&](const Index3& zone) {
+    for (const Index3& zone : IndicesIn(map.counts)) {
       std::uint8_t& level = map.of_zone[NumberIn(map.counts, zone)];
-      if (level == LevelMap::kOutside) return;
+      if (level == LevelMap::kOutside) continue;
       for (const Axis axis : kAxes) {
         for (const int step : {-1, 1}) {
           Index3 beside = zone;
@@ -93,7 +94,7 @@ void Even(LevelMap& map) {
           changed = true;
         }
       }
-    });
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include "common/planning/brick_visibility.h"
 #include "common/volume/box_assembly.h"
 #include "common/volume/bricks.h"
+#include "common/volume/indices.h"
 
 namespace slabstream {
 namespace {
@@ -38,12 +39,11 @@ UnreadParts::UnreadParts(const VolumeSummary& summary, ClassificationTable drawn
 }
 
 bool UnreadParts::AnyDrawn(const Box& box) const {
-  const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
-  const std::int32_t first = brick_of(box.begin.x), last = brick_of(box.end.x - 1);
-  for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
-    for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
+  const auto [first, end] = CubesTouched(box, kBrick);
+  for (std::int32_t z = first.z; z < end.z; ++z) {
+    for (std::int32_t y = first.y; y < end.y; ++y) {
       const auto row = drawn_.begin() + std::ptrdiff_t(NumberIn(summary_.brick_counts, {0, y, z}));
-      if (std::find(row + first, row + last + 1, 1) != row + last + 1) return true;
+      if (std::find(row + first.x, row + end.x, 1) != row + end.x) return true;
     }
   }
   return false;
@@ -59,17 +59,11 @@ std::vector<FilledBox> UnreadParts::Of(const Box& padded) const {
 
 // Takes the sample of any brick that has finite ones.
 void UnreadParts::AddFill(const Box& part, std::vector<FilledBox>& filled) const {
-  const Index3 first = {part.begin.x / kBrick, part.begin.y / kBrick, part.begin.z / kBrick};
-  const Index3 end = CubesOver(part.end, kBrick);
-  for (Index3 brick = first; brick.z < end.z; ++brick.z) {
-    for (brick.y = first.y; brick.y < end.y; ++brick.y) {
-      for (brick.x = first.x; brick.x < end.x; ++brick.x) {
-        const ValueRange& range = (*summary_.indexed)[NumberIn(summary_.brick_counts, brick)];
-        if (range.min > range.max) continue;
-        filled.push_back({part, StoredSample(double(range.min), summary_.description)});
-        return;
-      }
-    }
+  for (const Index3& brick : IndicesIn(CubesTouched(part, kBrick))) {
+    const ValueRange& range = (*summary_.indexed)[NumberIn(summary_.brick_counts, brick)];
+    if (range.min > range.max) continue;
+    filled.push_back({part, StoredSample(double(range.min), summary_.description)});
+    return;
   }
 }
 

@@ -11,6 +11,7 @@
 #include "common/planning/frame_window.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/volume/bricks.h"
+#include "common/volume/indices.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
@@ -31,14 +32,8 @@ std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
 template <class Function>
 void VisitBricks(const Box& padded, const VolumeSummary& summary, Function&& function) {
   const BrickGrid grid(padded);
-  for (std::int32_t z = 0; z < grid.counts.z; ++z) {
-    for (std::int32_t y = 0; y < grid.counts.y; ++y) {
-      for (std::int32_t x = 0; x < grid.counts.x; ++x) {
-        const Index3 brick = grid.first + Index3{x, y, z};
-        function(NumberIn(summary.brick_counts, brick), grid.BoxOf(brick));
-      }
-    }
-  }
+  for (const Index3& brick : IndicesIn(Box{grid.first, grid.first + grid.counts}))
+    function(NumberIn(summary.brick_counts, brick), grid.BoxOf(brick));
 }
 
 // Of the cells of an unstructured grid in the bricks that the padded box touches.

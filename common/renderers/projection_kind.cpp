@@ -6,25 +6,12 @@
 #include "common/renderers/sampling_rate.h"
 
 namespace slabstream {
-namespace {
-
-class ProjectionCost : public AnalyticCost {
- public:
-  explicit ProjectionCost(double sampling_rate) : sampling_rate_(sampling_rate) {}
-  double Seconds(const Box& box, const CostView& view) const override {
+AnalyticCost ProjectionKind::MakeCost(const CostBasis& basis) const {
+  return [rate = SamplingRateOf(basis.parameters)](const Box& box, const CostView& view) {
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
     namespace cost = calibration::projection;
-    return cost::kBox + cost::kSample * sampling_rate_ * double(box.voxel_count()) * pixels;
-  }
-
- private:
-  const double sampling_rate_;
-};
-
-}  // namespace
-
-std::unique_ptr<AnalyticCost> ProjectionKind::MakeCost(const CostBasis& basis) const {
-  return std::make_unique<ProjectionCost>(SamplingRateOf(basis.parameters));
+    return cost::kBox + cost::kSample * rate * double(box.voxel_count()) * pixels;
+  };
 }
 
 ClassificationTable ProjectionKind::DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const {

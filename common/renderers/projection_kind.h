@@ -2,8 +2,6 @@
 // worker/rays/project.h), and values become colours at the end. Every box draws, since any may change a ray's value.
 #pragma once
 
-#include <memory>
-
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
 #include "common/parallel/parallel.h"
@@ -16,7 +14,7 @@ class ProjectionKind : public RendererKind {
   using RendererKind::RendererKind;
 
   // The first parameter is the sampling rate. The time of a box is that of its samples, along the rays of all pixels that it covers.
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override;
+  AnalyticCost MakeCost(const CostBasis& basis) const override;
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override;
   bool FrameIsPicture(const FrameSetup& /*setup*/) const override { return false; }
 

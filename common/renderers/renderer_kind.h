@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
+#include <functional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -54,13 +54,9 @@ struct CostView {
 // The view of a setup's frame.
 CostView CostViewOf(const FrameSetup& setup);
 
-// The time that boxes of one volume take under one transfer function.
-class AnalyticCost {
- public:
-  virtual ~AnalyticCost() = default;
-  // Seconds of one thread; 0 if the box draws nothing. `box` lies inside the volume and is not empty.
-  virtual double Seconds(const Box& box, const CostView& view) const = 0;
-};
+// The time that boxes of one volume take under one transfer function: seconds of one thread; 0 if the box draws nothing. `box` lies inside
+// the volume and is not empty.
+using AnalyticCost = std::function<double(const Box& box, const CostView& view)>;
 
 // What an AnalyticCost is made from; all of it must outlive it.
 struct CostBasis {
@@ -134,7 +130,7 @@ class RendererKind {
   // The default is Table.
   virtual ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const;
 
-  virtual std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const = 0;
+  virtual AnalyticCost MakeCost(const CostBasis& basis) const = 0;
 
   // Makes the picture from the accumulated frame or a share of it, which stores all its pixels. Bounds of the result are in pixels of the
   // picture.

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 
 namespace slabstream {
@@ -24,6 +25,13 @@ inline sigset_t StopSignals() {
 inline void BlockStopSignals() {
   const sigset_t signals = StopSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+// Whether one of the blocked signals has come, or comes within this time.
+inline bool StopComesWithin(std::chrono::milliseconds time) {
+  const sigset_t signals = StopSignals();
+  const timespec limit{time.count() / 1000, time.count() % 1000 * 1'000'000};
+  return ::sigtimedwait(&signals, nullptr, &limit) > 0;
 }
 
 // `kRequest` is called by the signal handler, once for each signal. Service has WaitUntilStopped().

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/image/local_image.h"
 #include "common/wire/codecs.h"
 #include "slabstream/v1/envelope.pb.h"
 
@@ -84,7 +85,7 @@ std::size_t PayloadBytesOf(const FrameReply& message) {
 }
 std::size_t PayloadBytesOf(const SentPicture& message) { return message.bytes; }
 std::size_t PayloadBytesOf(const PartialImage& message) {
-  if (message.shared) return sizeof(ColumnSpan) * message.shared->rows();
+  if (message.shared) return sizeof(ColumnSpan) * std::size_t(message.shared->bounds.height());
   return message.packed ? message.packed->bytes : PayloadBytes(message.image);
 }
 std::size_t PayloadBytesOf(const Chunk& message) { return message.encoded_bytes; }

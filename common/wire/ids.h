@@ -1,8 +1,11 @@
-// Identities and limits that appear in many messages.
+// Identities, limits and small values that messages are made of.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "common/planning/worker_id.h"
 
@@ -25,6 +28,21 @@ struct GroupKey {
   std::uint32_t group = 0;
   friend bool operator==(const GroupKey&, const GroupKey&) = default;
   friend auto operator<=>(const GroupKey&, const GroupKey&) = default;
+};
+
+// The slot that a worker owns, among how many.
+struct SlotPlace {
+  std::uint32_t slot = 0;
+  std::uint32_t slots = 0;  // 0: it owns none
+  friend bool operator==(const SlotPlace&, const SlotPlace&) = default;
+};
+
+// A label of a dataset that a client sends.
+struct NewLabel {
+  std::uint32_t value = 1;                         // [1, kMaxLabelValue]
+  std::string name = {};                           // at most kMaxLabelNameBytes
+  std::optional<std::array<float, 3>> color = {};  // straight, [0, 1]; none: StandardColor
+  friend bool operator==(const NewLabel&, const NewLabel&) = default;
 };
 
 }  // namespace slabstream

@@ -17,6 +17,4 @@ inline constexpr std::size_t kMaxPeers = std::size_t{kMaxRanks} + 1;            
 inline constexpr std::size_t kMaxListed = 65536;  // workers or datasets of a StatusReply, keys of a KeysReply
 inline constexpr std::size_t kKeyTextBytes = 40;  // a public key (common/transport/keys.h)
 
-inline constexpr std::size_t kMaxKeyBytes = 64;  // bytes of a key or a date that is named
-
 }  // namespace slabstream

@@ -14,11 +14,9 @@
 #include <variant>
 
 #include "common/base/check.h"
-#include "common/base/status.h"
-#include "common/frame/dataset_id.h"
 #include "common/volume/layers.h"
-#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
+#include "common/wire/voxels_structs.h"
 
 namespace slabstream {
 
@@ -68,38 +66,6 @@ inline ChunkPart PartOfChunk(const Box& box, const SampleTypes& types, std::uint
 inline std::uint32_t BytesOfChunk(const Box& box, const SampleTypes& types, std::uint32_t chunk) {
   return PartOfChunk(box, types, chunk).bytes;
 }
-
-struct ChunkRequest {
-  Epoch epoch = 0;
-  WorkerId worker = 0;
-  DatasetId dataset = 0;
-  Box box;                  // not empty
-  std::uint32_t chunk = 0;  // [0, ChunkCount), or from kFirstCellChunk on
-  friend bool operator==(const ChunkRequest&, const ChunkRequest&) = default;
-};
-
-struct Chunk {  // payload: the packed samples or cells
-  Epoch epoch = 0;
-  DatasetId dataset = 0;
-  Box box;
-  std::uint32_t chunk = 0;
-  Codec codec = Codec::kRaw;        // kZstd: plain zstd of the samples, bytes not grouped
-  std::uint32_t raw_bytes = 0;      // after unpacking, [1, kChunkBytes]
-  std::uint32_t encoded_bytes = 0;  // length of the payload frame
-  std::uint64_t digest = 0;         // XXH3-64 of the unpacked bytes
-  std::uint64_t cell_bytes = 0;     // for a chunk of cells: bytes of all cells of the box, [1, kMaxCellBytes]; else 0
-  std::uint64_t stored_bytes = 0;   // VolumeSource::TakeStoredBytes of whoever has read the dataset
-  friend bool operator==(const Chunk&, const Chunk&) = default;
-};
-
-struct ChunkRefused {
-  Epoch epoch = 0;
-  DatasetId dataset = 0;
-  Box box;
-  std::uint32_t chunk = 0;
-  Status status;  // not ok: no such dataset, box outside the volume
-  friend bool operator==(const ChunkRefused&, const ChunkRefused&) = default;
-};
 
 using WorkerToVoxels = std::variant<ChunkRequest>;
 using VoxelsToWorker = std::variant<Chunk, ChunkRefused>;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <concepts>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,9 +19,6 @@
 #include "coordinator/datasets/dataset_machine.h"
 
 namespace slabstream {
-
-// What datasets may take of a coordinator's memory; the rest is for a volume that is being read, and for pictures. `memory_bytes` 0: no
-// limit.
 
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
@@ -122,12 +120,10 @@ struct DatasetMachine::State {
 
   // ---- messages of clients
   void OnMessage(PeerToken client, const DataOrder& message, const Bytes&);
-  void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const ViewQuery& message, const Bytes&) { Ask(client, message); }
+  template <std::convertible_to<Question> Query>
+  void OnMessage(PeerToken client, const Query& message, const Bytes&) {
+    Ask(client, message);
+  }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
   void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);

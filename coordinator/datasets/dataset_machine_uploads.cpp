@@ -34,8 +34,9 @@ Status DatasetMachine::State::AdmitUpload(const AddVolume& order) {
   if (datasets.size() + uploads.size() >= config.max_datasets) {
     return Status::ResourceExhausted(fmt::format("the catalogue has {} datasets, which is its limit", datasets.size()));
   }
-  const std::uint64_t share = DatasetShare(config.memory_bytes), bytes = order.bytes();
-  while (datasets.bytes() + UploadBytes() + bytes > share && UnloadOne()) {
+  const std::uint64_t share = DatasetShare(config.memory_bytes), bytes = BytesToSend(order);
+  // What can never fit makes no room.
+  while (UploadBytes() + bytes <= share && datasets.bytes() + UploadBytes() + bytes > share && UnloadOne()) {
   }
   if (datasets.bytes() + UploadBytes() + bytes <= share) return Status::Ok();
   ++refused.too_large;
@@ -49,8 +50,8 @@ Status DatasetMachine::State::NameIsFree(const std::string& name) const {
 
 std::uint64_t DatasetMachine::State::UploadBytes() const {
   std::uint64_t total = 0;
-  for (const auto& [id, upload] : uploads) total += upload.order.bytes();
-  for (const auto& [name, file] : files) total += file.order.bytes();
+  for (const auto& [id, upload] : uploads) total += BytesToSend(upload.order);
+  for (const auto& [name, file] : files) total += BytesToSend(file.order);
   return total;
 }
 
@@ -62,7 +63,7 @@ void DatasetMachine::State::On(const UploadBegun& event) {
 }
 
 void DatasetMachine::State::GrantCredit(OpenUpload& upload) {
-  upload.allowed = std::min(upload.received + kUploadWindow, upload.order.bytes());
+  upload.allowed = std::min(upload.received + kUploadWindow, BytesToSend(upload.order));
   Send(upload.client, VolumeCredit{.nonce = upload.order.nonce, .received = upload.received, .allowed = upload.allowed});
 }
 
@@ -82,9 +83,9 @@ void DatasetMachine::State::OnMessage(PeerToken client, const VolumePart& part, 
   }
   actions.emplace_back(StoreUpload{found->first, part.begin, payload});
   upload.received += part.bytes;
-  if (upload.received == upload.order.bytes()) {
+  if (upload.received == BytesToSend(upload.order)) {
     actions.emplace_back(FinishUpload{found->first});
-  } else if (upload.allowed < upload.order.bytes() && upload.allowed - upload.received <= kUploadWindow / 2) {
+  } else if (upload.allowed < BytesToSend(upload.order) && upload.allowed - upload.received <= kUploadWindow / 2) {
     GrantCredit(upload);
   }
 }

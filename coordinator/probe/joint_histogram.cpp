@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/volume/indices.h"
+
 namespace slabstream {
 namespace {
 
@@ -12,8 +14,8 @@ constexpr std::int64_t kMostBoxes = 64;
 
 // Boxes at multiples of kSide, as evenly spread as whole numbers allow. At least one along each axis.
 std::vector<Box> SpreadBoxes(const Index3& size) {
-  Index3 counts = {(size.x + kSide - 1) / kSide, (size.y + kSide - 1) / kSide, (size.z + kSide - 1) / kSide};
-  const Index3 all = counts;
+  const Index3 all = CubesOver(size, kSide);
+  Index3 counts = all;
   while (std::int64_t{counts.x} * counts.y * counts.z > kMostBoxes) {
     std::int32_t& most = counts.x >= counts.y && counts.x >= counts.z ? counts.x : counts.y >= counts.z ? counts.y : counts.z;
     --most;
@@ -22,13 +24,9 @@ std::vector<Box> SpreadBoxes(const Index3& size) {
     return kSide * std::int32_t((std::int64_t{2} * i + 1) * of / (2 * count));
   };
   std::vector<Box> boxes;
-  for (Index3 i; i.z < counts.z; ++i.z) {
-    for (i.y = 0; i.y < counts.y; ++i.y) {
-      for (i.x = 0; i.x < counts.x; ++i.x) {
-        const Index3 begin = {at(i.x, counts.x, all.x), at(i.y, counts.y, all.y), at(i.z, counts.z, all.z)};
-        boxes.push_back(Intersection({begin, begin + Uniform(kSide)}, Box{{}, size}));
-      }
-    }
+  for (const Index3& i : IndicesIn(counts)) {
+    const Index3 begin = {at(i.x, counts.x, all.x), at(i.y, counts.y, all.y), at(i.z, counts.z, all.z)};
+    boxes.push_back(Intersection({begin, begin + Uniform(kSide)}, Box{{}, size}));
   }
   return boxes;
 }

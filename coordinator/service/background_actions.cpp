@@ -14,7 +14,7 @@
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/text/url.h"

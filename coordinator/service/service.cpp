@@ -9,6 +9,7 @@
 #include <deque>
 #include <random>
 #include <span>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -80,6 +81,10 @@ struct CoordinatorService::Impl {
   void ReceiveFromWorkers();
   // True: a program of another version wrote the message. Its sender hears our version, so that both sides say both.
   bool AnswerOtherVersion(Socket& socket, const Incoming& incoming, Plane plane);
+  // Tell the sender of a message that cannot be decoded, as far as it can be told. A refused request whose id can be read has an answer,
+  // which the machine sends, so that nobody waits for it in vain.
+  void RefuseWorker(const Incoming& incoming, const Status& why);
+  std::optional<CoordinatorToClient> RefuseClient(const Incoming& incoming, const Status& why);
   // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
   std::optional<Role> RoleOf(const Incoming& incoming) { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
   bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
@@ -236,6 +241,23 @@ bool CoordinatorService::Impl::AnswerOtherVersion(Socket& socket, const Incoming
   return true;
 }
 
+void CoordinatorService::Impl::RefuseWorker(const Incoming& incoming, const Status& why) {
+  if (AnswerOtherVersion(control, incoming, Plane::kControl)) return;
+  complaints.Warning("control plane: dropped a message: " + why.message());
+  if (!Decode<ClientToCoordinator>(incoming.header()).ok()) return;
+  const Status elsewhere = Status::InvalidArgument("this is the endpoint for workers; clients connect to " + client_endpoint);
+  (void)control.Send(incoming.identity, Encode(OrderRefused{.nonce = 0, .status = elsewhere}));
+}
+
+std::optional<CoordinatorToClient> CoordinatorService::Impl::RefuseClient(const Incoming& incoming, const Status& why) {
+  if (AnswerOtherVersion(clients, incoming, Plane::kClient)) return std::nullopt;
+  complaints.Warning("client plane: refused a message: " + why.message());
+  if (!Decode<WorkerToCoordinator>(incoming.header()).ok()) return RefusalOf(incoming.header(), why);
+  const Status elsewhere = Status::InvalidArgument("this is the endpoint for clients; workers connect to " + worker_endpoint);
+  (void)clients.Send(incoming.identity, Encode(OrderRefused{.nonce = 0, .status = elsewhere}));  // a worker would wait for ever
+  return std::nullopt;
+}
+
 void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
@@ -245,12 +267,9 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
     Result<WorkerToCoordinator> message =
         Guarded("decoding", [&] { return Decode<WorkerToCoordinator>(incoming->header(), payload.size()); });
     if (!message.ok()) {
-      if (AnswerOtherVersion(control, *incoming, Plane::kControl)) continue;
-      complaints.Warning("control plane: dropped a message: " + message.status().message());
-      if (Decode<ClientToCoordinator>(incoming->header()).ok()) {
-        const Status why = Status::InvalidArgument("this is the endpoint for workers; clients connect to " + client_endpoint);
-        (void)control.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
-      }
+      // Guarded, as decoding is: a message that nobody understands must not end the service.
+      const Status refused = Guarded("refusing", [&] { RefuseWorker(*incoming, message.status()); });
+      if (!refused.ok()) complaints.Warning("control plane: " + refused.message());
       continue;
     }
     HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});
@@ -266,17 +285,10 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     Result<ClientToCoordinator> message =
         Guarded("decoding", [&] { return Decode<ClientToCoordinator>(incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
-      if (AnswerOtherVersion(clients, *incoming, Plane::kClient)) continue;
-      complaints.Warning("client plane: refused a message: " + message.status().message());
-      if (Decode<WorkerToCoordinator>(incoming->header()).ok()) {  // it would wait for ever
-        const Status why = Status::InvalidArgument("this is the endpoint for clients; workers connect to " + worker_endpoint);
-        (void)clients.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
-        continue;
-      }
-      // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
-      if (std::optional<CoordinatorToClient> refusal = RefusalOf(incoming->header(), message.status())) {
-        HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});
-      }
+      std::optional<CoordinatorToClient> refusal;
+      const Status refused = Guarded("refusing", [&] { refusal = RefuseClient(*incoming, message.status()); });
+      if (!refused.ok()) complaints.Warning("client plane: " + refused.message());
+      if (refusal) HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});
       continue;
     }
     if (CarryOut(*incoming, *message, *role)) continue;
@@ -297,17 +309,14 @@ void CoordinatorService::Impl::ReceiveFromClients() {
 bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role) {
   const auto reply = [&](MessageView answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
   const auto refuse = [&](std::uint64_t nonce, std::string why) { reply(OrderRefused{nonce, Status::InvalidArgument(std::move(why))}); };
-  if (const auto* end = std::get_if<ShutDown>(&message); end != nullptr && role != Role::kAdmin) {
-    refuse(end->nonce, fmt::format("ending the service needs the service file of role admin, not {}", NameOf(role)));
-    return true;
-  }
-  if (const auto* data = std::get_if<DataOrder>(&message); data != nullptr && data->action != DataAction::kList && role != Role::kAdmin) {
-    refuse(data->nonce, fmt::format("adding, removing and reloading datasets needs the service file of role admin, not {}", NameOf(role)));
-    return true;
-  }
-  if (const auto* add = std::get_if<AddVolume>(&message); add != nullptr && role != Role::kAdmin) {
-    refuse(add->nonce, fmt::format("adding a volume needs the service file of role admin, not {}", NameOf(role)));
-    return true;
+  const auto only_admin = [&](std::uint64_t nonce, std::string_view what) {
+    if (role != Role::kAdmin) refuse(nonce, fmt::format("{} needs the service file of role admin, not {}", what, NameOf(role)));
+    return role != Role::kAdmin;
+  };
+  if (const auto* end = std::get_if<ShutDown>(&message)) return only_admin(end->nonce, "ending the service");
+  if (const auto* add = std::get_if<AddVolume>(&message)) return only_admin(add->nonce, "adding a volume");
+  if (const auto* data = std::get_if<DataOrder>(&message)) {
+    return data->action != DataAction::kList && only_admin(data->nonce, "adding, removing and reloading datasets");
   }
   const auto* order = std::get_if<KeysOrder>(&message);
   if (order == nullptr) return false;

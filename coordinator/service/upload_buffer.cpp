@@ -23,7 +23,7 @@ LabelTable TableOf(const std::vector<NewLabel>& labels) {
 }  // namespace
 
 Result<std::shared_ptr<UploadBuffer>> UploadBuffer::Make(const AddVolume& order) {
-  if (Status fits = CheckFitsMemory(std::int64_t(order.bytes()), "dataset \"" + order.name + "\""); !fits.ok()) return fits;
+  if (Status fits = CheckFitsMemory(std::int64_t(BytesToSend(order)), "dataset \"" + order.name + "\""); !fits.ok()) return fits;
   std::shared_ptr<UploadBuffer> buffer(new UploadBuffer(order));
   if (order.file) {
     buffer->file_.resize(order.file->bytes);
@@ -88,7 +88,7 @@ Result<DataSource> UploadBuffer::Finish() {
     whole.layers.labels = labels;
   }
   DataSource source(DataLoader([whole](const TellRead&) -> Result<LoadedData> { return LoadedData{whole}; }));
-  source.held_bytes = order_.bytes();
+  source.held_bytes = BytesToSend(order_);
   return source;
 }
 

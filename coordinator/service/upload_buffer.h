@@ -7,7 +7,7 @@
 
 #include "common/base/status.h"
 #include "common/memory/aligned_buffer.h"
-#include "common/wire/volume_messages.h"
+#include "common/wire/client_messages.h"
 #include "data/catalogue/data_source.h"
 
 namespace slabstream {

@@ -149,21 +149,25 @@ Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
 
 void VoxelServer::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket_};
+  const auto guarded = [this](auto&& work) {
+    const Status done = Guarded("voxels plane", work);
+    if (!done.ok()) complaints_.Warning(done.message());  // the worker asks again when its request times out
+  };
   while (!stop.stop_requested()) {
-    Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
-    for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
-    for (ReadDone& done : read_->TakeAll()) {
-      const DatasetId dataset = done.asked->request.dataset;
-      --reads_.at(dataset).begun;
-      Reply(done.asked->identity, done.asked->request, std::move(done.answer));
-      ReadNext(dataset);
-    }
-    while (!stop.stop_requested()) {
-      const std::optional<Incoming> incoming = socket_.TryReceive();
-      if (!incoming) break;
-      const Status answered = Guarded("voxels plane", [&] { Answer(*incoming); });
-      if (!answered.ok()) complaints_.Warning(answered.message());  // the worker asks again when its request times out
-    }
+    guarded([&] {
+      Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
+      for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
+      for (ReadDone& done : read_->TakeAll()) {
+        --reads_.at(done.asked->request.dataset).begun;
+        guarded([&] { Reply(done.asked->identity, done.asked->request, std::move(done.answer)); });
+        guarded([&] { ReadNext(done.asked->request.dataset); });
+      }
+      while (!stop.stop_requested()) {
+        const std::optional<Incoming> incoming = socket_.TryReceive();
+        if (!incoming) break;
+        guarded([&] { Answer(*incoming); });
+      }
+    });
   }
 }
 
@@ -209,18 +213,22 @@ void VoxelServer::ReadNext(DatasetId dataset) {
     // Of zeros, also where there is no layer: g++ 12 says of any other that it may be read before it is set.
     const SampleTypes types(asked->from.description().type, LayerTypes());
     const ChunkPart part = PartOfChunk(request.box, types, request.chunk);
-    ReadPart(asked->from.source, asked->from.level, request.box, part.begin, part.bytes,
-             [inbox = read_, codec = codec_, epoch = epoch_, asked](Result<Bytes> samples) {
-               const ChunkRequest& of = asked->request;
-               auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
-                 if (!samples.ok()) return samples.status();
-                 Chunk chunk{.epoch = epoch, .dataset = of.dataset, .box = of.box, .chunk = of.chunk};
-                 chunk.stored_bytes = asked->from.source->TakeStoredBytes();
-                 Bytes payload = PackChunk(*std::move(samples), codec, chunk);
-                 return std::pair(chunk, std::move(payload));
-               });
-               inbox->Post({asked, std::move(answer)});
-             });
+    const auto done = [inbox = read_, codec = codec_, epoch = epoch_, asked](Result<Bytes> samples) {
+      const ChunkRequest& of = asked->request;
+      auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
+        if (!samples.ok()) return samples.status();
+        Chunk chunk{.epoch = epoch, .dataset = of.dataset, .box = of.box, .chunk = of.chunk};
+        chunk.stored_bytes = asked->from.source->TakeStoredBytes();
+        Bytes payload = PackChunk(*std::move(samples), codec, chunk);
+        return std::pair(chunk, std::move(payload));
+      });
+      inbox->Post({asked, std::move(answer)});
+    };
+    const Status begun =
+        Guarded("a chunk of voxels", [&] { ReadPart(asked->from.source, asked->from.level, request.box, part.begin, part.bytes, done); });
+    if (begun.ok()) continue;
+    --reads.begun;  // its place is free again
+    Reply(asked->identity, request, begun);
   }
   if (reads.waiting.empty() && reads.begun == 0) reads_.erase(dataset);
 }

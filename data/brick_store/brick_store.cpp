@@ -7,7 +7,6 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <span>
 #include <utility>
 
 #include "common/base/log.h"

@@ -2,7 +2,6 @@
 // round blocks, packed by LZ4 or Zstandard. Source: https://github.com/kiyo-masui/bitshuffle
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <utility>
 
 #include "common/base/check.h"
@@ -50,48 +49,42 @@ std::uint64_t BigEndian(std::span<const std::byte> bytes) {
   return number;
 }
 
-class Bitshuffle : public ChunkCodec {
- public:
-  Bitshuffle(std::size_t element_bytes, std::size_t block_elements)
-      : element_bytes_(element_bytes), block_bytes_(block_elements * element_bytes) {}
+}  // namespace
 
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+SharedCodec BitshuffleCodec(std::size_t element_bytes, std::size_t block_elements) {
+  CHECK(element_bytes >= 1 && block_elements > 0 && block_elements % kTogether == 0);
+  return std::make_shared<ChunkCodec>([=](const Bytes& packed, std::uint64_t most) -> Result<Bytes> {
     if (packed.size() > most) return TooManyBytes("bitshuffle", packed.size(), most);
     UnwrittenVector<std::byte> out(packed.size());
     std::span<const std::byte> in = packed.span();
     std::byte* to = out.data();
     // What is left over at the end is as it was.
-    const std::size_t whole = in.size() / (kTogether * element_bytes_) * kTogether * element_bytes_;
+    const std::size_t whole = in.size() / (kTogether * element_bytes) * kTogether * element_bytes;
     for (std::size_t left = whole; left > 0;) {
-      const std::size_t bytes = std::min(left, block_bytes_);
-      Unshuffle(in.first(bytes), element_bytes_, to);
+      const std::size_t bytes = std::min(left, block_elements * element_bytes);
+      Unshuffle(in.first(bytes), element_bytes, to);
       in = in.subspan(bytes);
       to += bytes;
       left -= bytes;
     }
     std::ranges::copy(in, to);
     return Bytes(std::move(out));
-  }
-
- private:
-  const std::size_t element_bytes_, block_bytes_;
-};
+  });
+}
 
 // The number of decoded bytes (64 bits) and of those of a block (32 bits); then each block behind the number of its packed bytes (32 bits).
 // All numbers are big endian.
-class Blocks : public ChunkCodec {
- public:
-  explicit Blocks(const BlockFormat& format) : format_(format) {}
-
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+SharedCodec BlocksCodec(const BlockFormat& format) {
+  CHECK(format.element_bytes >= 1 && format.packing != nullptr);
+  return std::make_shared<ChunkCodec>([format](const Bytes& packed, std::uint64_t most) -> Result<Bytes> {
     constexpr std::size_t kHeader = 12, kLength = 4;
     const std::span<const std::byte> all = packed.span();
     if (all.size() < kHeader) return DamagedBytes("blocks");
     const std::uint64_t bytes = BigEndian(all.first(8)), stated = BigEndian(all.subspan(8, 4));
     if (bytes > most) return TooManyBytes("a chunk", bytes, most);
-    const std::size_t together = kTogether * format_.element_bytes;
-    if (stated == 0 || (format_.bitshuffle && stated % together != 0)) return DamagedBytes("blocks");
-    const std::uint64_t plain = format_.bitshuffle ? bytes % together : 0;  // at the end, not packed
+    const std::size_t together = kTogether * format.element_bytes;
+    if (stated == 0 || (format.bitshuffle && stated % together != 0)) return DamagedBytes("blocks");
+    const std::uint64_t plain = format.bitshuffle ? bytes % together : 0;  // at the end, not packed
     UnwrittenVector<std::byte> out(bytes);
     std::size_t at = kHeader;
     for (std::uint64_t done = 0; done < bytes - plain;) {
@@ -103,15 +96,15 @@ class Blocks : public ChunkCodec {
       Bytes block = packed.Part(at, length);
       at += length;
       // LZ4's filter leaves a block as it is that would not shrink.
-      const bool as_it_is = !format_.bitshuffle && length == block_bytes;
+      const bool as_it_is = !format.bitshuffle && length == block_bytes;
       if (!as_it_is) {
-        Result<Bytes> decoded = format_.packing->Decode(std::move(block), block_bytes);
+        Result<Bytes> decoded = format.packing->Decode(std::move(block), block_bytes);
         if (!decoded.ok()) return decoded;
         block = *std::move(decoded);
       }
       if (block.size() != block_bytes) return DamagedBytes("blocks");
-      if (format_.bitshuffle) {
-        Unshuffle(block.span(), format_.element_bytes, out.data() + done);
+      if (format.bitshuffle) {
+        Unshuffle(block.span(), format.element_bytes, out.data() + done);
       } else {
         std::ranges::copy(block.span(), out.data() + done);
       }
@@ -120,22 +113,7 @@ class Blocks : public ChunkCodec {
     if (all.size() - at < plain) return DamagedBytes("blocks");
     std::ranges::copy(all.subspan(at, plain), out.data() + bytes - plain);
     return Bytes(std::move(out));
-  }
-
- private:
-  const BlockFormat format_;
-};
-
-}  // namespace
-
-SharedCodec BitshuffleCodec(std::size_t element_bytes, std::size_t block_elements) {
-  CHECK(element_bytes >= 1 && block_elements > 0 && block_elements % kTogether == 0);
-  return std::make_shared<Bitshuffle>(element_bytes, block_elements);
-}
-
-SharedCodec BlocksCodec(const BlockFormat& format) {
-  CHECK(format.element_bytes >= 1 && format.packing != nullptr);
-  return std::make_shared<Blocks>(format);
+  });
 }
 
 }  // namespace slabstream

@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <bit>
 #include <cstring>
 
 #include "common/memory/pooled_vector.h"
@@ -17,43 +15,28 @@ T Swapped(T value) {
 }
 
 template <class T>
-void Swap(std::span<const std::byte> in, std::byte* out) {
-  for (std::size_t i = 0; i < in.size(); i += sizeof(T)) {
+Result<Bytes> SwapBytes(const Bytes& packed, std::uint64_t most) {
+  if (Status status = CheckElements(packed, sizeof(T), most); !status.ok()) return status;
+  UnwrittenVector<std::byte> out(packed.size());
+  for (std::size_t i = 0; i < out.size(); i += sizeof(T)) {
     T value;
-    std::memcpy(&value, in.data() + i, sizeof(T));
+    std::memcpy(&value, packed.span().data() + i, sizeof(T));
     value = Swapped(value);
-    std::memcpy(out + i, &value, sizeof(T));
+    std::memcpy(out.data() + i, &value, sizeof(T));
   }
+  return Bytes(std::move(out));
 }
-
-class SwapBytes : public ChunkCodec {
- public:
-  explicit SwapBytes(std::size_t element_bytes) : element_bytes_(element_bytes) {}
-
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    if (element_bytes_ == 1) return packed;
-    if (packed.size() > most) return TooManyBytes("a chunk", packed.size(), most);
-    if (packed.size() % element_bytes_ != 0) {
-      return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", packed.size(), element_bytes_));
-    }
-    UnwrittenVector<std::byte> out(packed.size());
-    switch (element_bytes_) {
-      case 2: Swap<std::uint16_t>(packed.span(), out.data()); break;
-      case 4: Swap<std::uint32_t>(packed.span(), out.data()); break;
-      default: Swap<std::uint64_t>(packed.span(), out.data()); break;
-    }
-    return Bytes(std::move(out));
-  }
-
- private:
-  const std::size_t element_bytes_;
-};
 
 }  // namespace
 
 SharedCodec SwapBytesCodec(std::size_t element_bytes) {
   CHECK(element_bytes == 1 || element_bytes == 2 || element_bytes == 4 || element_bytes == 8) << element_bytes;
-  return std::make_shared<SwapBytes>(element_bytes);
+  switch (element_bytes) {
+    case 1: return std::make_shared<ChunkCodec>([](Bytes packed, std::uint64_t) { return packed; });
+    case 2: return std::make_shared<ChunkCodec>(SwapBytes<std::uint16_t>);
+    case 4: return std::make_shared<ChunkCodec>(SwapBytes<std::uint32_t>);
+    default: return std::make_shared<ChunkCodec>(SwapBytes<std::uint64_t>);
+  }
 }
 
 }  // namespace slabstream

@@ -46,16 +46,13 @@ class Decompressor {
   bz_stream stream_{};
 };
 
-class Bzip2 : public ChunkCodec {
- public:
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    Decompressor decompressor;
-    return DecodeGrowing("bzip2", packed.span(), most, [&](auto& in, auto& out) { return decompressor.Step(in, out); });
-  }
-};
-
 }  // namespace
 
-SharedCodec Bzip2Codec() { return std::make_shared<Bzip2>(); }
+SharedCodec Bzip2Codec() {
+  return std::make_shared<ChunkCodec>([](const Bytes& packed, std::uint64_t most) {
+    Decompressor decompressor;
+    return DecodeGrowing("bzip2", packed.span(), most, [&](auto& in, auto& out) { return decompressor.Step(in, out); });
+  });
+}
 
 }  // namespace slabstream

@@ -6,9 +6,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
-#include <span>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/status.h"
@@ -18,16 +18,21 @@ namespace slabstream {
 
 class ChunkCodec {
  public:
-  ChunkCodec() = default;
-  virtual ~ChunkCodec() = default;
-  ChunkCodec(const ChunkCodec&) = delete;
-  ChunkCodec& operator=(const ChunkCodec&) = delete;
+  // What Decode does.
+  using Decoder = std::function<Result<Bytes>(Bytes packed, std::uint64_t most)>;
+  // `decoded_each`, `encoded_each`: bytes of an element decoded and as it is packed, of codecs that change its type.
+  explicit ChunkCodec(Decoder decode, std::size_t decoded_each = 1, std::size_t encoded_each = 1)
+      : decode_(std::move(decode)), decoded_each_(decoded_each), encoded_each_(encoded_each) {}
 
   // DataLoss: the bytes are damaged. ResourceExhausted: they say that they hold more than `most`.
-  virtual Result<Bytes> Decode(Bytes packed, std::uint64_t most) const = 0;
+  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const { return decode_(std::move(packed), most); }
 
   // The most bytes of which `bytes` decoded ones are made, if what packs them packs well. Codecs add checksums and headers.
-  virtual std::uint64_t MostEncoded(std::uint64_t bytes) const { return bytes + 4096; }
+  std::uint64_t MostEncoded(std::uint64_t bytes) const { return bytes / decoded_each_ * encoded_each_ + 4096; }
+
+ private:
+  const Decoder decode_;
+  const std::size_t decoded_each_, encoded_each_;
 };
 
 using CodecChain = std::vector<std::shared_ptr<const ChunkCodec>>;  // in the order in which a writer applies them

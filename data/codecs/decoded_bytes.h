@@ -1,31 +1,29 @@
-// What decoders share: parts of bytes, and refusals.
+// What decoders share: refusals, and numbers beside the bytes.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string_view>
-#include <utility>
 
 #include "common/base/status.h"
 #include "common/memory/bytes.h"
 
 namespace slabstream {
 
-// `count` bytes from `begin` on, without a copy.
-inline Bytes PartOf(Bytes bytes, std::size_t begin, std::size_t count) {
-  auto whole = std::make_shared<const Bytes>(std::move(bytes));
-  const std::span<const std::byte> part = whole->span().subspan(begin, count);
-  return {std::move(whole), part};
-}
-
 inline Status DamagedBytes(std::string_view codec) { return Status::DataLoss(fmt::format("damaged: these are no bytes of {}", codec)); }
 
 inline Status TooManyBytes(std::string_view codec, std::uint64_t bytes, std::uint64_t most) {
   return Status::ResourceExhausted(fmt::format("{} says that it holds {} bytes, at most {} are expected", codec, bytes, most));
+}
+
+// That there are as many bytes as whole elements have, and no more than `most`.
+inline Status CheckElements(const Bytes& packed, std::size_t element_bytes, std::uint64_t most) {
+  if (packed.size() > most) return TooManyBytes("a chunk", packed.size(), most);
+  if (packed.size() % element_bytes == 0) return Status::Ok();
+  return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", packed.size(), element_bytes));
 }
 
 // The number in the first four bytes, the lowest one first.
@@ -41,13 +39,13 @@ struct SummedBytes {
   std::uint32_t sum = 0;  // as it stands there
 };
 // `codec`: for messages. DataLoss: there is no room for a checksum; ResourceExhausted: more than `most` bytes are beside it.
-inline Result<SummedBytes> TakeSum(std::string_view codec, Bytes packed, std::uint64_t most, bool in_front = false) {
+inline Result<SummedBytes> TakeSum(std::string_view codec, const Bytes& packed, std::uint64_t most, bool in_front = false) {
   constexpr std::size_t kSumBytes = 4;
   if (packed.size() < kSumBytes) return DamagedBytes(codec);
   const std::size_t count = packed.size() - kSumBytes;
   if (count > most) return TooManyBytes(codec, count, most);
   const std::uint32_t sum = Little32(packed.span().subspan(in_front ? 0 : count));
-  return SummedBytes{PartOf(std::move(packed), in_front ? kSumBytes : 0, count), sum};
+  return SummedBytes{packed.Part(in_front ? kSumBytes : 0, count), sum};
 }
 
 }  // namespace slabstream

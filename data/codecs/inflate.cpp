@@ -43,40 +43,32 @@ class Inflater {
   z_stream stream_{};
 };
 
-class Inflate : public ChunkCodec {
- public:
-  Inflate(std::string_view name, int window_bits, bool many) : name_(name), window_bits_(window_bits), many_(many) {}
-
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+SharedCodec InflateCodec(std::string_view name, int window_bits, bool many) {
+  return std::make_shared<ChunkCodec>([=](const Bytes& packed, std::uint64_t most) -> Result<Bytes> {
     // Deflate makes at most 258 bytes of 2 bits. One more than allowed tells that there are more.
     constexpr std::uint64_t kDeflateRatio = 1032;
     const std::uint64_t limit = packed.size() > most / kDeflateRatio ? most : packed.size() * kDeflateRatio;
     UnwrittenVector<std::byte> bytes(limit + 1);
     std::span<const std::byte> in = packed.span();
     std::span<std::byte> out = bytes;
-    Inflater inflater(window_bits_);
+    Inflater inflater(window_bits);
     do {
       const int code = inflater.Member(in, out);
       if (code == Z_MEM_ERROR) throw std::bad_alloc();
-      if (out.empty()) return TooManyBytes(name_, limit + 1, limit);
-      if (code != Z_STREAM_END) return DamagedBytes(name_);
-    } while (many_ && !in.empty());
-    if (!in.empty()) return DamagedBytes(name_);
+      if (out.empty()) return TooManyBytes(name, limit + 1, limit);
+      if (code != Z_STREAM_END) return DamagedBytes(name);
+    } while (many && !in.empty());
+    if (!in.empty()) return DamagedBytes(name);
     bytes.resize(bytes.size() - out.size());
     return Bytes(std::move(bytes));
-  }
-
- private:
-  const std::string_view name_;
-  const int window_bits_;
-  const bool many_;
-};
+  });
+}
 
 constexpr int kLargestWindow = 15, kGzipHeader = 16;  // zlib's numbers
 
 }  // namespace
 
-SharedCodec GzipCodec() { return std::make_shared<Inflate>("gzip", kLargestWindow + kGzipHeader, true); }
-SharedCodec ZlibCodec() { return std::make_shared<Inflate>("zlib", kLargestWindow, false); }
+SharedCodec GzipCodec() { return InflateCodec("gzip", kLargestWindow + kGzipHeader, true); }
+SharedCodec ZlibCodec() { return InflateCodec("zlib", kLargestWindow, false); }
 
 }  // namespace slabstream

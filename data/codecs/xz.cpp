@@ -36,16 +36,13 @@ class Decoder {
   lzma_stream stream_ = LZMA_STREAM_INIT;
 };
 
-class Xz : public ChunkCodec {
- public:
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    Decoder decoder;
-    return DecodeGrowing("xz", packed.span(), most, [&](auto& in, auto& out) { return decoder.Step(in, out); });
-  }
-};
-
 }  // namespace
 
-SharedCodec XzCodec() { return std::make_shared<Xz>(); }
+SharedCodec XzCodec() {
+  return std::make_shared<ChunkCodec>([](const Bytes& packed, std::uint64_t most) {
+    Decoder decoder;
+    return DecodeGrowing("xz", packed.span(), most, [&](auto& in, auto& out) { return decoder.Step(in, out); });
+  });
+}
 
 }  // namespace slabstream

@@ -17,20 +17,11 @@
 namespace slabstream {
 namespace {
 
-// Names of a letter and digits: "s00".
-std::vector<std::string> Numbered(const std::vector<std::string>& names, char letter) {
-  std::vector<std::string> found;
-  for (const std::string& name : names) {
-    if (name.size() > 1 && name[0] == letter && ParseNumber<int>(name.substr(1)).value_or(-1) >= 0) found.push_back(name);
-  }
-  return found;
-}
-
 bool IsBigDataViewer(Hdf5File& file) {
   const Result<std::vector<std::string>> names = file.Names("/");
   if (!names.ok()) return false;
-  const std::vector<std::string> setups = Numbered(*names, 's');
-  return !setups.empty() && file.Has("/" + setups.front() + "/resolutions") && !Numbered(*names, 't').empty();
+  const std::vector<std::string> setups = Numbered(*names, "s");
+  return !setups.empty() && file.Has("/" + setups.front() + "/resolutions") && !Numbered(*names, "t").empty();
 }
 
 // Since 2023 a setup says what its samples are. Before, all were unsigned samples of 16 bits in signed ones, which is what Java has.
@@ -54,7 +45,7 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   Pyramid pyramid{.info = {.format = "BigDataViewer HDF5", .files = {file->path()}}};
   const Result<std::vector<std::string>> names = file->Names("/");
   if (!names.ok()) return names.status();
-  const std::vector<std::string> times = Numbered(*names, 't'), setups = Numbered(*names, 's');
+  const std::vector<std::string> times = Numbered(*names, "t"), setups = Numbered(*names, "s");
   pyramid.info.times = int(times.size());
   const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times, options);
   if (!time.ok()) return time.status();
@@ -63,16 +54,12 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   const Result<ViewSetupFile> xml = ReadViewSetupsBeside(file->path());
   if (!xml.ok()) return xml.status();
   if (!xml->path.empty()) pyramid.info.files.push_back(xml->path);
-  const auto setup_of = [&](const std::string& name) {
-    const auto found = std::ranges::find(xml->setups, ParseNumber<int>(name.substr(1)).value_or(-1), &ViewSetup::id);
-    return found == xml->setups.end() ? ViewSetup{} : *found;
-  };
-  for (const std::string& name : setups) pyramid.info.channels.push_back(setup_of(name).name);
+  for (const std::string& name : setups) pyramid.info.channels.push_back(xml->Of(name, "s").name);
   const Result<int> channel = ChosenChannel(file->path(), pyramid.info.channels, options);
   if (!channel.ok()) return channel.status();
   pyramid.info.channel = *channel;
   const std::string& name = setups[std::size_t(*channel)];
-  const ViewSetup setup = setup_of(name);
+  const ViewSetup setup = xml->Of(name, "s");
   const Vec3 spacing = setup.spacing.value_or(Vec3{1, 1, 1});
   if (setup.spacing) pyramid.orientation.unit = setup.unit;
 

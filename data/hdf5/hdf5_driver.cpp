@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -77,16 +76,7 @@ herr_t Read(H5FD_t* library, H5FD_mem_t, hid_t, haddr_t begin, std::size_t bytes
     file.place = Hdf5Place{begin, bytes};
     return 0;
   }
-  auto* out = static_cast<std::byte*>(buffer);
-  while (bytes > 0) {
-    const ssize_t got = ::pread(file.descriptor, out, bytes, off_t(begin));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return -1;
-    out += got;
-    begin += haddr_t(got);
-    bytes -= std::size_t(got);
-  }
-  return 0;
+  return ReadBytesAt(file.descriptor, begin, {static_cast<std::byte*>(buffer), bytes}) == bytes ? 0 : -1;
 }
 
 herr_t Write(H5FD_t*, H5FD_mem_t, hid_t, haddr_t, std::size_t, const void*) { return -1; }

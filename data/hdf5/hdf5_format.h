@@ -1,7 +1,6 @@
 // HDF5 files as sources: pyramids of Imaris and BigDataViewer, and datasets as images (hdf5_image.h).
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "common/base/status.h"

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
-#include "common/base/printable.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
 #include "data/sources/axis_choice.h"

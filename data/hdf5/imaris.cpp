@@ -2,7 +2,6 @@
 // large the image is. Source: https://imaris.oxinst.com/learning/view/article/imaris-5-5-file-format-description
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 
 #include "common/base/log.h"

@@ -4,14 +4,12 @@
 
 #include "data/layers/color_table.h"
 
-namespace slabstream::byte_lut {
+namespace slabstream {
 namespace {
 
 constexpr std::size_t kColors = 256;
 
-bool Recognises(std::string_view file) { return file.size() == 3 * kColors; }
-
-Result<ColorTable> Read(std::string_view file) {
+Result<ColorTable> ReadByteLut(std::string_view file) {
   ColorTable table;
   for (std::size_t value = 0; value < kColors; ++value) {
     LabelColor color{};
@@ -23,6 +21,8 @@ Result<ColorTable> Read(std::string_view file) {
 
 }  // namespace
 
-ColorTableFormat Format() { return {"LUT of 768 bytes", Recognises, Read}; }
+ColorTableFormat ByteLut() {
+  return {"LUT of 768 bytes", [](std::string_view file) { return file.size() == 3 * kColors; }, ReadByteLut};
+}
 
-}  // namespace slabstream::byte_lut
+}  // namespace slabstream

@@ -8,25 +8,15 @@
 
 namespace slabstream {
 
-namespace byte_lut {
-ColorTableFormat Format();
-}
-namespace free_surfer {
-ColorTableFormat Format();
-}
-namespace fsl_lut {
-ColorTableFormat Format();
-}
-namespace indexed_colors {
-ColorTableFormat Format();
-}
-namespace itk_snap {
-ColorTableFormat Format();
-}
+// Each in the file of its format, or in that of text tables.
+ColorTableFormat ByteLut();
+ColorTableFormat FreeSurferLut();
+ColorTableFormat FslLut();
+ColorTableFormat IndexedColors();
+ColorTableFormat ItkSnapLabels();
 
 const std::vector<ColorTableFormat>& ColorTableFormats() {
-  static const std::vector<ColorTableFormat> formats = {byte_lut::Format(), indexed_colors::Format(), itk_snap::Format(),
-                                                        free_surfer::Format(), fsl_lut::Format()};
+  static const std::vector<ColorTableFormat> formats = {ByteLut(), IndexedColors(), ItkSnapLabels(), FreeSurferLut(), FslLut()};
   return formats;
 }
 

@@ -9,15 +9,15 @@
 #include "common/text/parse_number.h"
 #include "data/layers/color_table.h"
 
-namespace slabstream::indexed_colors {
+namespace slabstream {
 namespace {
 
-bool Recognises(std::string_view file) {
+bool LooksLikeJson(std::string_view file) {
   const std::size_t first = file.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && (file[first] == '{' || file[first] == '[');
 }
 
-Result<std::vector<LabelColor>> ReadColors(const Json& preset) {
+Result<std::vector<LabelColor>> ColorsOf(const Json& preset) {
   const Json& array = preset.at("IndexedColors");
   if (!array.is_array() || array.empty() || array.size() % 3 != 0 || array.size() > 3 * kMaxColorTableEntries) {
     return Status::InvalidArgument(
@@ -33,7 +33,7 @@ Result<std::vector<LabelColor>> ReadColors(const Json& preset) {
 }
 
 // "12" and "12.0" are label 12.
-std::optional<std::uint32_t> LabelOf(const Json& text) {
+std::optional<std::uint32_t> LabelNamed(const Json& text) {
   if (!text.is_string()) return std::nullopt;
   const auto value = ParseNumber<double>(text.text());
   if (!value || !(*value >= 0 && *value <= kMaxLabelValue) || *value != double(std::uint32_t(*value))) return std::nullopt;
@@ -42,7 +42,7 @@ std::optional<std::uint32_t> LabelOf(const Json& text) {
 
 Result<ColorTable> ReadPreset(const Json& preset) {
   if (!preset.is_object() || !preset.contains("IndexedColors")) return Status::InvalidArgument("a JSON file without IndexedColors");
-  Result<std::vector<LabelColor>> colors = ReadColors(preset);
+  Result<std::vector<LabelColor>> colors = ColorsOf(preset);
   if (!colors.ok()) return colors.status();
   ColorTable table;
   if (!preset.contains("Annotations")) {
@@ -55,7 +55,7 @@ Result<ColorTable> ReadPreset(const Json& preset) {
         fmt::format("Annotations must be an array of 2 texts a label, at most {} labels", kMaxColorTableEntries));
   }
   for (std::size_t i = 0; i < pairs.size(); i += 2) {
-    const auto value = LabelOf(pairs[i]);
+    const auto value = LabelNamed(pairs[i]);
     if (!value)
       return Status::InvalidArgument(fmt::format("Annotations[{}] is not a whole number in [0, {}] as a text", i, kMaxLabelValue));
     if (!pairs[i + 1].is_string()) return Status::InvalidArgument(fmt::format("Annotations[{}] is not a text", i + 1));
@@ -65,7 +65,7 @@ Result<ColorTable> ReadPreset(const Json& preset) {
   return table;
 }
 
-Result<ColorTable> Read(std::string_view file) {
+Result<ColorTable> ReadIndexedColors(std::string_view file) {
   const Result<Json> document = Json::Parse(file);
   if (!document.ok()) return document.status();
   if (document->is_array() && document->empty()) return Status::InvalidArgument("the array is empty");
@@ -74,6 +74,6 @@ Result<ColorTable> Read(std::string_view file) {
 
 }  // namespace
 
-ColorTableFormat Format() { return {"ParaView IndexedColors", Recognises, Read}; }
+ColorTableFormat IndexedColors() { return {"ParaView IndexedColors", LooksLikeJson, ReadIndexedColors}; }
 
-}  // namespace slabstream::indexed_colors
+}  // namespace slabstream

@@ -9,7 +9,6 @@
 
 #include "common/memory/pooled_vector.h"
 #include "data/codecs/codecs.h"
-#include "data/codecs/decoded_bytes.h"
 #include "data/sources/decode_chunk.h"
 
 namespace slabstream::n5 {
@@ -164,8 +163,7 @@ Result<Block> ParseBlock(const Bytes& stored, const std::vector<std::uint64_t>& 
   const std::uint64_t counted = mode == kWithCount ? header.Take(4) : count;
   if (!header.whole()) return Status::DataLoss("damaged: the header of the block is cut off");
   if (counted != count) return Status::DataLoss(fmt::format("is a block of {} elements, must have {}", counted, count));
-  const auto whole = std::make_shared<const Bytes>(stored);
-  block.packed = Bytes(whole, whole->span().subspan(header.at()));
+  block.packed = stored.Part(header.at(), stored.size() - header.at());
   return block;
 }
 

@@ -11,8 +11,6 @@
 
 namespace slabstream::n5 {
 
-inline constexpr const char* kAttributes = "attributes.json";
-
 // Errors of VolumeFormat::open.
 Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptions& options, const SourceContext& context);
 

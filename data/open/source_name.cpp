@@ -1,7 +1,6 @@
 #include "data/open/source_name.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <filesystem>
 #include <map>

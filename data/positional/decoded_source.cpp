@@ -15,6 +15,7 @@
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
 #include "data/positional/located_volume.h"
+#include "data/positional/turned_box.h"
 #include "data/sources/copy_samples.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/raw_volume.h"
@@ -49,16 +50,20 @@ double SampleOfNoLabel(const RawHeader& header) {
 // Turns and straightens the samples.
 Status Place(RawVolume& raw, const WorldPlacement& placed, bool labels, const std::string& path) {
   const SampleType type = raw.header.type;
+  const Index3& stored = raw.header.size;
+  const auto& from = placed.turn.from;
+  const Box all = {{}, {stored[from[0]], stored[from[1]], stored[from[2]]}};
   if (placed.turn != AxisTurn{}) {
     if (Status status = CheckFitsMemory(std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
-    raw.bytes = TurnVoxels(type, raw.bytes, raw.header.size, placed.turn);
+    AlignedVector<std::byte> turned(raw.bytes.size());
+    const TurnedBox to{placed.turn, all.end, all, BoxRoom::Dense(all, turned.data(), true)};
+    to.Fill({{}, stored}, type, raw.bytes.data(), {1, stored.x, std::int64_t{stored.x} * stored.y});
+    raw.bytes = std::move(turned);
   }
   if (placed.slant) {
     const std::int64_t bytes = placed.geometry.bounds().voxel_count() * std::int64_t(BytesPerSample(type));
     if (Status status = CheckFitsMemory(bytes, path); !status.ok()) return status;
-    const auto& from = placed.turn.from;
-    const Index3 slanted = {raw.header.size[from[0]], raw.header.size[from[1]], raw.header.size[from[2]]};
-    raw.bytes = StraightenVoxels(type, raw.bytes, slanted, *placed.slant, placed.geometry.size,
+    raw.bytes = StraightenVoxels(type, raw.bytes, all.end, *placed.slant, placed.geometry.size,
                                  labels ? SampleOfNoLabel(raw.header) : LowestSample(raw), labels ? Sampling::kNearest : Sampling::kLinear);
   }
   return Status::Ok();
@@ -175,7 +180,7 @@ class DecodedSource : public VolumeSource {
     auto volume = std::make_shared<Volume>();
     volume->description = info_.finest();
     volume->description.type = kept.type;
-    volume->description.mapping = {stored.mapping.scale, stored.mapping.scale * kept.shift + stored.mapping.offset};
+    volume->description.mapping = {stored.mapping.scale, stored.mapping.FromStored(kept.shift)};
     volume->block = {volume->description.geometry.bounds(), kept.type, std::move(kept.bytes)};
     volume->cells = std::move(raw->cells);
     level_in_memory.volume = std::move(volume);

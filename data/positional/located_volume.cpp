@@ -8,8 +8,7 @@ SourceInfo InfoOfFile(const VolumeFormat& format, const std::string& path, const
                       const std::vector<std::filesystem::path>& beside, const Index3& block, const ReadOptions& options) {
   const auto [type, shift] = KeptTypeOf(header.type);
   // value = scale * (stored + shift) + offset
-  const auto [scale, offset] = header.rescale;
-  const VolumeDescription description = {placed.geometry, type, {scale, scale * shift + offset}};
+  const VolumeDescription description = {placed.geometry, type, {header.rescale.scale, header.rescale.FromStored(shift)}};
   const std::array<int, 3>& from = placed.turn.from;
   SourceInfo info = {.levels = {{description, {block[from[0]], block[from[1]], block[from[2]]}}},
                      .format = std::string(format.name),

@@ -2,7 +2,6 @@
 // what lies between the rows of a box.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>

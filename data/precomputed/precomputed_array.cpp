@@ -37,21 +37,15 @@ bool BeginsWith(const Bytes& bytes, std::string_view magic) {
 }
 
 // Unpacks a file with this ending, or what a mirror has packed. It may be longer than what it holds, so `most` is of its own.
-class Unpacking : public ChunkCodec {
- public:
-  Unpacking(SharedCodec codec, std::uint64_t most) : codec_(std::move(codec)), most_(most) {}
-  Result<Bytes> Decode(Bytes packed, std::uint64_t) const override {
-    const SharedCodec codec = codec_ != nullptr                        ? codec_
+SharedCodec Unpacking(const SharedCodec& stated, std::uint64_t most) {
+  return std::make_shared<ChunkCodec>([=](Bytes packed, std::uint64_t) {
+    const SharedCodec codec = stated != nullptr                        ? stated
                               : BeginsWith(packed, "\x1f\x8b")         ? GzipCodec()
                               : BeginsWith(packed, "\x28\xb5\x2f\xfd") ? ZstdCodec()
                                                                        : nullptr;
-    return codec == nullptr ? Result<Bytes>(std::move(packed)) : codec->Decode(std::move(packed), most_);
-  }
-
- private:
-  const SharedCodec codec_;
-  const std::uint64_t most_;
-};
+    return codec == nullptr ? Result<Bytes>(std::move(packed)) : codec->Decode(std::move(packed), most);
+  });
+}
 
 class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_this<PrecomputedArray> {
  public:
@@ -151,7 +145,7 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
     const std::uint64_t channels = shape_.size[0], voxels = size[0] * size[1] * size[2];
     const std::size_t each = BytesPerSample(shape_.type);
     const std::uint64_t bytes = voxels * channels * each;
-    const auto unpacking = std::make_shared<Unpacking>(packing, MostStored());
+    const SharedCodec unpacking = Unpacking(packing, MostStored());
     CodecChain chain;
     switch (scale_.encoding) {
       case Encoding::kRaw:

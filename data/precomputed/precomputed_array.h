@@ -8,7 +8,6 @@
 #include <optional>
 #include <string>
 
-#include "common/base/status.h"
 #include "data/precomputed/sharding.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/read_context.h"

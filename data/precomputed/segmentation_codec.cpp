@@ -1,7 +1,5 @@
 #include "data/precomputed/segmentation_codec.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -33,13 +31,13 @@ class Words {
   std::uint64_t count_;
 };
 
-class Segmentation : public ChunkCodec {
+class Segmentation {
  public:
   using Triple = std::array<std::uint64_t, 3>;
   Segmentation(const Triple& size, const Triple& block, std::uint64_t channels, std::size_t label_bytes)
       : size_(size), block_(block), channels_(channels), label_bytes_(label_bytes) {}
 
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+  Result<Bytes> Decode(const Bytes& packed, std::uint64_t most) const {
     const std::uint64_t of_channel = size_[0] * size_[1] * size_[2] * label_bytes_, bytes = channels_ * of_channel;
     if (bytes > most) return TooManyBytes(kName, bytes, most);
     const Words words(packed.span());
@@ -109,7 +107,8 @@ class Segmentation : public ChunkCodec {
 
 SharedCodec SegmentationCodec(const std::array<std::uint64_t, 3>& size, const std::array<std::uint64_t, 3>& block, std::uint64_t channels,
                               std::size_t label_bytes) {
-  return std::make_shared<Segmentation>(size, block, channels, label_bytes);
+  return std::make_shared<ChunkCodec>(
+      [of = Segmentation(size, block, channels, label_bytes)](const Bytes& packed, std::uint64_t most) { return of.Decode(packed, most); });
 }
 
 }  // namespace slabstream::precomputed

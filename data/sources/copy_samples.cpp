@@ -1,6 +1,5 @@
 #include "data/sources/copy_samples.h"
 
-#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <type_traits>

@@ -73,8 +73,8 @@ class ExactCopy {
     }
     if (shifted) {
       volume->description.type = volume->block.type = shifted->type;
-      const auto [scale, offset] = of_.mapping;
-      volume->description.mapping = {scale, scale * shifted->shift + offset};  // value = scale * (stored + shift) + offset
+      // value = scale * (stored + shift) + offset
+      volume->description.mapping = {of_.mapping.scale, of_.mapping.FromStored(shifted->shift)};
       volume->block.bytes = std::move(shifted->bytes);
     }
     const bool rounds = shifted ? !shifted->exact : rounds_;

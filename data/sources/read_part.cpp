@@ -3,7 +3,6 @@
 #include <memory>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "common/memory/pooled_vector.h"
 

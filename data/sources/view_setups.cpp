@@ -32,7 +32,23 @@ std::optional<Vec3> Spacing(std::string_view text) {
   return Trimmed(text).empty() ? std::optional(spacing) : std::nullopt;
 }
 
+// What stands behind the prefix.
+std::optional<int> NumberOf(std::string_view name, std::string_view prefix) { return ParseNumber<int>(name.substr(prefix.size())); }
+
 }  // namespace
+
+ViewSetup ViewSetupFile::Of(const std::string& name, std::string_view prefix) const {
+  const auto found = std::ranges::find(setups, NumberOf(name, prefix).value_or(-1), &ViewSetup::id);
+  return found == setups.end() ? ViewSetup{} : *found;
+}
+
+std::vector<std::string> Numbered(const std::vector<std::string>& names, std::string_view prefix) {
+  std::vector<std::string> found;
+  for (const std::string& name : names) {
+    if (name.starts_with(prefix) && NumberOf(name, prefix).value_or(-1) >= 0) found.push_back(name);
+  }
+  return found;
+}
 
 Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml) {
   struct Element {

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -27,7 +28,13 @@ Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml);
 struct ViewSetupFile {
   std::string path;  // "": there is none
   std::vector<ViewSetup> setups;
+
+  // Of the group or folder that is called by `prefix` and the setup's number. One without a name if the file does not list it.
+  ViewSetup Of(const std::string& name, std::string_view prefix) const;
 };
 Result<ViewSetupFile> ReadViewSetupsBeside(const std::string& path);
+
+// Of names, those that are `prefix` and a number: "setup0".
+std::vector<std::string> Numbered(const std::vector<std::string>& names, std::string_view prefix);
 
 }  // namespace slabstream

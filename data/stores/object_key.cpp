@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <climits>
-#include <string>
 
 #include "common/base/printable.h"
 

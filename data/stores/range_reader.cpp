@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
 
+#include "common/files/file_descriptor.h"
 #include "common/memory/pooled_vector.h"
 
 namespace slabstream {
@@ -30,15 +30,9 @@ Result<Bytes> ReadRange(int file, const std::string& what, const ByteRange& rang
   const Result<ByteSpan> span = BytesOfRange(what, std::uint64_t(about.st_size), range, most);
   if (!span.ok()) return span.status();
   UnwrittenVector<std::byte> bytes(span->bytes);
-  std::size_t read = 0;
-  while (read < bytes.size()) {
-    const ssize_t count = ::pread(file, bytes.data() + read, bytes.size() - read, off_t(span->begin + read));
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return failed(errno);
-    if (count == 0) break;  // it became shorter
-    read += std::size_t(count);
-  }
-  bytes.resize(read);
+  const std::size_t read = ReadBytesAt(file, span->begin, bytes);
+  if (read < bytes.size() && errno != 0) return failed(errno);
+  bytes.resize(read);  // it may have become shorter
   return Bytes(std::move(bytes));
 }
 

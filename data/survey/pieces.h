@@ -1,7 +1,6 @@
 // A level of a source in pieces that are read one after the other, so that it is never in memory as a whole.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>

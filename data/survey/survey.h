@@ -12,7 +12,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <stop_token>
 
 #include "common/base/status.h"
 #include "common/volume/summary.h"

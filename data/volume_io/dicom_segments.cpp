@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/dicom_frames.h"

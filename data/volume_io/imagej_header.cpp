@@ -1,6 +1,4 @@
 // The lines are those that ij.io.FileSaver of ImageJ 1 writes and ij.io.FileOpener and TiffDecoder read.
-#include "data/volume_io/imagej_header.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +7,7 @@
 
 #include "common/text/parse_number.h"
 #include "data/volume_io/length_names.h"
-#include "data/volume_io/text_header.h"
+#include "data/volume_io/page_layout.h"
 
 namespace slabstream {
 namespace {

@@ -85,9 +85,7 @@ class Jpeg2000File : public SliceFile {
     std::string& text = *static_cast<std::string*>(complaint);
     if (text.empty()) text.assign(why, std::string_view(why).find_last_not_of('\n') + 1);
   }
-  Status Failed(StatusCode code, const std::string& why) const {
-    return {code, path_ + ": " + why + (complaint_.empty() ? "" : ": " + complaint_)};
-  }
+  Status Failed(StatusCode code, const std::string& why) const { return PictureFailure(code, path_, why, complaint_); }
 
   template <auto kDestroy>
   struct Destroy {  // OpenJPEG's handles are pointers to nothing, all of the same type

@@ -1,6 +1,5 @@
 #include "data/volume_io/nifti_header.h"
 
-#include <algorithm>
 #include <cstring>
 
 #include "data/volume_io/binary_header.h"

@@ -1,5 +1,3 @@
-#include "data/volume_io/ome_layout.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -15,6 +13,7 @@
 #include "common/text/parse_number.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/ome_header.h"
+#include "data/volume_io/page_layout.h"
 #include "data/volume_io/tiff_file.h"
 
 namespace slabstream {

@@ -6,9 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "common/base/status.h"
 #include "common/math/vec.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/read_options.h"
+#include "data/volume_io/tiff_file.h"
 
 namespace slabstream {
 
@@ -42,5 +45,36 @@ struct PageLayout {
   std::int64_t planes() const { return slices * channels * times; }
   std::string Text() const;  // "7 slices, 2 channels and 3 times"
 };
+
+// What ImageJ and Fiji write into the description of the first page: lines such as channels=2, slices=7, frames=3, spacing=1.5,
+// unit=micron.
+//
+// Whether a description is ImageJ's, or that of ImageJ2 (SCIFIO), which has the same lines.
+bool IsImageJHeader(const std::string& description);
+
+// `first`: the file at its first page, whose resolution is the size of pixels; `header`: of this page. InvalidArgument: a number of slices,
+// channels or frames out of [1, kMaxVolumes], or another order than three different letters of c, z and t.
+Result<PageLayout> ReadImageJHeader(const TiffFile& first, const RawHeader& header, const std::string& description);
+
+// What Python's tifffile writes into the description of the first page: the shape of the array, {"shape": [2, 7, 256, 256], "axes":
+// "TZYX"}.
+//
+// None: the description is not tifffile's, says nothing but the size of a page, or that of another page. Axes without names: z, y and x are
+// the last ones; one before them is time, or the channel if `options` take one and no time; two are time and channel. An axis before z that
+// is none of them counts as time. InvalidArgument, naming `path`: more axes.
+Result<std::optional<PageLayout>> ReadTifffileHeader(const std::string& path, const std::string& description, const RawHeader& page,
+                                                     const ReadOptions& options);
+
+// Where the planes of an OME image lie: in the pages of one TIFF file, or of several in one folder.
+//
+// The description of the first page of a TIFF file, or all of a file of OME metadata (.companion.ome, .ome.xml). Errors of TiffFile::Open
+// and ReadTextFile.
+Result<std::string> DescriptionIn(const std::string& path);
+
+// `path`: the file that has the description; files that this one names are looked for in its folder, and only there.
+// Lengths are converted to micrometres. If there are several images, options.series says which one, from 0; without it,
+// the first one is taken. InvalidArgument, naming `path`: no XML; sizes out of [1, kMaxVolumes]; an unknown
+// DimensionOrder; an image that is not there. NotFound: the description is in another file, which is missing.
+Result<PageLayout> ReadOmeLayout(const std::string& path, const std::string& description, const ReadOptions& options);
 
 }  // namespace slabstream

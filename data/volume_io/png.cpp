@@ -6,7 +6,6 @@
 #include <bit>
 #include <csetjmp>
 #include <cstdio>
-#include <memory>
 #include <new>
 #include <string>
 #include <utility>
@@ -59,9 +58,7 @@ class PngFile : public SliceFile {
     std::longjmp(file.jump_, 1);
   }
 
-  Status Failed(StatusCode code, const std::string& why) const {
-    return {code, path_ + ": " + why + (complaint_[0] == '\0' ? "" : std::string(": ") + complaint_.data())};
-  }
+  Status Failed(StatusCode code, const std::string& why) const { return PictureFailure(code, path_, why, complaint_.data()); }
 
   bool Begin() {
     if (setjmp(jump_) != 0) return false;
@@ -96,11 +93,8 @@ class PngFile : public SliceFile {
     return true;
   }
 
-  struct Close {
-    void operator()(std::FILE* file) const { (void)std::fclose(file); }
-  };
   std::string path_;
-  std::unique_ptr<std::FILE, Close> file_;
+  PictureHandle file_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
   std::jmp_buf jump_{};

@@ -2,13 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <span>
-#include <type_traits>
 #include <utility>
 
 #include "common/volume/memory_budget.h"

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -42,6 +43,17 @@ class SliceFile {
   // Fills `out` with the samples, in this machine's byte order. `header` is its own. DataLoss: truncated or damaged.
   virtual Status ReadSamples(const RawHeader& header, std::byte* out) = 0;
 };
+
+// What decoders in C read a picture from.
+struct ClosePicture {
+  void operator()(std::FILE* file) const { (void)std::fclose(file); }
+};
+using PictureHandle = std::unique_ptr<std::FILE, ClosePicture>;
+
+// "PATH: WHY: COMPLAINT", where the decoder has one.
+inline Status PictureFailure(StatusCode code, const std::string& path, const std::string& why, std::string_view complaint) {
+  return {code, path + ": " + why + (complaint.empty() ? "" : ": ") + std::string(complaint)};
+}
 
 // The header of a volume of `count` slices like `slice`. Spacing: options.spacing if it is given, else that of the
 // slice. InvalidArgument: too many. DataLoss: files of `file_bytes` cannot hold it.

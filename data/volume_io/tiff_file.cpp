@@ -101,9 +101,7 @@ Result<std::unique_ptr<TiffFile>> TiffFile::Open(const std::string& path, std::u
   return directory != 0 ? file->Damaged() : file->Refused("not a TIFF volume");
 }
 
-Status TiffFile::Failed(StatusCode code, const std::string& why) const {
-  return {code, path_ + ": " + why + (complaint_->empty() ? "" : ": " + *complaint_)};
-}
+Status TiffFile::Failed(StatusCode code, const std::string& why) const { return PictureFailure(code, path_, why, *complaint_); }
 Status TiffFile::Damaged() const { return Failed(StatusCode::kDataLoss, "truncated or damaged"); }
 Status TiffFile::Refused(const std::string& why) const { return Failed(StatusCode::kInvalidArgument, why); }
 

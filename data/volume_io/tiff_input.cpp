@@ -24,13 +24,8 @@ Result<TiffInput> TiffInput::Open(const std::string& path, std::uint64_t directo
 }
 
 std::size_t TiffInput::ReadAt(std::uint64_t begin, std::byte* out, std::size_t bytes) const {
-  std::size_t done = 0;
-  while (done < bytes && begin + done < size_) {
-    const ssize_t got = ::pread(file_.number(), out + done, bytes - done, off_t(begin + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) break;
-    done += std::size_t(got);
-  }
+  if (begin >= size_) return 0;
+  const std::size_t done = ReadBytesAt(file_.number(), begin, {out, bytes});
   for (std::size_t i = 0; i < first_.count; ++i) {
     const std::uint64_t place = first_.begin + i;
     if (place >= begin && place < begin + done) out[place - begin] = first_.bytes[i];

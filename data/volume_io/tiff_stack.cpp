@@ -8,10 +8,8 @@
 
 #include "common/base/log.h"
 #include "data/volume_io/chosen_channel.h"
-#include "data/volume_io/imagej_header.h"
 #include "data/volume_io/ome_header.h"
-#include "data/volume_io/ome_layout.h"
-#include "data/volume_io/tifffile_header.h"
+#include "data/volume_io/page_layout.h"
 
 namespace slabstream {
 namespace {

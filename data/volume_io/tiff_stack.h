@@ -1,7 +1,6 @@
 // TiffStack: the pages of a TIFF file, or of the files of an OME-TIFF, that are the slices of a volume.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,10 +1,9 @@
-#include "data/volume_io/tifffile_header.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "common/text/parse_number.h"
+#include "data/volume_io/page_layout.h"
 
 namespace slabstream {
 namespace {

@@ -88,33 +88,6 @@ Reach ReachOf(double per_step, std::int32_t count) {
   return {std::min(end, 0.0), std::max(end, 0.0)};
 }
 
-template <class T>
-void CopyTurned(const T* first, const Index3& stored, const AxisTurn& turn, T* out) {
-  constexpr std::int32_t kTile = 32;  // voxels a side: what is read and written of a tile stays in a cache
-  const Index3 size = {stored[turn.from[0]], stored[turn.from[1]], stored[turn.from[2]]};
-  const std::array<std::int64_t, 3> strides = {1, stored.x, std::int64_t{stored.x} * stored.y};
-  std::array<std::int64_t, 3> step{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t stride = strides[std::size_t(turn.from[i])];
-    step[i] = turn.flipped[i] ? -stride : stride;
-    if (turn.flipped[i]) first += stride * (size[int(i)] - 1);
-  }
-  const auto copy = [&](const Index3& begin, const Index3& end) {
-    for (std::int32_t z = begin.z; z < end.z; ++z) {
-      for (std::int32_t y = begin.y; y < end.y; ++y) {
-        const T* in = first + z * step[2] + y * step[1] + begin.x * step[0];
-        T* row = out + NumberIn(size, {begin.x, y, z});
-        for (std::int32_t x = begin.x; x < end.x; ++x, in += step[0]) *row++ = *in;
-      }
-    }
-  };
-  for (std::int32_t z = 0; z < size.z; z += kTile) {
-    for (std::int32_t y = 0; y < size.y; y += kTile) {
-      for (std::int32_t x = 0; x < size.x; x += kTile) copy({x, y, z}, Min(Index3{x, y, z} + Uniform(kTile), size));
-    }
-  }
-}
-
 // The nearest value of the type, halves away from zero.
 template <class T>
 T Rounded(double value) {
@@ -217,14 +190,6 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
   orientation.origin = origin + orientation.ToWorld(geometry.spacing * slant.first);
   placed.slant = slant;
   return placed;
-}
-
-AlignedVector<std::byte> TurnVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const AxisTurn& turn) {
-  AlignedVector<std::byte> turned(samples.size());
-  VisitSampleType(type, [&]<class T>(const T*) {
-    CopyTurned(reinterpret_cast<const T*>(samples.data()), size, turn, reinterpret_cast<T*>(turned.data()));
-  });
-  return turned;
 }
 
 AlignedVector<std::byte> StraightenVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const Slant& slant,

@@ -43,11 +43,9 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
 bool IsFinite(const Vec3& v);
 std::string InBrackets(const Vec3& v);  // "(0, 1.5, nan)", for messages
 
-// `samples`: of a whole volume of `size` voxels as stored.
-AlignedVector<std::byte> TurnVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const AxisTurn& turn);
 enum class Sampling { kLinear, kNearest };
-// `size`: of the slanted grid; `straight_size`: of the straight one. `outside`: what voxels of it hold that the slanted one does not reach,
-// a sample.
+// `samples`: of a whole volume. `size`: of the slanted grid; `straight_size`: of the straight one. `outside`: what voxels of it hold that
+// the slanted one does not reach, a sample.
 AlignedVector<std::byte> StraightenVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const Slant& slant,
                                           const Index3& straight_size, double outside, Sampling sampling);
 

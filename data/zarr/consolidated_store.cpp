@@ -1,7 +1,6 @@
 #include "data/zarr/consolidated_store.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <map>
 #include <optional>

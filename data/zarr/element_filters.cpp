@@ -64,54 +64,41 @@ Bytes Turned(SampleType from, SampleType to, std::span<const std::byte> in, Deco
 }
 
 // What is stored is of another type, differences, or of another scale.
-class Elements : public ChunkCodec {
- public:
-  enum class Kind : std::uint8_t { kConverted, kDifferences, kScaled };
-  Elements(Kind kind, SampleType type, SampleType stored, double scale = 1, double offset = 0)
-      : kind_(kind), type_(type), stored_(stored), scale_(scale), offset_(offset) {}
+enum class Kind : std::uint8_t { kConverted, kDifferences, kScaled };
 
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+SharedCodec Elements(Kind kind, SampleType type, SampleType stored, double scale = 1, double offset = 0) {
+  const std::size_t bytes_each = BytesPerSample(type), stored_each = BytesPerSample(stored);
+  const auto decode = [=](const Bytes& packed, std::uint64_t most) -> Result<Bytes> {
     const std::span<const std::byte> in = packed.span();
-    if (in.size() % BytesPerSample(stored_) != 0) {
-      return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", in.size(), BytesPerSample(stored_)));
+    if (in.size() % stored_each != 0) {
+      return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", in.size(), stored_each));
     }
-    const std::uint64_t bytes = in.size() / BytesPerSample(stored_) * BytesPerSample(type_);
+    const std::uint64_t bytes = in.size() / stored_each * bytes_each;
     if (bytes > most) return TooManyBytes("a chunk", bytes, most);
-    if (kind_ == Kind::kScaled) return Turned<double>(stored_, type_, in, [this](double value) { return value / scale_ + offset_; });
-    const bool differences = kind_ == Kind::kDifferences;
-    if (IsInteger(stored_) && IsInteger(type_)) {
-      return Turned<std::uint64_t>(stored_, type_, in, [differences, sum = std::uint64_t{0}](std::uint64_t value) mutable {
+    if (kind == Kind::kScaled) return Turned<double>(stored, type, in, [=](double value) { return value / scale + offset; });
+    const bool differences = kind == Kind::kDifferences;
+    if (IsInteger(stored) && IsInteger(type)) {
+      return Turned<std::uint64_t>(stored, type, in, [differences, sum = std::uint64_t{0}](std::uint64_t value) mutable {
         return differences ? sum += value : value;
       });
     }
-    return Turned<double>(stored_, type_, in,
-                          [differences, sum = 0.0](double value) mutable { return differences ? sum += value : value; });
-  }
-  std::uint64_t MostEncoded(std::uint64_t bytes) const override {
-    return bytes / BytesPerSample(type_) * BytesPerSample(stored_) + ChunkCodec::MostEncoded(0);
-  }
-
- private:
-  const Kind kind_;
-  const SampleType type_, stored_;
-  const double scale_, offset_;
-};
+    return Turned<double>(stored, type, in, [differences, sum = 0.0](double value) mutable { return differences ? sum += value : value; });
+  };
+  return std::make_shared<ChunkCodec>(decode, bytes_each, stored_each);
+}
 
 // Truth values, eight to a byte, the first one in the highest bit; the first byte says how many bits of the last one count for nothing.
-class PackedBits : public ChunkCodec {
- public:
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    const std::span<const std::byte> in = packed.span();
-    if (in.empty()) return DamagedBytes("packbits");
-    constexpr std::uint64_t kBits = 8;
-    const std::uint64_t bits = kBits * (in.size() - 1), unused = std::to_integer<std::uint64_t>(in[0]);
-    if (unused > std::min(bits, kBits - 1)) return DamagedBytes("packbits");
-    if (bits - unused > most) return TooManyBytes("packbits", bits - unused, most);
-    UnwrittenVector<std::byte> out(bits - unused);
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = in[1 + i / kBits] >> (kBits - 1 - i % kBits) & std::byte{1};
-    return Bytes(std::move(out));
-  }
-};
+Result<Bytes> UnpackBits(const Bytes& packed, std::uint64_t most) {
+  const std::span<const std::byte> in = packed.span();
+  if (in.empty()) return DamagedBytes("packbits");
+  constexpr std::uint64_t kBits = 8;
+  const std::uint64_t bits = kBits * (in.size() - 1), unused = std::to_integer<std::uint64_t>(in[0]);
+  if (unused > std::min(bits, kBits - 1)) return DamagedBytes("packbits");
+  if (bits - unused > most) return TooManyBytes("packbits", bits - unused, most);
+  UnwrittenVector<std::byte> out(bits - unused);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = in[1 + i / kBits] >> (kBits - 1 - i % kBits) & std::byte{1};
+  return Bytes(std::move(out));
+}
 
 Result<ElementType> TypeOr(const Field& field, SampleType usual) {
   return field.given() ? ReadDtype(field) : Result<ElementType>(ElementType{usual});
@@ -129,7 +116,7 @@ Result<ElementFilter> ReadElementFilter(std::string_view name, const Field& sett
   if (name == "bitround") return filter;  // what it rounds stays an element
   if (name == "packbits") {
     if (type != SampleType::kUint8) return settings.Wrong("left out: packbits takes truth values");
-    filter.chain.push_back(std::make_shared<PackedBits>());
+    filter.chain.push_back(std::make_shared<ChunkCodec>(UnpackBits));
     return filter;
   }
   const bool astype = name == "astype";
@@ -147,10 +134,9 @@ Result<ElementFilter> ReadElementFilter(std::string_view name, const Field& sett
     if (!scale.ok()) return scale.status();
     if (!offset.ok()) return offset.status();
     if (*scale == 0) return settings["scale"].Wrong("a number other than 0");
-    filter.chain.push_back(std::make_shared<Elements>(Elements::Kind::kScaled, type, stored->type, *scale, *offset));
+    filter.chain.push_back(Elements(Kind::kScaled, type, stored->type, *scale, *offset));
   } else {
-    const auto kind = name == "delta" ? Elements::Kind::kDifferences : Elements::Kind::kConverted;
-    filter.chain.push_back(std::make_shared<Elements>(kind, type, stored->type));
+    filter.chain.push_back(Elements(name == "delta" ? Kind::kDifferences : Kind::kConverted, type, stored->type));
   }
   swap(*stored);
   filter.stored = stored->type;

@@ -4,13 +4,11 @@
 // Pure. Every number is checked.
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/volume/orientation.h"
 #include "common/volume/summary.h"
 #include "data/metadata/json_fields.h"
 #include "data/volume_io/stated_label.h"

@@ -7,27 +7,24 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <future>
 #include <optional>
+#include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "common/base/printable.h"
+#include "common/volume/volume.h"
 #include "data/sources/even_steps.h"
 #include "data/sources/mapped_array.h"
 #include "data/volume_io/length_names.h"
-#include "data/zarr/coordinates.h"
 #include "data/zarr/find_volume.h"
 
 namespace slabstream::zarr {
 namespace {
 
 using metadata::Field;
-
-template <class T>
-std::vector<T> InOrderOf(const std::vector<std::size_t>& from, const std::vector<T>& of_metadata) {
-  std::vector<T> ordered;
-  for (const std::size_t axis : from) ordered.push_back(of_metadata[axis]);
-  return ordered;
-}
 
 // Names of all axes of the metadata, "" where there is none.
 Result<std::vector<std::string>> NamesOfAxes(const ZarrArray& array, const ZarrNode& node) {
@@ -53,6 +50,50 @@ void NoteAxes(const std::vector<std::string>& names, const std::vector<AxisKind>
   const bool named = std::ranges::any_of(names, [](const std::string& name) { return !name.empty(); });
   info.notes.push_back(named ? Printable(fmt::format("the axes {} are taken for {}", fmt::join(names, ", "), fmt::join(as, ", ")))
                              : fmt::format("the axes have no names; in their order they are taken for {}", fmt::join(as, ", ")));
+}
+
+// Coordinates of an array's axes, as xarray keeps them: beside the array, each in an array of one axis that is called like it.
+struct AxisCoordinates {
+  std::vector<double> values;  // one for each index along the axis
+  std::string unit;            // "m"; "": none is stated
+};
+
+Result<std::optional<StoredChunk>> ReadNow(ChunkedArray& array, std::uint64_t index) {
+  std::promise<Result<std::optional<StoredChunk>>> answer;
+  array.ReadChunk(std::span(&index, 1), [&](Result<std::optional<StoredChunk>> chunk) { answer.set_value(std::move(chunk)); });
+  return answer.get_future().get();
+}
+
+// Those in the array `name` of a group that has one axis of `size` elements. nullopt: there is no such array, or it holds no numbers.
+// Errors of reading its chunks. Waits.
+Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& context, const std::string& group, const std::string& name,
+                                                       std::uint64_t size) {
+  const std::optional<AxisCoordinates> none;
+  if (name.empty() || name.find('/') != std::string::npos || size > std::uint64_t(kMaxVolumeSide)) return none;
+  const Result<std::optional<ZarrNode>> node = NodeReading(*context.store, metadata::Join(group, name)).Get();
+  if (!node.ok() || !node->has_value() || !(*node)->array) return none;
+  const Result<ZarrArray> opened = OpenArray(context, **node);
+  if (!opened.ok()) return none;
+  const ArrayShape& shape = opened->array->shape();
+  constexpr std::uint64_t kMostChunks = 1024;
+  if (shape.size.size() != 1 || shape.size[0] != size || (size - 1) / shape.chunk[0] >= kMostChunks) return none;
+  AxisCoordinates coordinates;
+  for (std::uint64_t chunk = 0; chunk * shape.chunk[0] < size; ++chunk) {
+    const Result<std::optional<StoredChunk>> read = ReadNow(*opened->array, chunk);
+    if (!read.ok()) return read.status();
+    for (std::uint64_t i = 0; i < std::min(shape.chunk[0], size - chunk * shape.chunk[0]); ++i) {
+      coordinates.values.push_back(VisitSampleType(shape.type, [&](const auto* null) {
+        std::remove_cvref_t<decltype(*null)> element;
+        std::memcpy(&element, *read ? (*read)->elements.span().data() + i * sizeof element : shape.fill.data(), sizeof element);
+        return double(element);
+      }));
+    }
+  }
+  const metadata::Field attributes = (*node)->attributes_field();
+  for (const char* const key : {"units", "unit"}) {
+    if (const metadata::Field unit = attributes[key]; unit.is_text()) coordinates.unit = *unit.Text();
+  }
+  return std::optional(std::move(coordinates));
 }
 
 // Spacing, origin and unit by coordinates that lie beside the array.
@@ -141,7 +182,8 @@ Status UnpackValues(const ZarrNode& node, ZarrArray& array, Pyramid& pyramid) {
 }  // namespace
 
 PyramidLevel LevelOf(const ZarrArray& array, const AxisChoice& choice) {
-  PyramidLevel level{.array = array.array, .at = InOrderOf(array.from, choice.at)};
+  PyramidLevel level{.array = array.array};
+  for (const std::size_t axis : array.from) level.at.push_back(choice.at[axis]);
   for (std::size_t i = 0; i < level.axes.size(); ++i) {
     const auto place = std::ranges::find(array.from, std::size_t(choice.axes[i]));
     level.axes[i] = choice.axes[i] < 0 ? -1 : int(place - array.from.begin());

@@ -17,7 +17,8 @@
 
 namespace slabstream::zarr {
 
-// Notes say what was chosen. `node` is an array. Errors of OpenArray, KindsOfPlainAxes, ChooseAxes and ReadCoordinates; InvalidArgument,
+// Notes say what was chosen. `node` is an array. Errors of OpenArray, KindsOfPlainAxes, ChooseAxes and of reading coordinates;
+// InvalidArgument,
 // naming the field: it is wrong. Waits.
 Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options);
 

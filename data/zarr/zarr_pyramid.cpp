@@ -1,26 +1,51 @@
+// Zarr, versions 2 and 3, in folders and zip archives: OME-Zarr images with their levels, and plain arrays.
+//
+//   scan.ome.zarr      scan.ome.zarr/labels/cells      scan.ozx?array=labels/cells      simulation.zarr?array=density,time=3
 #include "data/zarr/zarr_pyramid.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/printable.h"
 #include "common/text/url.h"
+#include "data/metadata/open_store_for.h"
+#include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/zarr/consolidated_store.h"
 #include "data/zarr/find_volume.h"
 #include "data/zarr/ome.h"
 #include "data/zarr/plain_array.h"
-#include "data/zarr/world_attributes.h"
 #include "data/zarr/zarr_array.h"
+#include "data/zarr/zarr_node.h"
 
-namespace slabstream::zarr {
+namespace slabstream {
+namespace zarr {
 namespace {
 
+using metadata::Field;
 using metadata::Join;
+
+bool IsArchive(const std::string& path) { return path.ends_with(".zip") || path.ends_with(".ozx"); }
+
+bool Recognises(const std::string& path, const ReadOptions&) {
+  std::error_code error;
+  const auto is_there = [&](std::string_view name) { return std::filesystem::is_regular_file(std::filesystem::path(path) / name, error); };
+  if (std::filesystem::is_directory(path, error)) return std::ranges::any_of(kNodeObjects, is_there);
+  if (!IsArchive(path)) return false;
+  const Result<std::shared_ptr<Store>> archive = ZipStore(path);
+  const Result<std::vector<std::string>> names = archive.ok() ? (*archive)->List("") : archive.status();
+  const auto has = [&](std::string_view name) { return std::ranges::find(*names, name) != names->end(); };
+  return names.ok() && std::ranges::any_of(kNodeObjects, has);
+}
 
 // The unit of x, if y and z state one as well, and by what theirs differ from it.
 struct CommonUnit {
@@ -56,6 +81,61 @@ void PlaceLevels(const OmeImage& image, const AxisChoice& choice, const std::vec
       if (!image.translated) level.origin[axis] += (level.spacing[axis] - finest) / 2;
     }
   }
+}
+
+Result<Vec3> ReadVector(const Field& field) {
+  if (!field.is_array() || field.size() != 3) return field.Wrong("a list of 3 numbers");
+  Vec3 vector;
+  for (int i = 0; i < 3; ++i) {
+    const Result<double> number = field[std::size_t(i)].Number();
+    if (!number.ok()) return number.status();
+    vector[i] = *number;
+  }
+  return vector;
+}
+
+bool AreRightHanded(const std::array<Vec3, 3>& axes) {
+  constexpr double kTolerance = 1e-6;
+  const auto near = [](double value, double expected) { return std::abs(value - expected) <= kTolerance; };
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!near(Dot(axes[i], axes[i]), 1) || !near(Dot(axes[i], axes[(i + 1) % 3]), 0)) return false;
+  }
+  return Dot(Cross(axes[0], axes[1]), axes[2]) > 0;
+}
+
+// What `slabstream convert` keeps of a volume in attributes of its own, since OME-Zarr has no place for it: the world, its axes, and the
+// mapping to data values. data/zarr_writer/ome_metadata.h says what they are.
+//
+// `own`: the attribute "slabstream" of an image; not stated: nothing changes. `pyramid`: its origins are positions in the coordinate system
+// of the image; they become positions in the world. InvalidArgument, naming the field: it is wrong.
+Status PlaceInWorld(const Field& own, Pyramid& pyramid) {
+  if (const Field place = own["orientation"]; place.given()) {
+    const Result<std::string> name = place["world"].Text();
+    if (!name.ok()) return name.status();
+    static constexpr std::array kWorlds = {World::kVoxels, World::kScene, World::kPatient};
+    const auto* const world = std::ranges::find(kWorlds, *name, [](World each) { return NameOf(each); });
+    if (world == kWorlds.end()) return place["world"].Wrong("voxels, scene or patient");
+    const Result<Vec3> origin = ReadVector(place["origin"]);
+    if (!origin.ok()) return origin.status();
+    std::array<Vec3, 3> axes;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Result<Vec3> axis = ReadVector(place["axes"][i]);
+      if (!axis.ok()) return axis.status();
+      axes[i] = *axis;
+    }
+    if (!AreRightHanded(axes)) return place["axes"].Wrong("3 unit vectors at right angles, right-handed");
+    pyramid.orientation.world = *world;
+    pyramid.orientation.axes = axes;
+    for (PyramidLevel& level : pyramid.levels) level.origin = *origin + pyramid.orientation.ToWorld(level.origin);
+  }
+  if (const Field values = own["values"]; values.given()) {
+    const Result<double> scale = values["scale"].Number(), offset = values["offset"].Number();
+    if (!scale.ok()) return scale.status();
+    if (!offset.ok()) return offset.status();
+    if (*scale == 0) return values["scale"].Wrong("a number other than 0");
+    pyramid.rescale = {*scale, *offset};
+  }
+  return Status::Ok();
 }
 
 Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options, std::set<std::string>& keys) {
@@ -137,4 +217,14 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& opened, const ReadOpti
   return pyramid;
 }
 
-}  // namespace slabstream::zarr
+}  // namespace zarr
+
+VolumeFormat Zarr() {
+  return {.name = "Zarr",
+          .recognises = zarr::Recognises,
+          .options = {"time", "channel", "spacing", "array", "follow-links"},
+          .markers = {zarr::kNodeObjects.begin(), zarr::kNodeObjects.end()},
+          .open = OpenInStore<zarr::OpenPyramid>};
+}
+
+}  // namespace slabstream

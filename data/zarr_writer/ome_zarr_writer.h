@@ -15,7 +15,6 @@
 #include <string>
 
 #include "common/base/status.h"
-#include "common/math/vec.h"
 #include "data/sources/volume_source.h"
 #include "data/zarr_writer/ome_metadata.h"
 

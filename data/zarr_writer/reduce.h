@@ -3,7 +3,6 @@
 
 #include <cstddef>
 
-#include "common/volume/box.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {

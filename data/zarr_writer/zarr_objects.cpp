@@ -15,7 +15,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <system_error>
 
@@ -103,15 +102,8 @@ class ObjectReader {
 
   Status Read(std::uint64_t begin, std::span<std::byte> out) const {
     if (begin > bytes_ || out.size() > bytes_ - begin) return Damaged();
-    while (!out.empty()) {
-      const ssize_t count = ::pread(descriptor_.number(), out.data(), out.size(), off_t(begin));
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) return Failure();
-      if (count == 0) return Damaged();
-      begin += std::uint64_t(count);
-      out = out.subspan(std::size_t(count));
-    }
-    return Status::Ok();
+    if (ReadBytesAt(descriptor_.number(), begin, out) == out.size()) return Status::Ok();
+    return errno != 0 ? Failure() : Damaged();
   }
 
  private:

@@ -10,6 +10,8 @@
 
 namespace slabstream {
 
+class RendererKind;
+
 inline constexpr int kMaxBenchSize = 8192;
 
 struct BenchOptions {

@@ -27,16 +27,6 @@ TransferFunction SphereTransfer(double opacity) {
   return {{{0, kWarm}, {128, kWarm}, {255, kCool}}, {{0, 0}, {64, opacity}, {255, opacity}}};
 }
 
-}  // namespace
-
-TransferFunction HalfShown(double opacity) {
-  TransferFunction transfer = SphereTransfer(opacity);
-  transfer.opacities = {{0, 0}, {191, 0}, {192, opacity}, {255, opacity}};
-  return transfer;
-}
-
-namespace {
-
 // A soft surface that is solid within a few voxels, in the colours of tissue.
 TransferFunction BrainTransfer() {
   return {{{0, {0.30F, 0.16F, 0.12F}}, {60, {0.62F, 0.38F, 0.30F}}, {120, {0.86F, 0.68F, 0.58F}}, {255, {1, 0.97F, 0.92F}}},
@@ -72,15 +62,6 @@ bool SamplesAlongRays(const RendererKind& renderer) {
   return std::ranges::any_of(renderer.parameters(), [](const RendererParameter& each) { return each.name == SamplingRate().name; });
 }
 
-}  // namespace
-
-BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer) {
-  return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)},
-                    HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
-}
-
-namespace {
-
 std::string CaseName(const RendererKind& renderer, const std::string& dataset) {
   return &renderer == &DefaultRenderer() ? dataset : std::string(renderer.name()) + "-" + dataset;
 }
@@ -89,10 +70,6 @@ std::string CaseName(const RendererKind& renderer, const std::string& dataset) {
 ParameterTexts StandardParameters(const RendererKind& renderer) {
   return SamplesAlongRays(renderer) ? ParameterTexts{{std::string(SamplingRate().name), "1"}} : ParameterTexts{};
 }
-
-}  // namespace
-
-namespace {
 
 BenchCase MadeHere(const RendererKind* renderer, std::variant<SphereRequest, ClusterRequest, GridRequest, std::string> volume,
                    const std::string& dataset, const std::string& what, double opacity) {
@@ -107,7 +84,33 @@ BenchCase MadeHere(const RendererKind* renderer, std::variant<SphereRequest, Clu
           .parameters = StandardParameters(*renderer)};
 }
 
+// "class1-300", "clusters-512-0.02". Nothing: the text is no such name.
+std::optional<BenchCase> ParseMadeHere(const std::string& text) {
+  static const std::regex kName("(class1|class2|clusters)-([0-9]{1,5})(-(0\\.[0-9]{1,6}))?");
+  std::smatch parts;
+  if (!std::regex_match(text, parts, kName)) return std::nullopt;
+  const int size = std::stoi(parts[2]);
+  if (parts[1] == "clusters") {
+    ClusterRequest clusters{.size = size};
+    if (parts[4].matched) clusters.occupancy = std::stod(parts[4]);
+    return ClusterCase(clusters, kTranslucentSphere);
+  }
+  const SphereClass sphere_class = parts[1] == "class1" ? SphereClass::kHollow : SphereClass::kFilled;
+  return SphereCase({sphere_class, size, parts[4].matched ? std::stod(parts[4]) : StandardOccupancy(sphere_class)}, kTranslucentSphere);
+}
+
 }  // namespace
+
+TransferFunction HalfShown(double opacity) {
+  TransferFunction transfer = SphereTransfer(opacity);
+  transfer.opacities = {{0, 0}, {191, 0}, {192, opacity}, {255, opacity}};
+  return transfer;
+}
+
+BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer) {
+  return SphereCase({sphere_class, size, StandardOccupancy(sphere_class)},
+                    HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
+}
 
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow;
@@ -163,25 +166,6 @@ const std::vector<BenchCase>& StandardBenchCases() {
   };
   return cases;
 }
-
-namespace {
-
-// "class1-300", "clusters-512-0.02". Nothing: the text is no such name.
-std::optional<BenchCase> ParseMadeHere(const std::string& text) {
-  static const std::regex kName("(class1|class2|clusters)-([0-9]{1,5})(-(0\\.[0-9]{1,6}))?");
-  std::smatch parts;
-  if (!std::regex_match(text, parts, kName)) return std::nullopt;
-  const int size = std::stoi(parts[2]);
-  if (parts[1] == "clusters") {
-    ClusterRequest clusters{.size = size};
-    if (parts[4].matched) clusters.occupancy = std::stod(parts[4]);
-    return ClusterCase(clusters, kTranslucentSphere);
-  }
-  const SphereClass sphere_class = parts[1] == "class1" ? SphereClass::kHollow : SphereClass::kFilled;
-  return SphereCase({sphere_class, size, parts[4].matched ? std::stod(parts[4]) : StandardOccupancy(sphere_class)}, kTranslucentSphere);
-}
-
-}  // namespace
 
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   for (const BenchCase& standard : StandardBenchCases()) {

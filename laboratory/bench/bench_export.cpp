@@ -4,7 +4,8 @@
 
 #include "common/files/files.h"
 #include "common/json/json.h"
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
+#include "common/planning/resolved_request.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/volume_writer.h"
 
@@ -50,9 +51,7 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Mat
 Status ExportCase(const BenchCase& bench_case, const BenchOptions& options) {
   const Result<std::shared_ptr<const Volume>> volume = LoadBenchVolume(bench_case);
   if (!volume.ok()) return volume.status();
-  Result<TransferFunction> transfer = std::holds_alternative<TransferFunction>(bench_case.transfer.choice)
-                                          ? Result<TransferFunction>(std::get<TransferFunction>(bench_case.transfer.choice))
-                                          : MakePreset(std::get<std::string>(bench_case.transfer.choice), SummaryOf(**volume));
+  const Result<TransferFunction> transfer = ResolveTransfer(bench_case.transfer, SummaryOf(**volume));
   if (!transfer.ok()) return transfer.status();
   const Result<Json> grid = GridJson(bench_case, **volume);
   if (!grid.ok()) return grid.status();

@@ -26,7 +26,6 @@ namespace {
 constexpr std::size_t kStandardPaths = 6;
 constexpr int kQuickFrames = 24;  // with steps as small as those of a whole path
 constexpr int kTableWorkers = 16;
-constexpr std::string_view kCombine = "radix-k";
 
 struct Balance {
   std::vector<BenchCase> volumes;  // a volume for each of its renderers
@@ -47,7 +46,7 @@ struct Balance {
       for (const Path* path : paths) {
         if (p != workers.front() && path != paths.front()) continue;
         for (const auto& [name, policy] : methods) {
-          Walk walk{{volume, {pixels, pixels}, {}, Combined(policy, kCombine, policy.groups, policy.assignment), p},
+          Walk walk{{volume, {pixels, pixels}, {}, Combined(policy, kUsualScheme, policy.groups, policy.assignment), p},
                     path,
                     frames,
                     LaterOf(volume)};

@@ -19,17 +19,12 @@ constexpr int kLearningFrames = 12;  // with dynamic balance
 constexpr int kLeastMeasured = 8;    // frames from picture to picture
 constexpr Duration kPatience = std::chrono::seconds(1);
 
-double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
-
-// Milliseconds a frame of each stage.
-using StageSeries = std::array<std::vector<double>, kStageCount>;
-void Append(StageSeries& series, const StageTimes& times) {
-  for (std::size_t stage = 0; stage < series.size(); ++stage) series[stage].push_back(Milliseconds(times[stage]));
-}
-Json MediansOf(StageSeries series) {
+// Milliseconds of each stage, over frames.
+Json MediansOf(const std::vector<StageTimes>& frames) {
   Json medians = Json::object();
-  for (std::size_t stage = 0; stage < series.size(); ++stage) {
-    medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(series[stage])).median;
+  for (int stage = 0; stage < kStageCount; ++stage) {
+    const auto of_stage = [stage](const StageTimes& times) { return Milliseconds(times[std::size_t(stage)]); };
+    medians[std::string(ToString(Stage(stage)))] = MedianOf(EachOf(frames, of_stage)).median;
   }
   return medians;
 }
@@ -50,32 +45,28 @@ StageTimes LongestStages(const FrameStatistics& statistics) {
 int WarmUpFrames(const Policy& policy) { return IsDynamic(policy) ? kLearningFrames : kWarmUpFrames; }
 
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
-  std::vector<double> latencies, renders, longest, pictures, imbalances, idle_shares, image_bytes;
-  StageSeries stages, longest_stages;
+  std::vector<double> latencies;
+  std::vector<FrameSummary> summaries;
+  std::vector<StageTimes> stages, longest_stages;
   for (int i = 0; i < warm_up + frames; ++i) {
     const Picture picture = OrThrow(client.Render(request));
     if (i < warm_up) continue;
-    const FrameSummary summary = Summarize(picture.statistics);
     latencies.push_back(Milliseconds(picture.latency.count()));
-    renders.push_back(Milliseconds(summary.stage_ns[std::size_t(Stage::kRender)]));
-    longest.push_back(Milliseconds(summary.render_ns));
-    imbalances.push_back(summary.imbalance);
-    idle_shares.push_back(summary.idle_share);
-    image_bytes.push_back(double(summary.image_bytes));
-    pictures.push_back(Milliseconds(summary.finish_ns));
-    Append(stages, summary.stage_ns);
-    Append(longest_stages, LongestStages(picture.statistics));
+    summaries.push_back(Summarize(picture.statistics));
+    stages.push_back(summaries.back().stage_ns);
+    longest_stages.push_back(LongestStages(picture.statistics));
   }
+  const auto median = [&](auto&& of) { return MedianOf(EachOf(summaries, of)).median; };
   return Json{{"latency_ms", MedianOf(latencies).median},
               {"all_latency_ms", latencies},
-              {"stages_ms", MediansOf(std::move(stages))},
-              {"render_ms", MedianOf(std::move(renders)).median},
-              {"longest_render_ms", MedianOf(std::move(longest)).median},
-              {"longest_stages_ms", MediansOf(std::move(longest_stages))},
-              {"picture_ms", MedianOf(std::move(pictures)).median},
-              {"imbalance", MedianOf(std::move(imbalances)).median},
-              {"idle_share", MedianOf(std::move(idle_shares)).median},
-              {"image_bytes", MedianOf(std::move(image_bytes)).median}};
+              {"stages_ms", MediansOf(stages)},
+              {"render_ms", median([](const FrameSummary& of) { return Milliseconds(of.stage_ns[std::size_t(Stage::kRender)]); })},
+              {"longest_render_ms", median([](const FrameSummary& of) { return Milliseconds(of.render_ns); })},
+              {"longest_stages_ms", MediansOf(longest_stages)},
+              {"picture_ms", median([](const FrameSummary& of) { return Milliseconds(of.finish_ns); })},
+              {"imbalance", median(&FrameSummary::imbalance)},
+              {"idle_share", median(&FrameSummary::idle_share)},
+              {"image_bytes", median(&FrameSummary::image_bytes)}};
 }
 
 double MeasurePeriod(Client& client, std::span<const FrameRequest> requests, int in_flight) {

@@ -1,5 +1,5 @@
 // Experiments: `slabstream experiment NAME -o DIR` runs one. Each is one file and one line in Experiments(). An experiment lists the trials
-// that it needs (trials.h), has them run, and makes a report of their numbers (report/document.h). The rest is the same for all
+// that it needs (trials.h), has them run, and adds their numbers to the results (results/results.h). The rest is the same for all
 // (run_experiment.cpp): folder, resumption, progress, provenance, files. All of this throws Failure (failure.h).
 #pragma once
 

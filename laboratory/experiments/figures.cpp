@@ -5,8 +5,9 @@
 #include "laboratory/experiments/balanced_case.h"
 
 namespace slabstream {
+namespace {
 
-FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
+FrameFigures FiguresOf(const MeasuredFrame& frame, const MachineModel& machine, int teams) {
   const Timeline alone = Simulate(frame, machine);
   const SimulatedFrame& first = alone.frames.front();
   return {.latency_seconds = first.latency(),
@@ -17,9 +18,11 @@ FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine
           .image_bytes = first.image_bytes};
 }
 
+}  // namespace
+
 std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, const std::vector<MachineModel>& machines, int teams) {
   std::vector<FrameFigures> repeats;
-  for (std::size_t i = 0; i < std::min(frames.size(), machines.size()); ++i) repeats.push_back(FindFigures(frames[i], machines[i], teams));
+  for (std::size_t i = 0; i < std::min(frames.size(), machines.size()); ++i) repeats.push_back(FiguresOf(frames[i], machines[i], teams));
   return repeats;
 }
 
@@ -36,12 +39,7 @@ void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures
   constexpr Field kFields[] = {{"latency", &FrameFigures::latency_seconds}, {"preview", &FrameFigures::preview_seconds},
                                {"period", &FrameFigures::steady_seconds},   {"imbalance", &FrameFigures::imbalance},
                                {"idle_share", &FrameFigures::idle_share},   {"image_bytes", &FrameFigures::image_bytes}};
-  for (const Field& field : kFields) {
-    std::vector<double> values;
-    values.reserve(repeats.size());
-    for (const FrameFigures& repeat : repeats) values.push_back(repeat.*field.figure);
-    results.Add(of, field.metric, values, Origin::kSimulated);
-  }
+  for (const Field& field : kFields) results.Add(of, field.metric, EachOf(repeats, field.figure), Origin::kSimulated);
 }
 
 }  // namespace slabstream

@@ -18,10 +18,8 @@ struct FrameFigures {
   double image_bytes = 0;      // between workers
 };
 
-// `teams` of the size of the frame's take frames in turn.
-FrameFigures FindFigures(const MeasuredFrame& frame, const MachineModel& machine, int teams = 1);
-
-// The same for every repeat: repeat i of the frame on repeat i of the machine, as far as both go.
+// Of every repeat: repeat i of the frame on repeat i of the machine, as far as both go. `teams` of the size of the frame's take frames in
+// turn.
 std::vector<FrameFigures> FindFigures(const std::vector<MeasuredFrame>& frames, const std::vector<MachineModel>& machines, int teams = 1);
 
 // The same of a frame whose CostTrial and FinishTrial were run, on machines joined by `link` (Clusters).

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "client/cli/service_connection.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
@@ -20,6 +19,7 @@
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/frame_costs.h"
+#include "laboratory/measure/lab_service.h"
 #include "laboratory/measure/validate.h"
 
 namespace slabstream {
@@ -61,6 +61,62 @@ CoverageMap CoverageOf(const Json& json, const PixelBounds& frame) {
   return coverage;
 }
 
+std::string AnglesOf(const ViewParameters& view) {
+  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
+  const auto point = [](const char* what, const std::optional<Vec3>& p) {
+    return p ? fmt::format(" {} {:.4g},{:.4g},{:.4g}", what, p->x, p->y, p->z) : std::string();
+  };
+  std::string name = fmt::format("{:.4g}/{:.4g}", *azimuth, *elevation);
+  if (roll != 0) name += fmt::format(" roll {:.4g}", roll);
+  if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
+  if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
+  if (distance > 0) name += fmt::format(" distance {:.4g}", distance);
+  return name + point("at", look_at) + point("from", eye) + point("up", up) + (*fit ? " fit" : "") + (of_patient ? " of a patient" : "");
+}
+
+Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  const FramePlan plan = PlanOf(context, frame);
+  const PictureCost cost = MeasurePictureCost(*volume.volume, plan.setup, kFinishes);
+  return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}, {"picture_bytes", cost.bytes}};
+}
+
+Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
+  ServiceConnection connection = OrThrow(OpenLabService(frame.workers, {context.volumes().Get(frame.volume).volume}));
+  FrameRequest request = RequestOf(frame);
+  request.dataset = connection.dataset();
+  return MeasureLatency(connection.client(), request, WarmUpFrames(frame.policy), frames);
+}
+
+// Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.
+double ExpectedEffort(const FrameCase& frame) {
+  const double side = SideOf(frame.volume).value_or(200);
+  const double halo = 2.0 * kHalo * std::cbrt(double(frame.workers) * std::max(1, frame.policy.groups));
+  return side * side * (side + 3 * halo) * 1e-6 + double(frame.size.width) * frame.size.height * 2e-6 + 0.1;
+}
+
+// Two volumes are two datasets, as at a service, so that nothing is known of one from the other.
+DatasetId IdOf(const Json& identity) { return std::max<DatasetId>(1, std::stoull(DigestText(identity.dump()), nullptr, 16)); }
+
+FramePlan PlanOf(const ResolvedRequest& resolved, int workers, std::shared_ptr<const Layout> layout) {
+  return OrThrow(PlanFrame(OrThrow(MakeFrameSetup(resolved)), resolved.policy, RosterOf(std::uint32_t(workers)), std::move(layout)));
+}
+
+KeyedFrame ForService(ExperimentContext& context, const FrameCase& frame, int frames) {
+  return WholeCase(context, "service", frame, {{"frames", frames}});
+}
+KeyedFrame ForValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
+  return WholeCase(context, "validation", frame, {{"turns", turns}});
+}
+
+Json MeasureValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
+  const VolumeInUse volume = context.volumes().Get(frame.volume);
+  const ValidationCase what{frame.volume.name, volume.volume, RequestOf(frame), frame.workers};
+  const ValidationRow row = OrThrow(ValidateSimulation(what, {.views = 1, .turns = turns}));
+  const ValidatedView& view = row.views.front();
+  return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
+}
+
 }  // namespace
 
 const RendererKind* Splatting() { return FindRenderer("splat"); }
@@ -79,27 +135,10 @@ FrameRequest RequestOf(const FrameCase& frame) {
   return request;
 }
 
-namespace {
-
-std::string AnglesOf(const ViewParameters& view) {
-  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
-  const auto point = [](const char* what, const std::optional<Vec3>& p) {
-    return p ? fmt::format(" {} {:.4g},{:.4g},{:.4g}", what, p->x, p->y, p->z) : std::string();
-  };
-  std::string name = fmt::format("{:.4g}/{:.4g}", *azimuth, *elevation);
-  if (roll != 0) name += fmt::format(" roll {:.4g}", roll);
-  if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
-  if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
-  if (distance > 0) name += fmt::format(" distance {:.4g}", distance);
-  return name + point("at", look_at) + point("from", eye) + point("up", up) + (*fit ? " fit" : "") + (of_patient ? " of a patient" : "");
-}
-
-}  // namespace
-
-Json ColumnsOf(const FrameCase& frame) {
+Json ColumnsOf(const FrameCase& frame, Json columns) {
   const auto& [decomposition, balance_by, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
   const std::int64_t pixels = std::int64_t{frame.size.width} * frame.size.height;
-  Json columns = ColumnsOf(frame.volume);
+  columns.update(ColumnsOf(frame.volume));
   columns.update(Json{{"workers", frame.workers},
                       {"view", AnglesOf(frame.view)},
                       {"pixels", std::min(frame.size.width, frame.size.height)},
@@ -144,54 +183,11 @@ Json NumbersOf(const std::vector<BoxCost>& costs, const FramePlan& plan) {
   return numbers;
 }
 
-namespace {
-
-Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
-  const FramePlan plan = PlanOf(context, frame);
-  const PictureCost cost = MeasurePictureCost(*volume.volume, plan.setup, kFinishes);
-  return Json{{"finish_seconds", cost.finish_seconds}, {"receive_seconds", cost.receive_seconds}, {"picture_bytes", cost.bytes}};
-}
-
-Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
-  ServiceConnection connection =
-      OrThrow(ServiceConnection::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
-                                           {[held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }}));
-  FrameRequest request = RequestOf(frame);
-  request.dataset = connection.dataset();
-  return MeasureLatency(connection.client(), request, WarmUpFrames(frame.policy), frames);
-}
-
-// Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.
-double ExpectedEffort(const FrameCase& frame) {
-  const double side = SideOf(frame.volume).value_or(200);
-  const double halo = 2.0 * kHalo * std::cbrt(double(frame.workers) * std::max(1, frame.policy.groups));
-  return side * side * (side + 3 * halo) * 1e-6 + double(frame.size.width) * frame.size.height * 2e-6 + 0.1;
-}
-
-}  // namespace
-
-namespace {
-
-// Two volumes are two datasets, as at a service, so that nothing is known of one from the other.
-DatasetId IdOf(const Json& identity) { return std::max<DatasetId>(1, std::stoull(DigestText(identity.dump()), nullptr, 16)); }
-
-}  // namespace
-
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame) {
   const FrameRequest request = RequestOf(frame);
   OrThrow(Validate(request));
   return OrThrow(ResolveCompared(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary));
 }
-
-namespace {
-
-FramePlan PlanOf(const ResolvedRequest& resolved, int workers, std::shared_ptr<const Layout> layout) {
-  return OrThrow(PlanFrame(OrThrow(MakeFrameSetup(resolved)), resolved.policy, RosterOf(std::uint32_t(workers)), std::move(layout)));
-}
-
-}  // namespace
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
   const ResolvedRequest resolved = Resolve(context, frame);
@@ -207,25 +203,6 @@ FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredL
   const ResolvedRequest resolved = Resolve(context, frame);
   return PlanOf(resolved, frame.workers, layouts.Next(resolved, context.volumes().Occupied(frame.volume)));
 }
-
-namespace {
-
-KeyedFrame ForService(ExperimentContext& context, const FrameCase& frame, int frames) {
-  return WholeCase(context, "service", frame, {{"frames", frames}});
-}
-KeyedFrame ForValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
-  return WholeCase(context, "validation", frame, {{"turns", turns}});
-}
-
-Json MeasureValidation(ExperimentContext& context, const FrameCase& frame, int turns) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
-  const ValidationCase what{frame.volume.name, volume.volume, RequestOf(frame), frame.workers};
-  const ValidationRow row = OrThrow(ValidateSimulation(what, {.views = 1, .turns = turns}));
-  const ValidatedView& view = row.views.front();
-  return Json{{"measured_ms", view.measured.latency * 1e3}, {"simulated_ms", view.simulated.latency * 1e3}};
-}
-
-}  // namespace
 
 Json BoxCostKey(ExperimentContext& context, const FrameCase& frame) { return ForBoxCosts(context, frame).key; }
 Trial BoxCostTrial(ExperimentContext& context, const FrameCase& asked) {
@@ -261,20 +238,10 @@ FrameInput MeasuredFrame::Input() const {
   return input;
 }
 
-std::vector<double> MeasuredFrame::WorkerSeconds() const {
-  std::vector<double> seconds(plan.slots);
-  for (const GroupPlan& group : plan.groups) {
-    for (const Placement& placement : group.placements) seconds[placement.worker - 1] += boxes[placement.id].seconds;
-  }
-  return seconds;
-}
-
-double MeasuredFrame::MostVoxelBytes() const {
-  std::vector<double> bytes(plan.slots);
-  for (const GroupPlan& group : plan.groups) {
-    for (const Placement& placement : group.placements) bytes[placement.worker - 1] += boxes[placement.id].voxel_bytes;
-  }
-  return *std::ranges::max_element(bytes);
+std::vector<double> MeasuredFrame::OfWorkers(double Cost::*number) const {
+  std::vector<double> sums(plan.slots);
+  for (const Placement& placement : PlacementsOf(plan)) sums[placement.worker - 1] += boxes[placement.id].*number;
+  return sums;
 }
 
 double MeasuredFrame::RenderSeconds() const {

@@ -3,6 +3,7 @@
 // box costs for any number of workers (simulator/model).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -34,8 +35,8 @@ const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
 
-// The columns of results that a frame fills (laboratory/results/columns.h). Those of the policy say what was asked for.
-Json ColumnsOf(const FrameCase& frame);
+// `columns`, and the columns of results that a frame fills (laboratory/results/columns.h). Those of the policy say what was asked for.
+Json ColumnsOf(const FrameCase& frame, Json columns = Json::object());
 
 // The keys of trials hold all that decides their numbers (frame_keys.h).
 
@@ -83,11 +84,14 @@ struct MeasuredFrame {
   std::vector<Cost> boxes;  // by BoxId; those without a placement cost nothing
   double finish_seconds = 0, receive_seconds = 0, picture_bytes = 0;
 
-  FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
-  std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box
-  double MostVoxelBytes() const;              // voxels, with halos, of the worker that holds most
-  double RenderSeconds() const;               // the sum over all boxes
-  double StageSeconds(Stage stage) const;     // the sum over all boxes
+  FrameInput Input() const;  // for SimulateFrames, valid as long as this lives
+  // The sum over the boxes of each worker, including workers without a box.
+  std::vector<double> OfWorkers(double Cost::*number) const;
+  std::vector<double> WorkerSeconds() const { return OfWorkers(&Cost::seconds); }
+  double LongestSeconds() const { return std::ranges::max(WorkerSeconds()); }
+  double ImbalanceOfWorkers() const { return Imbalance(WorkerSeconds()); }
+  double RenderSeconds() const;            // the sum over all boxes
+  double StageSeconds(Stage stage) const;  // the sum over all boxes
 };
 // Both trials must have been run.
 MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame);

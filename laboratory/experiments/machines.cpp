@@ -28,25 +28,6 @@ constexpr Found kNumbers[] = {
     {"client", [](MachineModel& m) -> double& { return m.client_seconds; }},
 };
 
-}  // namespace
-
-Trial HostTrial() {
-  const auto run = []() -> Json {
-    MachineModel machine = OrThrow(CalibrateThisHost(1)).machine;
-    // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
-    TaskArena one_thread(1);
-    machine.combining = one_thread.Run([] { return MeasureCombining(Transfer::kMessage); });
-    Json numbers = Json::object();
-    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
-    return numbers;
-  };
-  return {HostKey(), run, 50};
-}
-
-LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value(); }
-
-namespace {
-
 MachineModel JoinedBy(MachineModel machine, const LinkModel& link, const HostModel& host) {
   machine.message_seconds = MachineModel().message_seconds;  // over sockets; threads of one process need none
   machine.link = link;
@@ -62,6 +43,21 @@ MachineModel JoinedBy(MachineModel machine, const LinkModel& link, const HostMod
 }
 
 }  // namespace
+
+Trial HostTrial() {
+  const auto run = []() -> Json {
+    MachineModel machine = OrThrow(CalibrateThisHost(1));
+    // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
+    TaskArena one_thread(1);
+    machine.combining = one_thread.Run([] { return MeasureCombining(Transfer::kMessage); });
+    Json numbers = Json::object();
+    for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
+    return numbers;
+  };
+  return {HostKey(), run, 50};
+}
+
+LinkModel Link(std::string_view preset) { return ParseLink("link", preset).value(); }
 
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, const HostModel& host) {
   MachineModel machine;

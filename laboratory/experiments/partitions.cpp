@@ -18,8 +18,7 @@ namespace slabstream {
 namespace {
 
 constexpr std::array<std::string_view, 2> kLinks = {"10gbit", "1gbit"};  // the first one wherever there is one link
-constexpr std::string_view kCombine = "radix-k";                         // wherever partitions alone are compared
-constexpr std::array<std::string_view, 3> kSchemes = {"fan-in", kCombine, "direct-send"};
+constexpr std::array<std::string_view, 3> kSchemes = {"fan-in", kUsualScheme, "direct-send"};
 constexpr std::array<int, 2> kGroups = {1, 2};
 
 struct Comparison {
@@ -64,15 +63,15 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& compar
       trials.push_back(BoxCostTrial(context, comparison.Frame(volume, policy, p)));
     };
     trials.push_back(FinishTrial(context, comparison.Frame(volume, {}, 1)));
-    add_boxes(Combined(EqualSlabs().policy, kCombine), 1);
+    add_boxes(Combined(EqualSlabs().policy, kUsualScheme), 1);
     for (const NamedPolicy& named : AllPartitions()) {
       for (const int p : comparison.workers) {
-        for (const int groups : kGroups) add_boxes(Combined(named.policy, kCombine, groups), p);
+        for (const int groups : kGroups) add_boxes(Combined(named.policy, kUsualScheme, groups), p);
       }
     }
     for (const NamedPolicy& named : PartitionsByVoxels()) {
       for (const AssignmentEntry& assignment : AssignmentsToCompare())
-        add_boxes(Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
+        add_boxes(Combined(named.policy, kUsualScheme, kBoxesAWorker, assignment.name), comparison.TableWorkers());
     }
     for (const int p : comparison.workers) add_boxes({.groups = 1}, p);
   }
@@ -80,8 +79,7 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& compar
 }
 
 Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link = "") {
-  Json of = {{"part", part}};
-  of.update(ColumnsOf(frame));
+  Json of = ColumnsOf(frame, {{"part", part}});
   if (link.empty()) {
     of.erase("combine");  // what is measured does not depend on it
   } else {
@@ -92,17 +90,10 @@ Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link
 
 // What boxes alone tell.
 void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredFrame>& repeats) {
-  std::vector<double> imbalance, sum, longest;
-  for (const MeasuredFrame& frame : repeats) {
-    const std::vector<double> seconds = frame.WorkerSeconds();
-    imbalance.push_back(Imbalance(seconds));
-    sum.push_back(frame.RenderSeconds());
-    longest.push_back(*std::ranges::max_element(seconds));
-  }
-  results.Add(of, "imbalance", imbalance, Origin::kMeasured);
-  results.Add(of, "render_time", sum, Origin::kMeasured);
-  results.Add(of, "longest_render_time", longest, Origin::kMeasured);
-  results.Add(of, "memory", repeats.front().MostVoxelBytes(), Origin::kMeasured);
+  results.Add(of, "imbalance", EachOf(repeats, &MeasuredFrame::ImbalanceOfWorkers), Origin::kMeasured);
+  results.Add(of, "render_time", EachOf(repeats, &MeasuredFrame::RenderSeconds), Origin::kMeasured);
+  results.Add(of, "longest_render_time", EachOf(repeats, &MeasuredFrame::LongestSeconds), Origin::kMeasured);
+  results.Add(of, "memory", std::ranges::max(repeats.front().OfWorkers(&MeasuredFrame::Cost::voxel_bytes)), Origin::kMeasured);
 }
 
 void AddLatency(ExperimentContext& context, Results& results, std::string_view part, const FrameCase& frame,
@@ -119,13 +110,13 @@ void AddLatency(ExperimentContext& context, Results& results, std::string_view p
 
 // Every partition under every scheme, and what the service does if nothing is asked for.
 void AddPolicies(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
-  const FrameCase whole = comparison.Frame(volume, Combined(EqualSlabs().policy, kCombine), 1);
+  const FrameCase whole = comparison.Frame(volume, Combined(EqualSlabs().policy, kUsualScheme), 1);
   AddBoxFigures(results, CaseOf("partition", whole), RecallRepeats(context, whole));
   AddLatency(context, results, "policy", whole, kLinks);
   for (const int p : comparison.workers) {
     if (p == 1) continue;
     for (const NamedPolicy& named : AllPartitions()) {
-      const FrameCase boxes = comparison.Frame(volume, Combined(named.policy, kCombine), p);
+      const FrameCase boxes = comparison.Frame(volume, Combined(named.policy, kUsualScheme), p);
       AddBoxFigures(results, CaseOf("partition", boxes), RecallRepeats(context, boxes));
       for (const int groups : kGroups) {
         for (const std::string_view scheme : kSchemes)
@@ -138,7 +129,7 @@ void AddPolicies(ExperimentContext& context, const Comparison& comparison, const
 
 void AttachAllBoxes(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    const FrameCase frame = comparison.Frame(volume, Combined(named.policy, kCombine), comparison.TableWorkers());
+    const FrameCase frame = comparison.Frame(volume, Combined(named.policy, kUsualScheme), comparison.TableWorkers());
     AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
                 Recall(context, frame));
   }
@@ -148,7 +139,7 @@ void AddAssignments(ExperimentContext& context, const Comparison& comparison, co
   for (const NamedPolicy& named : PartitionsByVoxels()) {
     for (const AssignmentEntry& assignment : AssignmentsToCompare()) {
       const FrameCase frame =
-          comparison.Frame(volume, Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
+          comparison.Frame(volume, Combined(named.policy, kUsualScheme, kBoxesAWorker, assignment.name), comparison.TableWorkers());
       AddBoxFigures(results, CaseOf("assignment", frame), RecallRepeats(context, frame));
     }
   }

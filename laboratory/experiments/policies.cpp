@@ -10,39 +10,33 @@
 namespace slabstream {
 namespace {
 
-const std::string kTreeCombine = "fan-in";  // unless they say otherwise
+NamedPolicy Partitioned(std::string_view decomposition, std::string_view split) {
+  return {fmt::format("{} by {}", decomposition, split),
+          {.decomposition = std::string(decomposition), .balance_by = std::string(split), .groups = 1, .combine = "fan-in"}};
+}
 
 }  // namespace
 
 std::vector<NamedPolicy> AllPartitions() {
   std::vector<NamedPolicy> policies;
   for (const DecompositionEntry& entry : Decompositions()) {
-    for (const std::string split : {"voxels", "bricks", "occupied"}) {
-      policies.push_back({fmt::format("{} by {}", entry.name, split),
-                          {.decomposition = std::string(entry.name), .balance_by = split, .groups = 1, .combine = kTreeCombine}});
-    }
+    for (const char* split : {"voxels", "bricks", "occupied"}) policies.push_back(Partitioned(entry.name, split));
   }
   return policies;
 }
 
 NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 
-NamedPolicy BalancedSlabs() { return AllPartitions().at(2); }
+NamedPolicy BrickTree() { return Partitioned("kd-tree", "bricks"); }
 
-NamedPolicy BrickTree() {
-  return {"kd-tree by bricks", {.decomposition = "kd-tree", .balance_by = "bricks", .groups = 1, .combine = kTreeCombine}};
-}
-
-NamedPolicy BalancedTree() {
-  return {"kd-tree by occupied", {.decomposition = "kd-tree", .balance_by = "occupied", .groups = 1, .combine = kTreeCombine}};
-}
+NamedPolicy BalancedTree() { return Partitioned("kd-tree", "occupied"); }
 
 std::vector<NamedPolicy> PartitionsAlongTheView() {
   std::vector<NamedPolicy> policies;
-  for (const std::string decomposition : {"slab", "kd-tree"}) {
-    policies.push_back(
-        {fmt::format("{} along the view", decomposition),
-         {.decomposition = decomposition, .balance_by = "occupied", .axis = AxisChoice::kView, .groups = 1, .combine = kTreeCombine}});
+  for (const char* decomposition : {"slab", "kd-tree"}) {
+    NamedPolicy& named = policies.emplace_back(Partitioned(decomposition, "occupied"));
+    named.name = fmt::format("{} along the view", decomposition);
+    named.policy.axis = AxisChoice::kView;
   }
   return policies;
 }

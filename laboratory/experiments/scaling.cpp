@@ -10,6 +10,7 @@
 
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/resolved_policy.h"
 #include "common/wire/any_message.h"
 #include "common/wire/control_messages.h"
 #include "laboratory/experiments/balanced_case.h"
@@ -49,23 +50,19 @@ std::vector<Series> StrongSeries(const ExperimentContext& context, const Rendere
   const int size = context.Scaled(context.quick() ? 128 : 300), pixels = context.Scaled(512);
   std::vector<Series> all;
   const BenchCase sphere = StandardSphere(SphereClass::kHollow, size, renderer);
-  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    for (const std::string& scheme : UsualSchemes()) {
-      Series series{fmt::format("{}, {}", named.name, scheme), {}};
-      Policy policy = named.policy;
-      policy.combine = scheme;
-      for (const int p : workers) series.frames.push_back(FrameOf(sphere, pixels, policy, p));
-      all.push_back(std::move(series));
+  const auto add = [&](const std::string& name, const Policy& policy, int team = 0) {
+    Series& series = all.emplace_back(Series{name, {}, team});
+    for (const int p : workers) {
+      if (!IsDynamic(policy) || p <= kMostDynamicWorkers) series.frames.push_back(FrameOf(sphere, pixels, policy, p));
     }
+  };
+  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
+    for (const std::string& scheme : UsualSchemes()) add(fmt::format("{}, {}", named.name, scheme), Combined(named.policy, scheme));
   }
-  Series dynamic{"slabs, dynamic balance", {}}, teams{fmt::format("slabs, teams of {}", kTeam), {}, kTeam};
   Policy balanced = EqualSlabs().policy;
   balanced.balance = kDynamicBalance;
-  for (const int p : workers) {
-    if (p <= kMostDynamicWorkers) dynamic.frames.push_back(FrameOf(sphere, pixels, balanced, p));
-    teams.frames.push_back(FrameOf(sphere, pixels, EqualSlabs().policy, p));
-  }
-  all.insert(all.end(), {std::move(dynamic), std::move(teams)});
+  add("slabs, dynamic balance", balanced);
+  add(fmt::format("slabs, teams of {}", kTeam), EqualSlabs().policy, kTeam);
   return all;
 }
 
@@ -92,8 +89,7 @@ std::vector<FrameCase> FramesOfMany(const ExperimentContext& context) {
   std::vector<FrameCase> frames;
   const BenchCase sphere = StandardSphere(SphereClass::kHollow, context.Scaled(context.quick() ? 128 : 300), Splatting());
   for (const std::string& scheme : UsualSchemes()) {
-    Policy policy = BalancedTree().policy;
-    policy.combine = scheme;
+    const Policy policy = Combined(BalancedTree().policy, scheme);
     for (const int p : context.quick() ? std::vector{16, 64} : std::vector{16, 64, 256, 1024, 4096})
       frames.push_back(FrameOf(sphere, context.Scaled(512), policy, p));
   }

@@ -2,8 +2,8 @@
 
 #include <string>
 #include <utility>
-#include <vector>
 
+#include "client/cli/service_connection.h"
 #include "laboratory/experiments/client_frames.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/service_roster.h"
@@ -13,8 +13,7 @@ namespace {
 
 constexpr int kLatencyFrames = 5;
 
-}  // namespace
-
+// `begin`: the service when the run began.
 Trial ServiceFramesTrial(Client& client, const StatusReply& begin, const FrameCase& frame) {
   const int in_flight = FramesInFlight(int(begin.workers.size()), frame);
   const Json key = {{"what", "frames of a service"}, {"in flight", in_flight}, {"request", RequestJson(RequestOf(frame))}};
@@ -50,6 +49,21 @@ void AddServiceFrames(Results& results, const Json& of, const TrialLog& log, con
     at["stage"] = name;
     results.Add(at, "stage_time", seconds, Origin::kMeasured);
   }
+}
+
+}  // namespace
+
+void MeasureAtService(ExperimentContext& context, Results& results, const std::function<std::vector<ServedFrame>(int workers)>& frames) {
+  ServiceConnection connection = OrThrow(ServiceConnection::OpenService(context.options().own.service));
+  const StatusReply begin = OrThrow(connection.client().QueryStatus());
+  const Json roster = RosterOf(begin);
+  const std::vector<ServedFrame> served = frames(int(roster.size()));
+  std::vector<Trial> trials;
+  trials.reserve(served.size());
+  for (const ServedFrame& of : served) trials.push_back(ServiceFramesTrial(connection.client(), begin, of.frame));
+  context.Run(trials);
+  for (std::size_t i = 0; i < served.size(); ++i) AddServiceFrames(results, served[i].columns, context.log(), trials[i]);
+  AttachRoster(results, roster);
 }
 
 }  // namespace slabstream

@@ -15,28 +15,6 @@ namespace {
 
 constexpr int kMostWorkers = 4096;
 
-}  // namespace
-
-void DeclareSubjects(const Command& app, OwnOptions& options, const std::string& workers) {
-  app.AddTexts("VOLUME", options.cases,
-               "Volumes instead of the standard ones: FILE, FILE:TRANSFER, a case of `slabstream bench --list`, or class1-SIZE, "
-               "class2-SIZE or clusters-SIZE, which may end in -OCCUPANCY: clusters-512-0.02");
-  AddParsedList(
-      app, "--workers", options.workers,
-      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMostWorkers); },
-      "Numbers of workers (default: " + workers + ")");
-  AddParsedList(
-      app, "--renderer", options.renderers,
-      [](const std::string& option, const std::string& text) -> Result<const RendererKind*> {
-        const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
-        if (!index.ok()) return index.status();
-        return Renderers()[*index];
-      },
-      "How voxels become a picture; every volume is rendered by each (default: splat)");
-}
-
-namespace {
-
 // `volumes(renderer)` under each renderer that the user named, or once under its own (null).
 std::vector<BenchCase> UnderEach(const OwnOptions& own, const std::function<std::vector<BenchCase>(const RendererKind*)>& volumes) {
   std::vector<BenchCase> subjects;
@@ -59,6 +37,24 @@ std::vector<std::string> NamedIn(const ExperimentOptions& options) {
 }
 
 }  // namespace
+
+void DeclareSubjects(const Command& app, OwnOptions& options, const std::string& workers) {
+  app.AddTexts("VOLUME", options.cases,
+               "Volumes instead of the standard ones: FILE, FILE:TRANSFER, a case of `slabstream bench --list`, or class1-SIZE, "
+               "class2-SIZE or clusters-SIZE, which may end in -OCCUPANCY: clusters-512-0.02");
+  AddParsedList(
+      app, "--workers", options.workers,
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMostWorkers); },
+      "Numbers of workers (default: " + workers + ")");
+  AddParsedList(
+      app, "--renderer", options.renderers,
+      [](const std::string& option, const std::string& text) -> Result<const RendererKind*> {
+        const Result<std::size_t> index = ParseChoice(option, text, RendererNames());
+        if (!index.ok()) return index.status();
+        return Renderers()[*index];
+      },
+      "How voxels become a picture; every volume is rendered by each (default: splat)");
+}
 
 std::vector<BenchCase> SubjectsOf(const ExperimentOptions& options, int size) {
   return UnderEach(options.own, [&](const RendererKind* renderer) -> std::vector<BenchCase> {

@@ -5,7 +5,7 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
-#include "laboratory/experiments/service_sweep.h"
+#include "laboratory/experiments/service_frames.h"
 #include "laboratory/experiments/sweep_file.h"
 
 namespace slabstream {
@@ -51,13 +51,9 @@ std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
 
 // What the simulation is given, by the names that the same times have at a service.
 void AddInputs(ExperimentContext& context, const SweepCase& c, Results& results) {
-  std::vector<double> longest, picture;
-  for (const MeasuredFrame& repeat : RecallCosts(context, c.team)) {
-    longest.push_back(std::ranges::max(repeat.WorkerSeconds()));
-    picture.push_back(repeat.finish_seconds);
-  }
-  results.Add(c.columns, "longest_render_time", longest, Origin::kSimulated);
-  results.Add(c.columns, "picture_time", picture, Origin::kSimulated);
+  const std::vector<MeasuredFrame> repeats = RecallCosts(context, c.team);
+  results.Add(c.columns, "longest_render_time", EachOf(repeats, &MeasuredFrame::LongestSeconds), Origin::kSimulated);
+  results.Add(c.columns, "picture_time", EachOf(repeats, &MeasuredFrame::finish_seconds), Origin::kSimulated);
 }
 
 void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& results) {
@@ -81,6 +77,17 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
   }
 }
 
+std::vector<ServedFrame> FramesAtService(const Sweep& sweep, int workers) {
+  std::vector<ServedFrame> frames;
+  for (const auto& [frame, names] : FramesOf(sweep)) {
+    ServedFrame& served = frames.emplace_back(ServedFrame{frame, {}});
+    served.frame.workers = workers;
+    served.columns = ColumnsOf(served.frame);
+    served.columns.update(names);
+  }
+  return frames;
+}
+
 SweepPlace PlaceOf(const ExperimentOptions& options) { return options.own.at_service() ? SweepPlace::kAtService : SweepPlace::kHere; }
 
 }  // namespace
@@ -99,7 +106,11 @@ void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(
 
 void RunSweep(ExperimentContext& context, Results& results) {
   const Sweep sweep = OrThrow(ReadSweep(context.options().sweep_file, PlaceOf(context.options())));
-  context.options().own.at_service() ? RunServiceSweep(context, sweep, results) : RunSweepHere(context, sweep, results);
+  if (context.options().own.at_service()) {
+    MeasureAtService(context, results, [&](int workers) { return FramesAtService(sweep, workers); });
+  } else {
+    RunSweepHere(context, sweep, results);
+  }
   results.Attach("sweep", {{{"title", sweep.title}}});
 }
 

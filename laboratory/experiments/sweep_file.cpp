@@ -27,6 +27,21 @@ namespace {
 
 constexpr int kMaxSphere = 1024, kMaxHostCores = 1024;
 
+// What was parsed of a value; a default and a complaint if it could not be.
+template <class T>
+T Taken(const JsonValue& value, Result<T> parsed) {
+  if (parsed.ok()) return *std::move(parsed);
+  value.Complain(parsed.status().message());
+  return {};
+}
+
+// Reads a list, entry by entry.
+template <class T>
+JsonValue::Read Into(std::vector<T>& list, std::function<T(const JsonValue&)> read) {
+  return
+      [&list, read = std::move(read)](const JsonValue& value) { value.Each([&](const JsonValue& entry) { list.push_back(read(entry)); }); };
+}
+
 BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
   // What names a volume that is no sphere.
   const char* const source = place == SweepPlace::kHere ? "file" : "dataset";
@@ -56,22 +71,11 @@ BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
                  [&](const JsonValue& v) {
                    opacity = v.Number({0, 1, true});
                  }},
-                {source,
-                 [&](const JsonValue& v) {
-                   if (Result<BenchCase> parsed = ParseBenchCase(v.Text(), place == SweepPlace::kAtService); parsed.ok()) {
-                     volume = *std::move(parsed);
-                   } else {
-                     v.Complain(parsed.status().message());
-                   }
-                 }},
+                {source, [&](const JsonValue& v) { volume = Taken(v, ParseBenchCase(v.Text(), place == SweepPlace::kAtService)); }},
                 {"transfer",
                  [&](const JsonValue& v) {
                    transfer_name = v.Text();
-                   if (auto parsed = ParseTransfer("transfer", transfer_name); parsed.ok()) {
-                     transfer.choice = *std::move(parsed);
-                   } else {
-                     v.Complain(parsed.status().message());
-                   }
+                   transfer.choice = Taken(v, ParseTransfer("transfer", transfer_name));
                  }},
                 {"opacity_distance",
                  [&](const JsonValue& v) {
@@ -120,8 +124,8 @@ SweepView ReadView(const JsonValue& value, std::size_t index) {
   return read;
 }
 
-SweepPolicy ReadPolicy(const JsonValue& value) {
-  SweepPolicy read;
+NamedPolicy ReadPolicy(const JsonValue& value) {
+  NamedPolicy read;
   FrameRequest request;
   request.policy.groups = 1;
   auto fields = OptionFields(request, {"policy."});
@@ -181,7 +185,7 @@ std::vector<SweepFrame> FramesOf(const Sweep& sweep) {
   for (const BenchCase& volume : sweep.volumes) {
     for (const SweepRenderer& renderer : sweep.renderers) {
       for (const SweepView& view : sweep.views) {
-        for (const SweepPolicy& policy : sweep.policies) {
+        for (const NamedPolicy& policy : sweep.policies) {
           SweepFrame& made = frames.emplace_back();
           made.frame = {volume, sweep.size, view.view, policy.policy, 1, renderer.look};
           made.frame.volume.renderer = renderer.kind;
@@ -207,32 +211,23 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPl
     if (place == SweepPlace::kAtService && file.Has(own))
       mistake = fmt::format("'{}': a running service has its own, so leave them out", own);
   }
-  file.Fields(
-      {{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
-       {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
-       {"volumes", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.volumes.push_back(ReadVolume(e, place)); }); }},
-       {"renderers", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.renderers.push_back(ReadRenderer(e)); }); }},
-       {"views", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.views.push_back(ReadView(e, sweep.views.size())); }); }},
-       {"policies", [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.policies.push_back(ReadPolicy(e)); }); }},
-       {"workers",
-        [&](const JsonValue& v) { v.Each([&](const JsonValue& e) { sweep.workers.push_back(e.Integer(1, kMaxSweepWorkers)); }); }},
-       {"hosts",
-        [&](const JsonValue& v) {
-          constexpr std::array<std::string_view, 2> kTraffic = {"plain", "encrypted"};
-          v.Fields({{"cores", [&](const JsonValue& c) { sweep.host.cores = c.Integer(1, kMaxHostCores); }},
-                    {"traffic", [&](const JsonValue& t) { sweep.host.encrypted = t.OneOf(kTraffic) == 1; }}});
-        }},
-       {"links", [&](const JsonValue& v) {
-          v.Each([&](const JsonValue& e) {
-            const std::string name = e.Text();
-            const Result<LinkModel> link = ParseLink("link", name);
-            if (link.ok()) {
-              sweep.links.push_back({name, *link});
-            } else {
-              e.Complain(link.status().message());
-            }
-          });
-        }}});
+  file.Fields({{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
+               {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
+               {"volumes", Into<BenchCase>(sweep.volumes, [&](const JsonValue& v) { return ReadVolume(v, place); })},
+               {"renderers", Into<SweepRenderer>(sweep.renderers, ReadRenderer)},
+               {"views", Into<SweepView>(sweep.views, [&](const JsonValue& v) { return ReadView(v, sweep.views.size()); })},
+               {"policies", Into<NamedPolicy>(sweep.policies, ReadPolicy)},
+               {"workers", Into<int>(sweep.workers, [](const JsonValue& v) { return v.Integer(1, kMaxSweepWorkers); })},
+               {"hosts",
+                [&](const JsonValue& v) {
+                  constexpr std::array<std::string_view, 2> kTraffic = {"plain", "encrypted"};
+                  v.Fields({{"cores", [&](const JsonValue& c) { sweep.host.cores = c.Integer(1, kMaxHostCores); }},
+                            {"traffic", [&](const JsonValue& t) { sweep.host.encrypted = t.OneOf(kTraffic) == 1; }}});
+                }},
+               {"links", Into<SweepLink>(sweep.links, [](const JsonValue& v) {
+                  const std::string name = v.Text();
+                  return SweepLink{name, Taken(v, ParseLink("link", name))};
+                })}});
   for (const char* needed : {"volumes", "policies", "workers"}) {
     const bool from_service = place == SweepPlace::kAtService && needed == std::string_view("workers");
     if (!mistake && !from_service && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);

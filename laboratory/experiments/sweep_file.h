@@ -13,6 +13,7 @@
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/frame_case.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/policies.h"
 #include "simulator/model/link_model.h"
 
 namespace slabstream {
@@ -25,10 +26,6 @@ struct SweepRenderer {
   std::string name;
   const RendererKind* kind = &DefaultRenderer();
   FrameRequest look = {};  // as FrameCase has it
-};
-struct SweepPolicy {
-  std::string name;
-  Policy policy;
 };
 struct SweepView {
   std::string name;
@@ -47,7 +44,7 @@ struct Sweep {
   std::vector<BenchCase> volumes;
   std::vector<SweepRenderer> renderers;
   std::vector<SweepView> views;
-  std::vector<SweepPolicy> policies;
+  std::vector<NamedPolicy> policies;
   std::vector<int> workers;
   std::vector<SweepLink> links;
   HostModel host;  // the host that is simulated

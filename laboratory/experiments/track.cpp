@@ -1,7 +1,6 @@
 #include "laboratory/experiments/track.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <numeric>
 
@@ -18,17 +17,11 @@ double SumOf(const std::vector<double>& values) { return std::accumulate(values.
 double MeanOf(const std::vector<double>& values) { return SumOf(values) / double(values.size()); }
 std::vector<double> WithoutFirst(const std::vector<double>& values) { return {values.begin() + 1, values.end()}; }
 
-// The value that this share of all does not exceed.
-double QuantileOf(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values[std::size_t(std::ceil(share * double(values.size()))) - 1];
-}
-
 // Frames from the middle on until the longest render time has settled.
 double SettlingFrames(const std::vector<double>& longest) {
   const auto middle = longest.begin() + std::ptrdiff_t(longest.size() / 2);
   const std::vector<double> last_quarter(longest.end() - std::ptrdiff_t(longest.size() / 4), longest.end());
-  const double settled = kSettled * QuantileOf(last_quarter, 0.5);
+  const double settled = kSettled * Quantile(last_quarter, 0.5);
   int calm = 0;
   for (auto frame = middle; frame != longest.end(); ++frame) {
     calm = *frame <= settled ? calm + 1 : 0;
@@ -40,8 +33,7 @@ double SettlingFrames(const std::vector<double>& longest) {
 }  // namespace
 
 Json ColumnsOf(const Walk& walk) {
-  Json of = {{"part", "path"}};
-  of.update(ColumnsOf(walk.frame));
+  Json of = ColumnsOf(walk.frame, {{"part", "path"}});
   of["view"] = walk.path->name;
   return of;
 }
@@ -51,9 +43,7 @@ void AddTracks(Results& results, const Walk& walk, const Json& of, const std::ve
                        const char* variant = nullptr) {
     Json columns = of;
     if (variant != nullptr) columns["variant"] = variant;
-    std::vector<double> each;
-    for (const Track& track : repeats) each.push_back(figure(track));
-    results.Add(columns, metric, each, is_simulated ? Origin::kSimulated : Origin::kMeasured);
+    results.Add(columns, metric, EachOf(repeats, figure), is_simulated ? Origin::kSimulated : Origin::kMeasured);
   };
   const auto mean = [](std::vector<double> Track::*values) {
     return [values](const Track& track) { return MeanOf(WithoutFirst(track.*values)); };
@@ -61,7 +51,7 @@ void AddTracks(Results& results, const Walk& walk, const Json& of, const std::ve
   const char* const longest = "longest_render_time";
   add(longest, mean(&Track::longest_seconds));
   add(
-      longest, [](const Track& track) { return QuantileOf(WithoutFirst(track.longest_seconds), 0.95); }, false, "95 % of frames");
+      longest, [](const Track& track) { return Quantile(WithoutFirst(track.longest_seconds), 0.95); }, false, "95 % of frames");
   add(
       longest, [](const Track& track) { return std::ranges::max(WithoutFirst(track.longest_seconds)); }, false, "worst frame");
   add("imbalance", mean(&Track::imbalance));
@@ -84,9 +74,7 @@ void AddTracks(Results& results, const Walk& walk, const Json& of, const std::ve
 void AddSteps(std::vector<Json>& rows, const Walk& walk, const std::vector<Track>& repeats) {
   const Policy& policy = walk.frame.policy;
   const auto median = [&](std::vector<double> Track::*values, std::size_t step) {
-    std::vector<double> each;
-    for (const Track& track : repeats) each.push_back((track.*values)[step]);
-    return MedianOf(std::move(each)).median;
+    return MedianOf(EachOf(repeats, [&](const Track& track) { return (track.*values)[step]; })).median;
   };
   for (std::size_t step = 0; step < repeats.front().longest_seconds.size(); ++step) {
     rows.push_back({{"step", step},

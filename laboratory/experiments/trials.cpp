@@ -31,9 +31,7 @@ std::vector<Run> InRandomOrder(const std::vector<Trial>& trials, const TrialSche
   std::vector<Run> runs;
   for (int repeat = 0; repeat < schedule.repeats; ++repeat) {
     const std::size_t begin = runs.size();
-    for (const Trial& trial : trials) {
-      if (repeat == 0 || trial.repeat) runs.push_back({&trial, repeat});
-    }
+    for (const Trial& trial : trials) runs.push_back({&trial, repeat});
     // Fisher and Yates; std::shuffle may differ from library to library.
     for (std::size_t left = runs.size() - begin; left > 1; --left) {
       const auto first = runs.begin() + std::ptrdiff_t(begin);
@@ -110,27 +108,18 @@ void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, 
 }
 
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number, double factor) {
-  std::vector<double> values;
-  for (const Json* numbers : log.All(key)) values.push_back(Field(*numbers, number).get<double>() * factor);
-  CHECK(!values.empty()) << key.dump();
-  return values;
-}
-
-std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list) {
-  CHECK(!repeats.empty()) << list;
-  std::vector<Estimate> estimates;
-  for (std::size_t i = 0; i < Field(*repeats.front(), list).size(); ++i) {
-    std::vector<double> values;
-    values.reserve(repeats.size());
-    for (const Json* numbers : repeats) values.push_back(Field(*numbers, list).at(i).get<double>());
-    estimates.push_back(MedianOf(std::move(values)));
-  }
-  return estimates;
+  const std::vector<const Json*> repeats = log.All(key);
+  CHECK(!repeats.empty()) << key.dump();
+  return EachOf(repeats, [&](const Json* numbers) { return Field(*numbers, number).get<double>() * factor; });
 }
 
 std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list) {
+  CHECK(!repeats.empty()) << list;
   std::vector<double> medians;
-  for (const Estimate& estimate : EstimatesOf(repeats, list)) medians.push_back(estimate.median);
+  for (std::size_t i = 0; i < Field(*repeats.front(), list).size(); ++i) {
+    const auto entry = [&](const Json* numbers) { return Field(*numbers, list).at(i).get<double>(); };
+    medians.push_back(MedianOf(EachOf(repeats, entry)).median);
+  }
   return medians;
 }
 

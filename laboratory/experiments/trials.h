@@ -17,7 +17,6 @@ struct Trial {
   Json key;                   // its parameters, an object; holds all that decides its numbers
   std::function<Json()> run;  // numbers by name, an object; must not depend on what ran before; may throw Failure
   double effort = 1;          // expected time relative to other trials, for the time left
-  bool repeat = true;         // false: its numbers are computed, so once is enough
   Json inputs;                // all that `run` is given, however the key tells it; null: the key says it all
 };
 
@@ -40,8 +39,7 @@ void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, 
 // `factor`: into another unit.
 std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number, double factor = 1);
 inline Estimate EstimateOf(const TrialLog& log, const Json& key, const std::string& number) { return MedianOf(ValuesOf(log, key, number)); }
-// The same for a list of numbers, entry by entry, over `repeats`, which hold lists of one length.
-std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list);
+// The medians of a list of numbers, entry by entry, over `repeats`, which hold lists of one length.
 std::vector<double> MediansOf(const std::vector<const Json*>& repeats, const std::string& list);
 
 }  // namespace slabstream

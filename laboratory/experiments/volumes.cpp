@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <span>
 
-#include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/count_drawn.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/resolved_request.h"

@@ -115,12 +115,6 @@ void Follow(ExperimentContext& context, const Walk& walk, const Visit& visit) {
   }
 }
 
-std::vector<double> SecondsOf(const std::vector<BoxCost>& costs, double BoxCost::*field) {
-  std::vector<double> seconds;
-  for (const BoxCost& cost : costs) seconds.push_back(cost.*field);
-  return seconds;
-}
-
 Json MeasureWalk(ExperimentContext& context, const Walk& walk) {
   Json steps = Json::array();
   std::shared_ptr<const Volume> volume;  // outlives the worker
@@ -132,7 +126,7 @@ Json MeasureWalk(ExperimentContext& context, const Walk& walk) {
       worker = std::make_unique<LabWorker>(*volume);
     }
     const std::vector<BoxCost> costs = MeasureNextFrame(*worker, step.plan, step.changed);
-    StepTimes times{SecondsOf(costs, &BoxCost::first_seconds), SecondsOf(costs, &BoxCost::seconds)};
+    StepTimes times{EachOf(costs, &BoxCost::first_seconds), EachOf(costs, &BoxCost::seconds)};
     Json numbers = {{"seconds", times.first}, {"lasting", times.lasting}};
     if (IsSampled(step.number)) numbers["boxes"] = NumbersOf(costs, step.plan);
     steps.push_back(std::move(numbers));

@@ -26,8 +26,11 @@ BoxCost CostOfFirst(const Box& box, const FrameSetup& setup, const BoxRendering&
   return cost;
 }
 
-std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
+}  // namespace
+
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
   CHECK_GE(repeats, 1);
+  LabWorker worker(volume);
   std::vector<BoxCost> costs;
   for (const Box& box : boxes) costs.push_back(CostOfFirst(box, setup, worker.Render(box, setup)));
   // In rounds: a moment in which the machine is slower or quicker affects only part of a box's times. Each round renders a box twice, and
@@ -41,12 +44,8 @@ std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::sp
     }
   }
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const auto median = [&](auto&& number) {
-      std::vector<double> numbers;
-      for (const BoxRendering& rendering : again[i]) numbers.push_back(double(number(rendering)));
-      return MedianOf(std::move(numbers)).median;
-    };
-    costs[i].seconds = median([](const BoxRendering& r) { return r.processor_seconds; });
+    const auto median = [&](auto&& number) { return MedianOf(EachOf(again[i], number)).median; };
+    costs[i].seconds = median(&BoxRendering::processor_seconds);
     for (std::size_t stage = 0; stage < costs[i].stage_ns.size(); ++stage) {
       using Nanoseconds = std::remove_reference_t<decltype(costs[i].stage_ns[stage])>;
       costs[i].stage_ns[stage] = Nanoseconds(median([stage](const BoxRendering& r) { return r.report.stage_ns[stage]; }));
@@ -55,22 +54,10 @@ std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::sp
   return costs;
 }
 
-}  // namespace
-
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& setup, std::span<const Box> boxes, int repeats) {
-  LabWorker worker(volume);
-  return Measure(worker, setup, boxes, repeats);
-}
-
-std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats) {
+std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
   std::vector<Box> boxes;
   for (const Placement& placement : PlacementsOf(plan)) boxes.push_back(placement.box);
-  return Measure(worker, plan.setup, boxes, repeats);
-}
-
-std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats) {
-  LabWorker worker(volume);
-  return MeasureBoxCosts(worker, plan, repeats);
+  return MeasureBoxCosts(volume, plan.setup, boxes, repeats);
 }
 
 std::vector<BoxCost> MeasureNextFrame(LabWorker& worker, const FramePlan& plan, const std::vector<bool>& changed) {

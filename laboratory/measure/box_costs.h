@@ -37,12 +37,10 @@ std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FrameSetup& set
 
 // The boxes that a plan renders, in the order of PlacementsOf(plan).
 std::vector<BoxCost> MeasureBoxCosts(const Volume& volume, const FramePlan& plan, int repeats);
-// The same by a worker that may have rendered boxes of earlier frames and then keeps what it made for them.
-std::vector<BoxCost> MeasureBoxCosts(LabWorker& worker, const FramePlan& plan, int repeats);
 
-// For walks of many frames: each box is rendered once, and one that `changed` (by placement) twice: what is held of it
-// is dropped before, so that first_seconds has the data made for it, and seconds does not. If a box did not change,
-// both are the same. Drops what the worker holds of boxes that the plan does not render.
+// For walks of many frames, by a worker that keeps what it made for boxes of earlier frames. Each box is rendered once, and one that
+// `changed` (by placement) twice: what is held of it is dropped before, so that first_seconds has the data made for it, and seconds does
+// not. If a box did not change, both are the same. Drops what the worker holds of boxes that the plan does not render.
 std::vector<BoxCost> MeasureNextFrame(LabWorker& worker, const FramePlan& plan, const std::vector<bool>& changed);
 
 // Largest / mean of the boxes' `seconds`: 1 is perfect balance, and the value if all costs are 0. With `slots` owners of several boxes

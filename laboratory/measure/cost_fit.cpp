@@ -17,22 +17,19 @@ using Eigen::VectorXd;
 
 double Measured(const CostSample& sample, Stage stage) { return double(sample.stage_ns[std::size_t(stage)]) * 1e-9; }
 
-// Rows and times divided by the time, so that residuals are relative.
-struct System {
-  MatrixXd units;
-  VectorXd ones;
-};
-
-System MakeSystem(const StageModel& stage, std::span<const CostSample* const> samples) {
-  System system{MatrixXd(Eigen::Index(samples.size()), Eigen::Index(stage.units.size())), VectorXd::Ones(Eigen::Index(samples.size()))};
+// A row a sample: its amounts of work over its time. Constants that fit it make each row 1, so residuals are relative.
+MatrixXd MakeSystem(const StageModel& stage, std::span<const CostSample* const> samples) {
+  MatrixXd system(Eigen::Index(samples.size()), Eigen::Index(stage.units.size()));
   for (std::size_t row = 0; row < samples.size(); ++row) {
     for (std::size_t column = 0; column < stage.units.size(); ++column) {
-      system.units(Eigen::Index(row), Eigen::Index(column)) =
+      system(Eigen::Index(row), Eigen::Index(column)) =
           samples[row]->work[std::size_t(stage.units[column])] / Measured(*samples[row], stage.stage);
     }
   }
   return system;
 }
+
+VectorXd Ones(const MatrixXd& system) { return VectorXd::Ones(system.rows()); }
 
 // Columns are first scaled to the same length: their units differ by ten orders of magnitude.
 VectorXd ColumnLengths(const MatrixXd& a) {
@@ -83,9 +80,9 @@ VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eige
 }
 
 VectorXd FitConstants(const StageModel& stage, std::span<const CostSample* const> samples, std::vector<Eigen::Index>& free) {
-  const System system = MakeSystem(stage, samples);
-  const VectorXd lengths = ColumnLengths(system.units);
-  return SolveNonNegative(system.units * lengths.cwiseInverse().asDiagonal(), system.ones, free).cwiseQuotient(lengths);
+  const MatrixXd system = MakeSystem(stage, samples);
+  const VectorXd lengths = ColumnLengths(system);
+  return SolveNonNegative(system * lengths.cwiseInverse().asDiagonal(), Ones(system), free).cwiseQuotient(lengths);
 }
 
 // The 97.5 % quantile of Student's t (Abramowitz and Stegun, 26.7.5): within 1 % for 3 degrees of freedom, better for more.
@@ -97,13 +94,13 @@ double StudentQuantile(double freedom) {
 }
 
 // Half the width of each constant's 95 % interval, if `columns` are the ones that were fitted.
-VectorXd HalfWidths(const System& system, const std::vector<Eigen::Index>& columns, const VectorXd& seconds) {
+VectorXd HalfWidths(const MatrixXd& system, const std::vector<Eigen::Index>& columns, const VectorXd& seconds) {
   VectorXd widths = VectorXd::Zero(seconds.size());
-  const double freedom = double(system.units.rows()) - double(columns.size());
+  const double freedom = double(system.rows()) - double(columns.size());
   if (columns.empty() || freedom < 1) return widths;
-  const double variance = (system.units * seconds - system.ones).squaredNorm() / freedom;
-  const VectorXd lengths = ColumnLengths(system.units);
-  const MatrixXd scaled = (system.units * lengths.cwiseInverse().asDiagonal())(Eigen::all, columns);
+  const double variance = (system * seconds - Ones(system)).squaredNorm() / freedom;
+  const VectorXd lengths = ColumnLengths(system);
+  const MatrixXd scaled = (system * lengths.cwiseInverse().asDiagonal())(Eigen::all, columns);
   const MatrixXd covariance = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
   for (std::size_t i = 0; i < columns.size(); ++i) {
     widths[columns[i]] =
@@ -112,13 +109,13 @@ VectorXd HalfWidths(const System& system, const std::vector<Eigen::Index>& colum
   return widths;
 }
 
-std::vector<TermFit> MakeTerms(const StageModel& stage, const System& system, const VectorXd& seconds,
+std::vector<TermFit> MakeTerms(const StageModel& stage, const MatrixXd& system, const VectorXd& seconds,
                                const std::vector<Eigen::Index>& free) {
   const VectorXd widths = HalfWidths(system, free, seconds);
   // A constant held at 0 gets the upper bound of the fit with all columns.
   std::vector<Eigen::Index> all(stage.units.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = Eigen::Index(i);
-  const VectorXd unconstrained = SolveOn(system.units, system.ones, all);
+  const VectorXd unconstrained = SolveOn(system, Ones(system), all);
   const VectorXd all_widths = HalfWidths(system, all, unconstrained);
 
   std::vector<TermFit> terms;
@@ -162,7 +159,7 @@ Result<StageFit> FitStage(const StageModel& stage, std::span<const CostSample> s
   }
   std::vector<Eigen::Index> free;
   const VectorXd seconds = FitConstants(stage, used, free);
-  const System system = MakeSystem(stage, used);
+  const MatrixXd system = MakeSystem(stage, used);
   const std::vector<double> predicted = CrossPredict(stage, used);
   double missed = 0, measured = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -171,7 +168,7 @@ Result<StageFit> FitStage(const StageModel& stage, std::span<const CostSample> s
     measured += time;
   }
   return StageFit{.terms = MakeTerms(stage, system, seconds, free),
-                  .residual = std::sqrt((system.units * seconds - system.ones).squaredNorm() / double(used.size())),
+                  .residual = std::sqrt((system * seconds - Ones(system)).squaredNorm() / double(used.size())),
                   .prediction_error = missed / measured};
 }
 

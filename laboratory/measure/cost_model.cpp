@@ -24,11 +24,11 @@ WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, doubl
 const std::vector<StageModel>& CostModelOf(std::string_view renderer) {
   static const std::map<std::string_view, std::vector<StageModel>> models = {
       {"splat",
-       {{Stage::kTransform, "c_t, c_o", {kBox, kBrickTest, kOccupied, kSheetPixel}},
-        {Stage::kShade, "c_sh", {kBox, kDrawn}},
-        {Stage::kSplat, "c_sp", {kBox, kDrawn, kSheetPixel}},
-        {Stage::kComposite, "c_cp", {kBox, kDrawn, kSheetPixel}}}},
-      {"zbuffer", {{Stage::kZBuffer, "c_t, c_o, c_z", {kBox, kBrickTest, kDrawn, kPixel}}, {Stage::kShade, "c_sh", {kBox, kPixel}}}},
+       {{Stage::kTransform, {kBox, kBrickTest, kOccupied, kSheetPixel}},
+        {Stage::kShade, {kBox, kDrawn}},
+        {Stage::kSplat, {kBox, kDrawn, kSheetPixel}},
+        {Stage::kComposite, {kBox, kDrawn, kSheetPixel}}}},
+      {"zbuffer", {{Stage::kZBuffer, {kBox, kBrickTest, kDrawn, kPixel}}, {Stage::kShade, {kBox, kPixel}}}},
       {"", {}}};
   const auto found = models.find(renderer);
   return (found == models.end() ? models.find("") : found)->second;

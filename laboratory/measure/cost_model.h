@@ -44,7 +44,6 @@ WorkUnits CountWork(const Box& box, const Camera& camera, double occupied, doubl
 
 struct StageModel {
   Stage stage = Stage::kRender;
-  std::string_view symbol;      // the paper's symbol
   std::vector<WorkUnit> units;  // the units that its time is a sum of, each with a constant
 };
 

@@ -88,26 +88,11 @@ PictureCost MeasurePictureCost(const Volume& volume, const FrameSetup& setup, in
   CHECK_GE(repeats, 1);
   PictureMeter meter(volume);
   meter.KeepAnswers(setup);
-  std::vector<double> finish_seconds, receive_seconds;
-  PictureCost cost;
-  for (int i = 0; i < repeats; ++i) {
-    cost = meter.Measure(setup);
-    finish_seconds.push_back(cost.finish_seconds);
-    receive_seconds.push_back(cost.receive_seconds);
-  }
-  return {.finish_seconds = MedianOf(std::move(finish_seconds)).median,
-          .receive_seconds = MedianOf(std::move(receive_seconds)).median,
-          .bytes = cost.bytes};
-}
-
-FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats) {
-  FrameCosts costs;
-  costs.boxes.resize(plan.layout->partition.boxes().size());
-  const std::vector<Placement> placements = PlacementsOf(plan);
-  std::vector<BoxCost> measured = MeasureBoxCosts(volume, plan, repeats);
-  for (std::size_t i = 0; i < placements.size(); ++i) costs.boxes[placements[i].id] = std::move(measured[i]);
-  costs.picture = MeasurePictureCost(volume, plan.setup, repeats);
-  return costs;
+  std::vector<PictureCost> costs;
+  for (int i = 0; i < repeats; ++i) costs.push_back(meter.Measure(setup));
+  return {.finish_seconds = MedianOf(EachOf(costs, &PictureCost::finish_seconds)).median,
+          .receive_seconds = MedianOf(EachOf(costs, &PictureCost::receive_seconds)).median,
+          .bytes = costs.back().bytes};
 }
 
 CostSample SampleOf(const BoxCost& box, const Camera& camera) {
@@ -120,16 +105,6 @@ CostSample SampleOf(const BoxCost& box, const Camera& camera) {
     sample.stage_ns[stage] = std::int64_t(double(box.stage_ns[stage]) * share);
   }
   return sample;
-}
-
-FrameInput FrameCosts::Input(const FramePlan& plan) const {
-  FrameInput input{.plan = &plan,
-                   .boxes = {},
-                   .finish_seconds = picture.finish_seconds,
-                   .receive_seconds = picture.receive_seconds,
-                   .picture_bytes = picture.bytes};
-  for (const BoxCost& box : boxes) input.boxes.push_back({box.seconds, box.coverage.share.empty() ? nullptr : &box.coverage, 0});
-  return input;
 }
 
 }  // namespace slabstream

@@ -1,6 +1,5 @@
-// Frame costs: all inputs of a simulation of one frame, measured in this process, on one thread: the time and coverage of each box of its
-// plan (box_costs.h), and the time to make the picture from them and to decode it. Pictures are made as for a PNG of 8 bits
-// (FrameRequest::straight8), which experiments ask services for, too.
+// Frame costs: what a frame costs beside the rendering of its boxes (box_costs.h), measured in this process: the time to make the picture,
+// and to decode it. Pictures are made as for a PNG of 8 bits (FrameRequest::straight8), which experiments ask services for, too.
 #pragma once
 
 #include <deque>
@@ -11,7 +10,6 @@
 #include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/cost_fit.h"
 #include "laboratory/measure/lab_worker.h"
-#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 
@@ -50,17 +48,6 @@ class PictureMeter {
   std::deque<Answer> kept_;
   std::size_t kept_bytes_ = 0;
 };
-
-struct FrameCosts {
-  std::vector<BoxCost> boxes;  // by BoxId of the plan; boxes without a placement cost nothing
-  PictureCost picture;
-
-  // Valid as long as this and `plan`, for which it was measured, live. Assumes that voxels are cached.
-  FrameInput Input(const FramePlan& plan) const;
-};
-
-// `repeats` >= 1: medians. `plan` is of this volume.
-FrameCosts MeasureFrameCosts(const Volume& volume, const FramePlan& plan, int repeats);
 
 // A sample for the fit of the cost model: processor time of each stage.
 CostSample SampleOf(const BoxCost& box, const Camera& camera);

@@ -7,7 +7,6 @@
 #include "common/base/time.h"
 #include "common/threads/task_thread.h"
 #include "laboratory/measure/lab_worker.h"
-#include "laboratory/measure/neighbours.h"
 
 namespace slabstream {
 namespace {
@@ -18,6 +17,10 @@ struct Rendered {
 };
 
 }  // namespace
+
+// While both run, each does 1 / (1 + s) of its work per second: the shorter one is done after shorter (1 + s), and the rest of the longer
+// one takes longer - shorter.
+double SlowdownOf(double first, double second, double both) { return (both - std::max(first, second)) / std::min(first, second); }
 
 class PlanRenderings::Worker {
  public:

@@ -12,9 +12,13 @@
 
 namespace slabstream {
 
+// Two renderings take `first` and `second` seconds alone; started together, both are done after `both` seconds. Returns the factor by which
+// each was slower while both ran, less one (MachineModel::memory_slowdown). All > 0. Below 0 only by noise.
+double SlowdownOf(double first, double second, double both);
+
 struct PlanSeconds {
   std::vector<double> boxes;  // by BoxId; alone
-  double slowdown = 0;        // how much two workers that render together slow each other down (neighbours.h); 0 with one
+  double slowdown = 0;        // how much two workers that render together slow each other down (SlowdownOf); 0 with one
 };
 
 class PlanRenderings {

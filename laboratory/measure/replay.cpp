@@ -217,9 +217,8 @@ Result<ReplayReport> Replay(std::span<const RecordedFrame> frames, const ReplayC
   report.in_flight = InFlight(frames);
   report.measured = Measured(frames);
   const auto for_recorded_times = [](MachineModel model) {
-    model.workers_a_host = 0;   // the recorded times include the slowdown by neighbours
-    model.picture_threads = 0;  // and the effect of threads on making a picture
-    model.client_seconds = 0;   // each frame has its own time at the client
+    model.workers_a_host = 0;  // the recorded times include the slowdown by neighbours
+    model.client_seconds = 0;  // each frame has its own time at the client
     return model;
   };
   const Result<ReplayedRun> same = Simulated(frames, {}, for_recorded_times(machine), report.in_flight);
@@ -240,10 +239,9 @@ Status RunReplay(const ReplayOptions& options, std::ostream& out) {
   text << file.rdbuf();
   const Result<std::vector<RecordedFrame>> frames = ParseRecording(text.str());
   if (!frames.ok()) return Status(frames.status().code(), fmt::format("{}: {}", options.trace_path, frames.status().message()));
-  const Result<Calibration> calibration = CalibrateThisHost(int(frames->front().workers));
-  if (!calibration.ok()) return calibration.status();
-  const MachineModel& machine = calibration->machine;
-  const Result<ReplayReport> report = Replay(*frames, *change, machine, ChangedMachine(machine, *change));
+  const Result<MachineModel> machine = CalibrateThisHost(int(frames->front().workers));
+  if (!machine.ok()) return machine.status();
+  const Result<ReplayReport> report = Replay(*frames, *change, *machine, ChangedMachine(*machine, *change));
   if (!report.ok()) return report.status();
 
   out << fmt::format("{} frames of {} workers, {} in flight, {}; means of frames that fetched no voxels\n", frames->size(),

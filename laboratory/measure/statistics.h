@@ -1,6 +1,7 @@
 // Statistics of repeated measurements: median, confidence interval and quantiles. Pure.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 namespace slabstream {
@@ -19,6 +20,14 @@ struct Estimate {
   bool two_modes = false;
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
+
+// A number of each: `of` is a member of the elements, or a function of one.
+template <class Elements, class Of>
+std::vector<double> EachOf(const Elements& elements, Of&& of) {
+  std::vector<double> numbers;
+  for (const auto& element : elements) numbers.push_back(double(std::invoke(of, element)));
+  return numbers;
+}
 
 // The q-quantile by nearest rank: the least value that at least a share q of the values do not exceed. At least one value, q in [0, 1].
 double Quantile(std::vector<double> values, double q);

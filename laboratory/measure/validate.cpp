@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/frame_costs.h"
@@ -15,7 +15,6 @@
 namespace slabstream {
 namespace {
 
-constexpr char kDataset[] = "volume";
 constexpr int kWakeUpSamples = 4;  // a turn
 
 FrameParts PartsOf(const TimedPicture& timed) {
@@ -40,15 +39,8 @@ FrameParts PartsOf(const Timeline& timeline) {
   return parts;
 }
 
-std::vector<double> PartOf(const std::vector<FrameParts>& frames, double FrameParts::*part) {
-  std::vector<double> values;
-  values.reserve(frames.size());
-  for (const FrameParts& frame : frames) values.push_back(frame.*part);
-  return values;
-}
-
 FrameParts MedianParts(const std::vector<FrameParts>& frames) {
-  const auto median = [&](double FrameParts::*part) { return MedianOf(PartOf(frames, part)).median; };
+  const auto median = [&](double FrameParts::*part) { return MedianOf(EachOf(frames, part)).median; };
   return {median(&FrameParts::render), median(&FrameParts::picture), median(&FrameParts::latency)};
 }
 
@@ -56,7 +48,7 @@ FrameParts MedianParts(const std::vector<FrameParts>& frames) {
 struct View {
   FrameRequest request;
   FramePlan plan;
-  FrameCosts costs;  // coverage of the boxes; their seconds are measured anew in each turn
+  std::vector<CoverageMap> coverage;  // by BoxId
   std::vector<FrameParts> measured, simulated;
 };
 
@@ -66,13 +58,16 @@ Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
   std::vector<View> views;
   for (int i = 0; i < count; ++i) {
     View& view = views.emplace_back(View{.request = what.request});
-    view.request.dataset = kDataset;
+    view.request.dataset = what.name;
     view.request.straight8 = true;
     *view.request.view.azimuth_degrees += 360.0 * i / count;
     Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster);
     if (!plan.ok()) return plan.status();
     view.plan = *std::move(plan);
-    view.costs = MeasureFrameCosts(*what.volume, view.plan, 1);
+    const std::vector<Placement> placements = PlacementsOf(view.plan);
+    std::vector<BoxCost> boxes = MeasureBoxCosts(*what.volume, view.plan, 1);
+    view.coverage.resize(view.plan.layout->partition.boxes().size());
+    for (std::size_t box = 0; box < boxes.size(); ++box) view.coverage[placements[box].id] = std::move(boxes[box].coverage);
   }
   return views;
 }
@@ -105,19 +100,19 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   Result<std::vector<View>> views = MakeViews(what, options.views);
   if (!views.ok()) return views.status();
   WakeUpProbe probe;
-  Result<std::unique_ptr<LabService>> service = LabService::Start(what.workers, {{kDataset, what.volume}});
+  Result<ServiceConnection> service = OpenLabService(what.workers, {what.volume});
   if (!service.ok()) return service.status();
+  for (View& view : *views) view.request.dataset = service->dataset();
   PlanRenderings renderings(*what.volume, what.workers);
   PictureMeter pictures(*what.volume, what.workers);
   MachineModel machine = ThisHost(what.workers);
-  machine.picture_threads = 0;  // pictures are measured with all the threads that make them
   std::vector<double> slowdowns;
 
   for (int turn = -1; turn < options.turns; ++turn) {  // the first turn fetches voxels and makes normals
     if (Status status = probe.Sample(kWakeUpSamples); !status.ok()) return status;
     for (View& view : *views) {
-      if (const Result<TimedPicture> first = (*service)->Render(view.request); !first.ok()) return first.status();
-      const Result<TimedPicture> timed = (*service)->Render(view.request);
+      if (const Result<Picture> first = service->client().Render(view.request); !first.ok()) return first.status();
+      const Result<TimedPicture> timed = RenderTimed(service->client(), view.request);
       if (!timed.ok()) return timed.status();
       renderings.Measure(view.plan);
       const PlanSeconds seconds = renderings.Measure(view.plan);
@@ -125,12 +120,15 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
       const PictureCost picture = pictures.Measure(view.plan.setup);
       if (turn < 0) continue;
 
-      for (const Placement& placement : PlacementsOf(view.plan)) view.costs.boxes[placement.id].seconds = seconds.boxes[placement.id];
-      view.costs.picture = {.finish_seconds = picture.finish_elapsed, .receive_seconds = picture.receive_seconds};
+      // A picture is measured with all the threads that make it.
+      FrameInput input{&view.plan, {}, picture.finish_elapsed, picture.receive_seconds};
+      for (std::size_t box = 0; box < view.coverage.size(); ++box) {
+        const CoverageMap& coverage = view.coverage[box];
+        input.boxes.push_back({seconds.boxes[box], coverage.share.empty() ? nullptr : &coverage, 0});
+      }
       slowdowns.push_back(seconds.slowdown);
       machine.wake_ups = probe.Estimates().Costs();
-      machine.memory_slowdown = ModelSlowdown(seconds.slowdown);
-      const FrameInput input = view.costs.Input(view.plan);
+      machine.memory_slowdown = std::clamp(seconds.slowdown, 0.0, 0.99);
       const Result<Timeline> timeline = SimulateFrames(std::span(&input, 1), machine);
       if (!timeline.ok()) return timeline.status();
       view.measured.push_back(PartsOf(*timed));
@@ -142,7 +140,7 @@ Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const Valid
   if (what.workers == 2) row.slowdown = MedianOf(std::move(slowdowns));
   for (const View& view : *views) {
     const auto quartile = [&](const std::vector<FrameParts>& frames, double share) {
-      return Quantile(PartOf(frames, &FrameParts::latency), share);
+      return Quantile(EachOf(frames, &FrameParts::latency), share);
     };
     row.views.push_back({view.request.view, MedianParts(view.measured), MedianParts(view.simulated), quartile(view.measured, 0.25),
                          quartile(view.measured, 0.75), quartile(view.simulated, 0.25), quartile(view.simulated, 0.75)});

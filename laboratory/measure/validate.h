@@ -3,7 +3,7 @@
 // Turn after turn and view after view, in sequence:
 //   - the service renders the view with one or two workers of one thread each, one frame in flight;
 //   - in this process, the boxes of its plan are rendered alone, on one thread; with two workers also both at once, which shows how much
-//     they slow each other down (neighbours.h); the picture is made and decoded.
+//     they slow each other down (plan_renderings.h); the picture is made and decoded.
 // Each of these is done twice in a row, and the second time counts: its threads have not slept for long, and its data is in the caches if
 // it fits. Before each turn, frames of another volume and service measure wake-ups. The measurements of a view in a turn are simulated on
 // a model of this machine (calibrate.h). So both sides meet the same state of the machine, and both are medians over turns. No time

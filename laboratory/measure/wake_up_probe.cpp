@@ -1,6 +1,5 @@
 #include "laboratory/measure/wake_up_probe.h"
 
-#include <map>
 #include <memory>
 #include <string>
 
@@ -10,15 +9,13 @@
 namespace slabstream {
 namespace {
 
-constexpr char kQuick[] = "quick", kSlow[] = "slow";
 constexpr int kQuickVolume = 16, kSlowVolume = 160;
 constexpr int kQuickPicture = 32, kSlowPicture = 512;
 constexpr int kQuickFrames = 4;  // a sample; the first one wakes all threads
 
-FrameRequest Request(const std::string& dataset) {
+FrameRequest Request(const std::string& dataset, int side) {
   FrameRequest request;
   request.dataset = dataset;
-  const int side = dataset == kQuick ? kQuickPicture : kSlowPicture;
   request.size = {side, side};
   request.policy.groups = 1;
   return request;
@@ -51,17 +48,17 @@ std::shared_ptr<const Volume> Sphere(int size) {
 }  // namespace
 
 Status WakeUpProbe::Sample(int count) {
-  static const std::map<std::string, std::shared_ptr<const Volume>> volumes = {{kQuick, Sphere(kQuickVolume)},
-                                                                               {kSlow, Sphere(kSlowVolume)}};
-  const Result<std::unique_ptr<LabService>> service = LabService::Start(1, volumes);
+  static const std::vector<std::shared_ptr<const Volume>> volumes = {Sphere(kQuickVolume), Sphere(kSlowVolume)};
+  Result<ServiceConnection> service = OpenLabService(1, volumes);
   if (!service.ok()) return service.status();
+  const FrameRequest quick = Request(service->dataset(0), kQuickPicture), slow = Request(service->dataset(1), kSlowPicture);
   for (int sample = -1; sample < count; ++sample) {  // the first one fetches voxels and makes the data that workers keep
     for (int i = 0; i < kQuickFrames; ++i) {
-      const Result<TimedPicture> timed = (*service)->Render(Request(kQuick));
+      const Result<TimedPicture> timed = RenderTimed(service->client(), quick);
       if (!timed.ok()) return timed.status();
       if (sample >= 0 && i > 0) quick_.push_back(InstantsOf(*timed));
     }
-    const Result<TimedPicture> timed = (*service)->Render(Request(kSlow));
+    const Result<TimedPicture> timed = RenderTimed(service->client(), slow);
     if (!timed.ok()) return timed.status();
     if (sample >= 0) slow_.push_back(InstantsOf(*timed));
   }

@@ -4,6 +4,7 @@
 // One thread at a time.
 #pragma once
 
+#include <cstdint>
 #include <set>
 #include <string>
 #include <string_view>
@@ -13,9 +14,18 @@
 #include "common/base/status.h"
 #include "common/json/json.h"
 #include "laboratory/measure/statistics.h"
-#include "laboratory/results/origin.h"
 
 namespace slabstream {
+
+// The source of a number.
+enum class Origin : std::uint8_t {
+  kMeasured = 0,   // on this machine, by running it
+  kSimulated = 1,  // in virtual time, from costs measured on this machine
+  kPaper = 2,      // printed by Yagel and Machiraju
+};
+
+// "measured", "simulated", "paper".
+std::string_view ToString(Origin origin);
 
 // Who found the values of a run.
 struct FoundBy {

@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import fnmatch
 import json
-import subprocess
 from typing import Any, Sequence
 
 import numpy
 
-from .errors import InvalidArgument, NotFound, Unavailable
-from .options import in_keywords
-from .programs import find_program
+from .errors import NotFound, Unavailable
+from .programs import find_program, run_program
 from .runs import Floats
 
 
@@ -87,11 +85,7 @@ def _run(rgba: Floats, format: Any, panes: Sequence[Any], purpose: str, **more: 
                        "$SLABSTREAM_PROGRAMS") from None
     pixels = numpy.ascontiguousarray(rgba, numpy.float32)
     given = json.dumps({name: value for name, value in order.items() if value is not None})
-    done = subprocess.run([program, "annotate"], input=given.encode() + b"\n" + pixels.tobytes(), capture_output=True)
-    if done.returncode != 0:
-        sentence = done.stderr.decode(errors="replace").strip().removeprefix("slabstream annotate: ")
-        raise (InvalidArgument if done.returncode == 2 else Unavailable)(in_keywords(sentence) or "slabstream annotate failed")
-    return done.stdout
+    return run_program(program, "annotate", given=given.encode() + b"\n" + pixels.tobytes())
 
 
 def draw(rgba: Floats, format: Any, panes: Sequence[Any]) -> Floats:

@@ -233,7 +233,7 @@ class Connection:
         answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
         requests = self._loop.requests
         nonce = next(requests.numbers)
-        self._loop.call(lambda: requests.ask(nonce, kind, message, answer))
+        self._loop.call(lambda: requests.ask(nonce, kind, message, answer, time.monotonic()))
         try:
             return answer.result(timeout)
         except concurrent.futures.TimeoutError:

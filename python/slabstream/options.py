@@ -23,19 +23,19 @@ class Option:
     text_name: str          # as on the command line, without dashes
     group: str
     help: str
-    type: str | None        # None: a flag
-    path: str               # of the field in a FrameRequest, "view.zoom", or of a parameter, "parameters.kernel"; empty: it is no field
-    default: str | None
-    choices: tuple[str, ...]
     least: float
     most: float
     above: bool             # values must exceed `least`
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
-    same_picture: bool      # it never changes the finished picture
-    negatable: bool         # a flag that may be on by itself: False turns it off
-    renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
     windows: dict[str, tuple[float, float]]  # of the option window: width and level by name
+    type: str | None = None         # None: a flag
+    path: str = ""                  # of the field in a FrameRequest, "view.zoom", or of a parameter, "parameters.kernel"; empty: it is no field
+    default: str | None = None
+    choices: tuple[str, ...] = ()
+    same_picture: bool = False      # it never changes the finished picture
+    negatable: bool = False         # a flag that may be on by itself: False turns it off
+    renderers: tuple[dict[str, Any], ...] = ()  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
 
 
 def _keyword(name: str) -> str:
@@ -43,25 +43,14 @@ def _keyword(name: str) -> str:
 
 
 def _option(entry: dict[str, Any]) -> Option:
-    return Option(
-        name=_keyword(entry["name"]),
-        text_name=entry["name"],
-        group=entry["group"],
-        help=entry["help"],
-        type=entry.get("type"),
-        path=entry.get("path", ""),
-        default=entry.get("default"),
-        choices=tuple(entry.get("choices", ())),
-        least=entry.get("above", entry.get("min", -math.inf)),
-        most=entry.get("max", math.inf),
-        above="above" in entry,
-        excludes=tuple(map(_keyword, entry.get("excludes", ()))),
-        needs=tuple(map(_keyword, entry.get("needs", ()))),
-        same_picture=entry.get("same_picture", False),
-        negatable=entry.get("negatable", False),
-        renderers=tuple(entry.get("renderers", ())),
-        windows={window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
-    )
+    given: dict[str, Any] = {
+        "name": _keyword(entry["name"]), "text_name": entry["name"], "least": entry.get("above", entry.get("min", -math.inf)),
+        "most": entry.get("max", math.inf), "above": "above" in entry,
+        "windows": {window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
+        **{others: tuple(map(_keyword, entry.get(others, ()))) for others in ("excludes", "needs")},
+    }
+    as_they_are = [field.name for field in dataclasses.fields(Option) if field.name in entry and field.name not in given]
+    return Option(**given, **{name: tuple(entry[name]) if isinstance(entry[name], list) else entry[name] for name in as_they_are})
 
 
 def _load() -> dict[str, dict[str, Option]]:

@@ -9,7 +9,8 @@ import subprocess
 import time
 from typing import Any, Sequence
 
-from .errors import NotFound
+from .errors import InvalidArgument, NotFound, Unavailable
+from .options import in_keywords
 
 class Kept:
     """A program that ends with this process, however it ends: a shell starts it, and ends it when nobody holds the other end of its pipe."""
@@ -72,3 +73,12 @@ def find_program() -> str:
         raise NotFound("there is no program slabstream to start a service with: put it on the path, name its folder in $SLABSTREAM_PROGRAMS, "
                        "or connect() to a service that runs")
     return found
+
+
+def run_program(program: str, command: str, *arguments: str, given: bytes = b"") -> bytes:
+    """What a command of `slabstream` prints, which reads `given`. InvalidArgument, Unavailable: it failed, and says why."""
+    done = subprocess.run([program, command, *arguments], input=given, capture_output=True)
+    if done.returncode != 0:
+        lines = done.stderr.decode(errors="replace").strip().splitlines() or [f"slabstream {command} failed"]
+        raise (InvalidArgument if done.returncode == 2 else Unavailable)(in_keywords(lines[-1].removeprefix(f"slabstream {command}: ")))
+    return done.stdout

@@ -52,6 +52,7 @@ class _Question:
     answer: concurrent.futures.Future[Any]          # the reply's message
     credited: Callable[[int], None] | None = None   # of a volume that is sent: told how many bytes may be sent in all
     epoch: int | None = None                        # of the coordinator that takes the volume, once a pong has told it
+    pinged: bool = True                             # fails if the service does not answer pings; False: a ping of its own
 
 
 class Requests:
@@ -86,16 +87,17 @@ class Requests:
             self._open[request].cancelled = True
             self._send_message(cancel_frame=schema.CancelFrame(request=request))
 
-    def ask(self, nonce: int, kind: str, message: Any, answer: concurrent.futures.Future[Any], now: float = 0,
+    def ask(self, nonce: int, kind: str, message: Any, answer: concurrent.futures.Future[Any], now: float,
             credited: Callable[[int], None] | None = None) -> None:
-        """Sends a question or an order. The answer is the reply's message. `credited`, `now`: of an AddVolume, whose bytes follow."""
+        """Sends a question or an order. The answer is the reply's message. `credited`: of an AddVolume, whose bytes follow."""
         message.nonce = nonce
         if self._gone:
             answer.set_exception(Unavailable(self._gone))
             return
-        if credited is not None:
+        pinged = kind != "client_ping"
+        if pinged:
             self._begin_pings(now)
-        self._questions[nonce] = _Question(answer, credited)
+        self._questions[nonce] = _Question(answer, credited, pinged=pinged)
         self._send_message(**{kind: message})
 
     def forget(self, nonce: int) -> None:
@@ -167,7 +169,7 @@ class Requests:
             self._gone = why
         for request in list(self._open):
             self._end(request, Unavailable(why))
-        self._fail_questions(why, lambda question: for_good or question.credited is not None)
+        self._fail_questions(why, lambda question: for_good or question.pinged)
         self._pinged.clear()
         self._unanswered_since = None
 
@@ -176,8 +178,8 @@ class Requests:
             self._questions.pop(nonce).answer.set_exception(Unavailable(why))
 
     def _pings(self) -> bool:
-        """Whether anything is open that takes long."""
-        return bool(self._open) or any(question.credited is not None for question in self._questions.values())
+        """Whether anybody waits."""
+        return bool(self._open) or any(question.pinged for question in self._questions.values())
 
     def _begin_pings(self, now: float) -> None:
         if not self._pings():

@@ -5,28 +5,18 @@ import dataclasses
 import json
 import os
 import pathlib
-import subprocess
 import tempfile
 from typing import Any
 
 import numpy
 import numpy.typing
 
-from .errors import InvalidArgument, Unavailable
+from .errors import InvalidArgument
 from .loading import path_text
-from .programs import find_program
+from .programs import find_program, run_program
 from .volumes import Vector
 
 Array = numpy.typing.NDArray[Any]
-
-
-def _run(command: str, *arguments: str) -> str:
-    done = subprocess.run([find_program(), command, *arguments], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
-        lines = done.stderr.strip().splitlines() or [f"slabstream {command} failed"]
-        sentence = lines[-1].removeprefix(f"slabstream {command}: ")
-        raise (InvalidArgument if done.returncode == 2 else Unavailable)(sentence)
-    return done.stdout
 
 
 def _zyx(values: list[Any]) -> tuple[Any, Any, Any]:
@@ -82,7 +72,7 @@ class Source:
 
     def __init__(self, path: str | os.PathLike[str]):
         self.path = path_text(path, "source")
-        about = json.loads(_run("info", self.path, "--json"))
+        about = json.loads(run_program(find_program(), "info", self.path, "--json"))
         # A file of one level says of itself what others say of each.
         described = about.get("levels", [about])
         dtype = numpy.dtype(about["file_type"])
@@ -105,7 +95,7 @@ class Source:
         text = ",".join(":".join("" if end is None else str(int(end)) for end in ends) for ends in reversed(bounds))
         with tempfile.TemporaryDirectory(prefix="slabstream-") as folder:
             file = pathlib.Path(folder) / "box.npy"
-            _run("convert", self.path, str(file), "--level", str(int(level)), "--box", text)
+            run_program(find_program(), "convert", self.path, str(file), "--level", str(int(level)), "--box", text)
             values: Array = numpy.load(file)
             return values
 

@@ -57,7 +57,6 @@ class Section:
     method: str
     answer: str = ""  # from the tables below it, by a rule that states both outcomes
     blocks: list[Union[Table, Figure, Photo]] = dataclasses.field(default_factory=list)
-    remark: str = ""  # written by hand: why it may be so, and on which run that was seen
 
     @property
     def anchor(self) -> str:

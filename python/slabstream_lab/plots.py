@@ -21,6 +21,11 @@ COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 MARKERS = "osD^v<>pP*"
 LINES = {"measured": "-", "simulated": "--", "paper": ":"}
 
+# What `lines` says of both axes together.
+FROM_ZERO = {"from_zero": True, "marks": True}
+LOG_X_FROM_ZERO = {"log_x": True, "from_zero": True, "marks": True}
+LOG_LOG = {"log_x": True, "log_y": True, "marks": True}
+
 Series = Mapping[str, Iterable[tuple[float, Value]]]
 
 

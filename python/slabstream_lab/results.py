@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import json
 import pathlib
-from typing import Any
+from typing import Any, Callable
 
 import pandas
 
@@ -43,6 +43,10 @@ class Run:
                 rows = rows[rows[name] == wanted]
         return rows
 
+    def narrowed(self, **columns: Any) -> "Run":
+        """Of the rows with these values alone."""
+        return Run(self.select(**columns), self.info, self.folder)
+
     def find(self, metric: str, **columns: Any) -> Value | None:
         """The only value of a case, or None if there is none. ResultsError if there are several."""
         rows = self.select(metric=metric, **columns)
@@ -81,6 +85,11 @@ def value_of(row: pandas.Series) -> Value:
     noise = row["noise"] if isinstance(row["noise"], str) else ""
     each = tuple(row["each"]) if isinstance(row["each"], list) else ()
     return Value(row["value"], row["low"], row["high"], int(row["repeats"]), row["unit"], row["origin"], noise, each)
+
+
+def values_by(rows: pandas.DataFrame, name: Callable[[pandas.Series], Any]) -> dict[Any, Value]:
+    """The values of rows, each by its name."""
+    return {name(row): value_of(row) for _, row in rows.iterrows()}
 
 
 def read(folder: str | pathlib.Path) -> Run:

@@ -1,64 +1,48 @@
 #include "simulator/model/machine_model.h"
 
-#include <fmt/format.h>
-
 #include <limits>
 
 #include "common/base/range_status.h"
 
 namespace slabstream {
-namespace {
-
-constexpr double kMaxSeconds = 3600;
-
-Status Validate(const LinkModel& link) {
-  if (Status s = InRange("link.latency_seconds", link.latency_seconds, 0, kMaxSeconds); !s.ok()) return s;
-  if (Status s = InRange("link.bytes_per_second", link.bytes_per_second, 1, 1e15); !s.ok()) return s;
-  if (Status s = InRange("link.ports", link.ports, 1, 1 << 20); !s.ok()) return s;
-  return InRange("link.oversubscription", link.oversubscription, 1e-3, 1e6);
-}
-
-Status Validate(const CombiningCosts& costs) {
-  const std::pair<const char*, double> seconds[] = {
-      {"combining.scan_pixel", costs.scan_pixel},       {"combining.encode_pixel", costs.encode_pixel},
-      {"combining.combine_pixel", costs.combine_pixel}, {"combining.local_pixel", costs.local_pixel},
-      {"combining.hidden_pixel", costs.hidden_pixel},   {"combining.cipher_byte", costs.cipher_byte}};
-  for (const auto& [field, value] : seconds) {
-    if (Status s = InRange(field, value, 0, kMaxSeconds); !s.ok()) return s;
-  }
-  if (Status s = InRange("combining.run_bytes", costs.run_bytes, 0, 1024); !s.ok()) return s;
-  if (Status s = InRange("combining.rgba_bytes", costs.rgba_bytes, 0, 1024); !s.ok()) return s;
-  return InRange("combining.depth_bytes", costs.depth_bytes, 0, 1024);
-}
-
-Status Validate(const WakeUps& costs) {
-  if (Status s = InRange("wake_ups.awake", costs.awake, 0, kMaxSeconds); !s.ok()) return s;
-  if (Status s = InRange("wake_ups.asleep", costs.asleep, 0, kMaxSeconds); !s.ok()) return s;
-  return InRange("wake_ups.doze", costs.doze, 0, std::numeric_limits<double>::max());
-}
-
-}  // namespace
 
 Status Validate(const MachineModel& machine) {
-  if (Status s = Validate(machine.link); !s.ok()) return s;
-  if (Status s = Validate(machine.combining); !s.ok()) return s;
-  if (Status s = Validate(machine.wake_ups); !s.ok()) return s;
-  if (Status s = InRange("picture.link_byte", machine.picture.link_byte, 0, kMaxSeconds); !s.ok()) return s;
-  if (Status s = InRange("picture.cipher_byte", machine.picture.cipher_byte, 0, kMaxSeconds); !s.ok()) return s;
-  for (const double speed : machine.speeds) {
-    if (Status s = InRange("speeds", speed, 1e-6, 1e6); !s.ok()) return s;
+  constexpr double kMaxSeconds = 3600;
+  const auto& [link, combining, picture, wake_ups, workers_a_host, cores_a_host, memory_slowdown, plan_seconds, message_seconds,
+               client_seconds] = machine;
+  const struct {
+    const char* field;
+    double value, least, most;
+  } limits[] = {
+      {"link.latency_seconds", link.latency_seconds, 0, kMaxSeconds},
+      {"link.bytes_per_second", link.bytes_per_second, 1, 1e15},
+      {"link.ports", double(link.ports), 1, 1 << 20},
+      {"link.oversubscription", link.oversubscription, 1e-3, 1e6},
+      {"combining.scan_pixel", combining.scan_pixel, 0, kMaxSeconds},
+      {"combining.encode_pixel", combining.encode_pixel, 0, kMaxSeconds},
+      {"combining.combine_pixel", combining.combine_pixel, 0, kMaxSeconds},
+      {"combining.local_pixel", combining.local_pixel, 0, kMaxSeconds},
+      {"combining.hidden_pixel", combining.hidden_pixel, 0, kMaxSeconds},
+      {"combining.cipher_byte", combining.cipher_byte, 0, kMaxSeconds},
+      {"combining.run_bytes", double(combining.run_bytes), 0, 1024},
+      {"combining.rgba_bytes", double(combining.rgba_bytes), 0, 1024},
+      {"combining.depth_bytes", double(combining.depth_bytes), 0, 1024},
+      {"wake_ups.awake", wake_ups.awake, 0, kMaxSeconds},
+      {"wake_ups.asleep", wake_ups.asleep, 0, kMaxSeconds},
+      {"wake_ups.doze", wake_ups.doze, 0, std::numeric_limits<double>::max()},
+      {"picture.link_byte", picture.link_byte, 0, kMaxSeconds},
+      {"picture.cipher_byte", picture.cipher_byte, 0, kMaxSeconds},
+      {"workers_a_host", double(workers_a_host), 0, 1 << 20},
+      {"cores_a_host", double(cores_a_host), 1, 1 << 20},
+      {"memory_slowdown", memory_slowdown, 0, 1},
+      {"plan_seconds", plan_seconds, 0, kMaxSeconds},
+      {"message_seconds", message_seconds, 0, kMaxSeconds},
+      {"client_seconds", client_seconds, 0, kMaxSeconds},
+  };
+  for (const auto& [field, value, least, most] : limits) {
+    if (Status status = InRange(field, value, least, most); !status.ok()) return status;
   }
-  if (Status s = InRange("stragglers.probability", machine.stragglers.probability, 0, 1); !s.ok()) return s;
-  if (Status s = InRange("stragglers.factor", machine.stragglers.factor, 1, 1e6); !s.ok()) return s;
-  if (Status s = InRange("threads", machine.threads, 1, 4096); !s.ok()) return s;
-  if (Status s = InRange("picture_threads", machine.picture_threads, 0, 4096); !s.ok()) return s;
-  if (Status s = InRange("serial_share", machine.serial_share, 0, 1); !s.ok()) return s;
-  if (Status s = InRange("workers_a_host", machine.workers_a_host, 0, 1 << 20); !s.ok()) return s;
-  if (Status s = InRange("cores_a_host", machine.cores_a_host, 1, 1 << 20); !s.ok()) return s;
-  if (Status s = InRange("memory_slowdown", machine.memory_slowdown, 0, 1); !s.ok()) return s;
-  if (Status s = InRange("plan_seconds", machine.plan_seconds, 0, kMaxSeconds); !s.ok()) return s;
-  if (Status s = InRange("message_seconds", machine.message_seconds, 0, kMaxSeconds); !s.ok()) return s;
-  return InRange("client_seconds", machine.client_seconds, 0, kMaxSeconds);
+  return Status::Ok();
 }
 
 }  // namespace slabstream

@@ -1,9 +1,8 @@
 // MachineModel: the machine that frames are simulated on. It has no render times: the cost of a box is measured (laboratory/measure) and
-// comes with the frame. All times are seconds of one thread of a worker of speed 1.
+// comes with the frame. All times are seconds of one thread of a worker.
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "common/base/status.h"
 #include "common/calibration/calibration.h"
@@ -25,7 +24,6 @@ struct CombiningCosts {
   // Images are lent: their pixels stay where they are. The thread that owns the sockets announces them itself if the combining thread is
   // idle.
   bool lent = false;
-  friend bool operator==(const CombiningCosts&, const CombiningCosts&) = default;
 };
 
 // Seconds from one thread's handing something over (a message, a task, a result) until another one has begun with it: to encode and decode
@@ -34,7 +32,6 @@ struct WakeUps {
   double awake = calibration::service::kAwake;    // to a thread that was at work a moment ago
   double asleep = calibration::service::kAsleep;  // to one that has waited `doze` seconds or longer: its core slept or did other work
   double doze = calibration::service::kDoze;
-  friend bool operator==(const WakeUps&, const WakeUps&) = default;
 };
 
 // A picture's way: the display worker encrypts it after making it; the coordinator decrypts and encrypts it, and the client decrypts it,
@@ -44,15 +41,6 @@ struct PictureWay {
   double link_byte = 0;    // to travel over a connection
   double cipher_byte = 0;  // to encrypt or decrypt it
   bool direct = false;
-  friend bool operator==(const PictureWay&, const PictureWay&) = default;
-};
-
-// Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
-struct Stragglers {
-  double probability = 0;  // how likely a worker is slow in a frame; [0, 1]
-  double factor = 1;       // then its rendering takes this many times as long; >= 1
-  std::uint64_t seed = 1;
-  friend bool operator==(const Stragglers&, const Stragglers&) = default;
 };
 
 struct MachineModel {
@@ -61,12 +49,6 @@ struct MachineModel {
   CombiningCosts combining;
   PictureWay picture;
   WakeUps wake_ups;
-  std::vector<double> speeds;  // the workers' relative speeds, > 0; worker i has speeds[i % size()]. Empty: all 1
-  Stragglers stragglers;
-  std::int32_t threads = 1;          // render threads of each worker
-  std::int32_t picture_threads = 0;  // threads that make a picture (`threads` if that is more): workers of one process share theirs
-  // Speed-up of making the picture (resampling, encoding) and of rendering by n threads: n / (1 + (n - 1) * serial_share).
-  double serial_share = calibration::service::kSerialShare;
 
   // Workers [i * workers_a_host, ...) share a host. If more threads are busy than it has cores, they share the cores equally; each busy
   // thread besides the first slows the others down by `memory_slowdown`, since they share caches and memory. 0: a host for each worker.
@@ -77,7 +59,6 @@ struct MachineModel {
   double plan_seconds = calibration::service::kPlan;        // the coordinator plans a frame
   double message_seconds = calibration::service::kMessage;  // the coordinator sends or takes a message, one after the other
   double client_seconds = calibration::service::kClient;    // the picture's way from coordinator to client, without wake-up and decoding
-  friend bool operator==(const MachineModel&, const MachineModel&) = default;
 };
 
 // InvalidArgument naming field, value and limit.

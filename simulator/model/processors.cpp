@@ -16,20 +16,16 @@ void Processors::Predict(std::uint32_t number) {
   Host& host = hosts_[number];
   ++host.generation;
   if (host.tasks.empty()) return;
-  double threads = 0, least = std::numeric_limits<double>::infinity();
-  for (const Task& task : host.tasks) {
-    threads += task.threads;
-    least = std::min(least, task.left);
-  }
+  const double threads = double(host.tasks.size()), least = std::ranges::min(host.tasks, {}, &Task::left).left;
   const double busy = std::min(threads, cores_);
   host.speed = busy / threads / (1 + memory_slowdown_ * std::max(busy - 1, 0.0));
   forecasts_.push({host.since + std::max(least, 0.0) / host.speed, number, host.generation});
 }
 
-void Processors::Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now) {
+void Processors::Start(std::uint32_t host, std::uint64_t task, double seconds, double now) {
   if (hosts_.size() <= host) hosts_.resize(host + 1);
   AdvanceTo(hosts_[host], now);
-  hosts_[host].tasks.push_back({task, seconds, threads});
+  hosts_[host].tasks.push_back({task, seconds});
   Predict(host);
 }
 

@@ -1,4 +1,4 @@
-// Processors: tasks that run on the cores of hosts, in virtual time. If the tasks of a host want more threads than it has cores, they share
+// Processors: tasks that run on the cores of hosts, in virtual time. If a host has more tasks than cores, they share
 // the cores equally; each busy thread besides the first slows the others down a little, since they share caches and memory.
 #pragma once
 
@@ -14,9 +14,9 @@ class Processors {
   // `cores` of each host, > 0; `memory_slowdown` in [0, 1).
   Processors(double cores, double memory_slowdown) : cores_(cores), memory_slowdown_(memory_slowdown) {}
 
-  // Starts a task that takes `seconds` if nothing slows it down, and keeps `threads` busy. `task` is any name for it. `now` must not
-  // decrease from call to call.
-  void Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now);
+  // Starts a task of one thread that takes `seconds` if nothing slows it down. `task` is any name for it. `now` must not decrease from call
+  // to call.
+  void Start(std::uint32_t host, std::uint64_t task, double seconds, double now);
   // A task that runs there is done now: Finish comes next to it, but for others that end now.
   void EndNow(std::uint32_t host, std::uint64_t task, double now);
 
@@ -36,7 +36,6 @@ class Processors {
   struct Task {
     std::uint64_t name = 0;
     double left = 0;  // seconds, if nothing slows it down
-    double threads = 1;
   };
   struct Host {
     std::vector<Task> tasks;

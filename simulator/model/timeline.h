@@ -55,8 +55,6 @@ struct Timeline {
   double end = 0;  // the last picture is received
 
   double frames_per_second() const { return end > 0 ? double(frames.size()) / end : 0; }
-  // Share of the workers' time in which they rendered, all threads of a worker counted as one: what is left of perfect scaling.
-  double render_share = 0;
 };
 
 }  // namespace slabstream

@@ -13,13 +13,6 @@ constexpr double kLogFull = -16;
 
 }  // namespace
 
-UnionCoverage::Amount& UnionCoverage::Amount::operator+=(const Amount& more) {
-  scanned += more.scanned;
-  filled += more.filled;
-  runs += more.runs;
-  return *this;
-}
-
 UnionCoverage::UnionCoverage(std::span<const CoverageMap* const> ranks, std::int32_t width, std::int32_t height)
     : width_(width), height_(height), tiles_x_(CoverageTiles(width)), tiles_y_(CoverageTiles(height)) {
   const std::size_t tiles = std::size_t(tiles_x_) * std::size_t(tiles_y_);

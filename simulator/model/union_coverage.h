@@ -20,7 +20,6 @@ class UnionCoverage {
     double scanned = 0;  // pixels between the first and the last tile column that is not empty
     double filled = 0;   // pixels that are not empty
     double runs = 0;     // unbroken stretches of them, row by row
-    Amount& operator+=(const Amount& more);
   };
   // `pixels` are numbered y * width + x. A row that lies in them only in part counts by its share.
   Amount Of(RankInterval ranks, PixelRange pixels) const;

@@ -41,13 +41,18 @@ class DirectPicturesTest : public ClientTest {
     const auto answer = [&](const AnyMessage& message) -> std::vector<Answer> {
       if (const auto* ping = std::get_if<ClientPing>(&message)) {
         ClientPong pong = PongTo(*ping);
-        pong.known.clear();  // the frame is over for the service
+        if (!held_) pong.known.clear();  // the frame is over for the service
         if (ping->senders && *ping->senders != 7) pong.senders = PictureSenders{7, {worker_.public_key}};
-        return {{pong, {}}};
+        if (!held_ || ping->received_bytes < held_->payload.size()) return {{pong, {}}};
+        return {{pong, {}}, *std::exchange(held_, std::nullopt)};
       }
       const auto& submit = std::get<SubmitFrame>(message);
       ++outcome.asked;
       Answer reply = ReplyTo(submit.request);
+      if (!submit.pictures && hold_) {
+        held_ = reply;
+        return {};
+      }
       if (!submit.pictures) return {reply};
       ++outcome.asked_with_door;
       if (brings != Brings::kNothing) {
@@ -80,6 +85,9 @@ class DirectPicturesTest : public ClientTest {
   }
 
   Duration lost_after_ = seconds(60);
+  // The service sends a picture again when the client says to have read as many bytes as the lost one had.
+  bool hold_ = false;
+  std::optional<Answer> held_;
   const KeyPair service_ = MakeKeyPair(), client_ = MakeKeyPair(), worker_ = MakeKeyPair(), stranger_ = MakeKeyPair();
   std::optional<Socket> worker_socket_;
 };
@@ -123,6 +131,15 @@ TEST_F(DirectPicturesTest, AreAskedForAgainIfTheyAreLost) {
     EXPECT_EQ(outcome.asked, 2);
     EXPECT_EQ(outcome.asked_with_door, 1) << "the second one comes through the coordinator";
   }
+}
+
+// The service has counted its bytes as sent. If they stayed unread for ever, it would take the client for one that does not read.
+TEST_F(DirectPicturesTest, CountAsReadIfTheyAreLost) {
+  lost_after_ = milliseconds(50);
+  hold_ = true;
+  const Outcome outcome = Render(Brings::kNothing);
+  ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
+  EXPECT_EQ(outcome.asked, 2);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "common/image/run_image.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
 #include "common/wire/other_version.h"

@@ -5,11 +5,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 // A service whose one worker is busy with a first frame of another client and one of kClient, so that what kClient asks for queues.
 struct BusyScript : CoordinatorScript {
   BusyScript() {

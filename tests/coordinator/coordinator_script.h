@@ -27,6 +27,10 @@ using CoordinatorAction = std::variant<FrameAction, DatasetAction>;
 using Actions = std::vector<CoordinatorAction>;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
 
 inline constexpr std::uint64_t kMebi = 1 << 20;
 inline constexpr PeerToken kClient = 21, kOther = 22;  // connections of two clients

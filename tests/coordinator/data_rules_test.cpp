@@ -4,11 +4,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 constexpr PeerToken kAdmin = 31;
 
 // Two datasets that are files, and a folder.

@@ -7,9 +7,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-
 TEST(CoordinatorFrames, FrameRunsGroupByGroupToItsPicture) {
   CoordinatorScript script;
   const FakeWorker a = script.Join(11, 1), b = script.Join(12, 2);
@@ -155,12 +152,20 @@ TEST(CoordinatorFrames, LossIsPlannedAroundFromTheFirstUnfinishedGroup) {
   EXPECT_EQ(replies[0].message.statistics.attempts, 2U);
 }
 
+// Two workers and a frame of so many groups, the first of which is done.
+struct FirstGroupDone : CoordinatorScript {
+  explicit FirstGroupDone(int group_count) {
+    Join(11, 1);
+    Join(12, 2);
+    groups = HandedOut(Submit(kClient, Frame(1, group_count)));
+    Done(groups[0]);
+  }
+  std::vector<GroupAssignment> groups;  // as they were handed out
+};
+
 TEST(CoordinatorFrames, LossOfTheDisplayWorkerBeginsAgain) {
-  CoordinatorScript script;
-  script.Join(11, 1);
-  script.Join(12, 2);
-  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 3)));
-  script.Done(groups[0]);
+  FirstGroupDone script(3);
+  const std::vector<GroupAssignment>& groups = script.groups;
   const auto again = HandedOut(script.Kill(script.WorkerOf(groups[0].display)));
   ASSERT_THAT(Keys(again), ElementsAre(GroupKey{1, 2, 0}, GroupKey{1, 2, 1}));
   EXPECT_EQ(again[0].first_group, 0U);
@@ -171,11 +176,8 @@ TEST(CoordinatorFrames, LossOfTheDisplayWorkerBeginsAgain) {
 }
 
 TEST(CoordinatorFrames, LossOfAWorkerThatHasDoneItsPartCostsNothing) {
-  CoordinatorScript script;
-  script.Join(11, 1);
-  script.Join(12, 2);
-  const auto groups = HandedOut(script.Submit(kClient, Frame(1, 1)));
-  script.Done(groups[0]);
+  FirstGroupDone script(1);
+  const std::vector<GroupAssignment>& groups = script.groups;
   const FakeWorker other =
       *std::find_if(script.workers.begin(), script.workers.end(), [&](const FakeWorker& w) { return w.id != groups[0].display; });
   EXPECT_TRUE(HandedOut(script.Kill(other)).empty());

@@ -6,8 +6,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-
 // A mask of the frame with the first `hidden` tiles hidden.
 OcclusionMask Mask(const GroupAssignment& group, std::size_t hidden) {
   const PixelBounds frame = FrameBounds(group.setup);

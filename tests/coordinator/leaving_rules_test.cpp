@@ -6,9 +6,6 @@
 namespace slabstream {
 namespace {
 
-using testing::IsEmpty;
-using testing::SizeIs;
-
 // Every group that is handed out, with how often each box was, over all attempts.
 struct Handed {
   std::vector<GroupAssignment> waiting;  // for their answers

@@ -8,11 +8,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 constexpr int kLevels = 3;
 
 VolumeGeometry GeometryOfLevel(int level) {

@@ -7,11 +7,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 constexpr DatasetId kBlock = 1;
 
 class MemoryRules : public testing::Test {

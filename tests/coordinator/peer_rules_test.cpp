@@ -4,10 +4,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 constexpr PeerToken kStranger = 66;
 
 FrameImage PictureOf(const GroupAssignment& group) {

@@ -5,10 +5,7 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
 using testing::Field;
-using testing::IsEmpty;
-using testing::SizeIs;
 
 const std::string kWorkerKey(40, 'w'), kClientKey(40, 'c');
 

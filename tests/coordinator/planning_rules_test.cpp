@@ -4,9 +4,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-using testing::SizeIs;
-
 // Plans wait until the test makes them.
 struct SlowPlanner : CoordinatorScript {
   SlowPlanner() {

@@ -5,10 +5,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 SampleQuery Question(std::uint64_t nonce, const std::string& dataset = "block") {
   return {.nonce = nonce, .dataset = dataset, .points = {{1, 2, 3}}};
 }
@@ -125,7 +121,7 @@ TEST_F(UploadRules, BytesComeInOrderWithinTheCreditAndBecomeADataset) {
   std::uint64_t allowed = Admit(upload).allowed, sent = 0;
   EXPECT_EQ(allowed, 8 * kMebi);
   int finished = 0;
-  while (sent < Order(1).bytes()) {
+  while (sent < BytesToSend(Order(1))) {
     ASSERT_LE(sent + kMaxVolumePartBytes, allowed) << "the credit comes before it is used up";
     const Actions actions = Send(Part(sent));
     const auto stored = Of<StoreUpload>(actions);
@@ -142,7 +138,7 @@ TEST_F(UploadRules, BytesComeInOrderWithinTheCreditAndBecomeADataset) {
   EXPECT_EQ(finished, 1);
   DataSource source("", "");
   source.load = [](const TellRead&) -> Result<LoadedData> { return LoadedData{}; };
-  source.held_bytes = Order(1).bytes();
+  source.held_bytes = BytesToSend(Order(1));
   const Actions done = script.Step(UploadFinished{upload, source});
   const auto replies = ToClients<DataReply>(done);
   ASSERT_THAT(replies, SizeIs(1));

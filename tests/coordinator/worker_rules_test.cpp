@@ -4,9 +4,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-
 TEST(CoordinatorWorkers, RepeatedRegisterGetsTheSameWelcome) {
   CoordinatorScript script;
   const FakeWorker worker = script.Join(11, 1);

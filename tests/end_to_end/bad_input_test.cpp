@@ -96,12 +96,12 @@ TEST_F(BadInputTest, CommandLines) {
 
 TEST_F(BadInputTest, WhoTypesNoCommandSeesExamples) {
   const std::string help = Slabstream({}).out;
-  EXPECT_THAT(help, testing::HasSubstr("Examples:\n  slabstream view head.nii.gz"));
-  EXPECT_THAT(help, testing::HasSubstr("turntable"));
+  EXPECT_THAT(help, HasSubstr("Examples:\n  slabstream view head.nii.gz"));
+  EXPECT_THAT(help, HasSubstr("turntable"));
   const std::string render = MustRun({"render", "--help"}).out, all = MustRun({"render", "--help-all"}).out;
-  EXPECT_THAT(render, testing::HasSubstr("options: slabstream render --help-all\n"));
-  EXPECT_THAT(render, testing::Not(testing::HasSubstr("--pixel-error")));
-  EXPECT_THAT(all, testing::HasSubstr("--pixel-error"));
+  EXPECT_THAT(render, HasSubstr("options: slabstream render --help-all\n"));
+  EXPECT_THAT(render, Not(HasSubstr("--pixel-error")));
+  EXPECT_THAT(all, HasSubstr("--pixel-error"));
   EXPECT_EQ(render, MustRun({"help", "render"}).out);
 }
 

@@ -12,8 +12,6 @@ namespace slabstream {
 namespace {
 
 using testing::AnyOf;
-using testing::HasSubstr;
-using testing::Not;
 
 class BenchTest : public EndToEndTest {
  protected:

@@ -8,13 +8,12 @@
 #include <thread>
 
 #include "tests/end_to_end/program.h"
+#include "tests/support/text_of.h"
 
 namespace slabstream {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 class ClientLibraryTest : public EndToEndTest {
  protected:
@@ -24,8 +23,6 @@ class ClientLibraryTest : public EndToEndTest {
 
   std::string endpoint_;
 };
-
-std::string TextOf(const std::vector<std::byte>& bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
 // What a call throws: its code; and its message, in `said`.
 template <class Call>

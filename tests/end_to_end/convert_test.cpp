@@ -13,8 +13,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 class ConvertTest : public EndToEndTest {
  protected:
   Json Info(std::vector<std::string> arguments) {
@@ -45,7 +43,7 @@ TEST_F(ConvertTest, WritesEveryFormatAndTellsSo) {
   for (const std::string to : {"a.nii", "b.nii.gz", "c.mha", "d.mhd", "e.npy", "f.vti", "g.nrrd"}) {
     const ProgramResult result = MustRun({"convert", from, to, "--progress"});
     EXPECT_THAT(result.out, HasSubstr("wrote " + to));
-    EXPECT_THAT(result.err, testing::AllOf(HasSubstr("reading " + from), HasSubstr("writing " + to + ": 100 %")));
+    EXPECT_THAT(result.err, AllOf(HasSubstr("reading " + from), HasSubstr("writing " + to + ": 100 %")));
     const Json info = Info({to});
     for (const char* field : {"size", "type", "spacing", "range", "histogram"}) EXPECT_EQ(info[field], before[field]) << to;
     from = to;
@@ -75,7 +73,7 @@ TEST_F(ConvertTest, AFullDiskIsToldAndTheConversionGoesOnWhenThereIsRoom) {
   const ProgramResult full = OnFullDisk(5000, [&] { return Slabstream({"convert", "s.nrrd", "a.ome.zarr"}); });
   EXPECT_EQ(full.exit_status, 1);
   ASSERT_EQ(full.err_lines().size(), 1U) << full.err;
-  EXPECT_THAT(full.err, testing::AllOf(HasSubstr("a.ome.zarr"), HasSubstr("File too large")));
+  EXPECT_THAT(full.err, AllOf(HasSubstr("a.ome.zarr"), HasSubstr("File too large")));
   EXPECT_NE(Slabstream({"info", "a.ome.zarr"}).exit_status, 0) << "it is no image yet";
   MustRun({"convert", "s.nrrd", "a.ome.zarr"});
   MustRun({"convert", "s.nrrd", "b.ome.zarr"});

@@ -13,10 +13,6 @@
 namespace slabstream {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
-
 class DicomTest : public EndToEndTest {
  protected:
   // A block in a box, stored sagittally, with slices from left to right.

@@ -15,9 +15,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
-
 class ExperimentTest : public EndToEndTest {
  protected:
   std::vector<Json> RowsOf(const std::string& folder) {

@@ -13,8 +13,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 constexpr int kPixels = 64;
 
 class GridTest : public EndToEndTest {

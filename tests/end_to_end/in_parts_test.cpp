@@ -11,13 +11,10 @@
 #include "tests/data/stores/scripted_server.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
 
 constexpr double kSame = 2e-5 + 1.0 / 1024;  // of pictures that were composed of other boxes
 
@@ -217,9 +214,7 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
   const std::string logs = up.substr(begin + 12, up.find('\n', begin) - begin - 12);
   int reading = 0;
   for (const auto& entry : std::filesystem::directory_iterator(logs)) {
-    std::ifstream file(entry.path());
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (text.find("reads " + Path("large.nrrd") + " itself") != std::string::npos) ++reading;
+    if (slabstream::ReadFile(entry.path()).find("reads " + Path("large.nrrd") + " itself") != std::string::npos) ++reading;
   }
   EXPECT_GT(reading, 0) << logs;
 }

@@ -10,8 +10,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 class MeasureTest : public EndToEndTest {
  protected:
   // 4 x 3 x 2 voxels of a patient with the value x + 10 y + 100 z, spaced 2, 3 and 5 mm; voxel 0 0 0 is at 10, 20, 30.

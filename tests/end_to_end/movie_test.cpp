@@ -20,8 +20,6 @@ namespace {
 
 using testing::Contains;
 using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::Not;
 
 constexpr int kPixels = 32;
 constexpr std::size_t kFrameBytes = std::size_t{3} * kPixels * kPixels;

@@ -15,8 +15,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 // A body with a bright block at its right, anterior, superior corner.
 Object Body() {
   Object body{.size = {24, 20, 16}, .steps = {Vec3{2, 0, 0}, Vec3{0, 1.5, 0}, Vec3{0, 0, 3}}, .origin = {}, .value = {}};

@@ -9,11 +9,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include "common/base/check.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 
@@ -151,10 +151,7 @@ std::string EndToEndTest::MakeSphere(const std::string& name, int sphere_class, 
   return Path(name);
 }
 
-std::string EndToEndTest::ReadFile(const std::string& name) const {
-  std::ifstream file(Path(name), std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string EndToEndTest::ReadFile(const std::string& name) const { return slabstream::ReadFile(Path(name)); }
 
 std::vector<std::string> EndToEndTest::Files() const {
   std::vector<std::string> names;

@@ -1,6 +1,7 @@
 // Runs the programs under test and keeps what they leave behind in a directory that vanishes with the test.
 #pragma once
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/types.h>
 
@@ -11,6 +12,10 @@
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
 
 struct ProgramResult {
   int exit_status = -1;  // 128 + signal if a signal ended it, as shells count

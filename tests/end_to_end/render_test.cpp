@@ -20,8 +20,6 @@ namespace {
 
 using testing::Contains;
 using testing::Each;
-using testing::HasSubstr;
-using testing::Not;
 
 constexpr int kVoxels = 48;  // a side of the ball's volume
 constexpr int kPixels = 96;  // a side of the pictures

@@ -16,9 +16,6 @@
 namespace slabstream {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
-
 // A zombie does not run: who started it may be gone, and nobody may be left to reap it.
 bool Runs(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");

@@ -10,9 +10,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
-
 class UnitsTest : public EndToEndTest {
  protected:
   // 40 x 30 x 20 voxels, spaced 0.5, 0.5 and 2.
@@ -30,7 +27,7 @@ TEST_F(UnitsTest, AreShownAsTheFileStatesThem) {
   EXPECT_THAT(info, HasSubstr("extent       20 x 15 x 40 \u00b5m\n"));
   EXPECT_EQ(Json::Parse(MustRun({"info", "cells.nrrd", "--json"}).out).value()["unit"], "\u00b5m");
   const std::vector<std::string> measure = {"measure", "cells.nrrd", "--local=1", "--distance", "0,0,0:3,4,0", "--box", ":,:,:"};
-  EXPECT_THAT(MustRun(measure).out, testing::AllOf(HasSubstr("distance 5 \u00b5m\n"), HasSubstr("12000 \u00b5m^3\n")));
+  EXPECT_THAT(MustRun(measure).out, AllOf(HasSubstr("distance 5 \u00b5m\n"), HasSubstr("12000 \u00b5m^3\n")));
   MustRun({"render", "cells.nrrd", "--local=1", "--size", "300x200", "--scale-bar", "-o", "bar.png"});
   EXPECT_EQ(Json::Parse(MustRun({"info", "bar.png", "--json"}).out).value()["geometry"]["unit"], "\u00b5m");
   MustRun({"convert", "cells.nrrd", "again.nrrd"});
@@ -39,7 +36,7 @@ TEST_F(UnitsTest, AreShownAsTheFileStatesThem) {
 
 TEST_F(UnitsTest, AreNotMadeUp) {
   Make("bare.nrrd", "");
-  EXPECT_THAT(MustRun({"info", "bare.nrrd"}).out, testing::AllOf(HasSubstr("spacing      0.5 0.5 2\n"), Not(HasSubstr("unit"))));
+  EXPECT_THAT(MustRun({"info", "bare.nrrd"}).out, AllOf(HasSubstr("spacing      0.5 0.5 2\n"), Not(HasSubstr("unit"))));
   EXPECT_EQ(Json::Parse(MustRun({"info", "bare.nrrd", "--json"}).out).value()["unit"], "unknown");
   EXPECT_THAT(MustRun({"measure", "bare.nrrd", "--local=1", "--distance", "0,0,0:3,4,0"}).out, HasSubstr("distance 5 units\n"));
   MakeSphere("ball.nrrd", 1, 16);

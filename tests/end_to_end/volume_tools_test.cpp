@@ -14,8 +14,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 class VolumeToolsTest : public EndToEndTest {
  protected:
   Json Info(const std::string& name, std::vector<std::string> more = {}) {
@@ -184,7 +182,7 @@ TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
     const std::string place = "{name}";  // which users type
     for (std::size_t at = text.find(place); at != std::string::npos; at = text.find(place)) text.erase(at, place.size());
     for (const char* notation : {"REQUIRED", "{", "}", ":{", " x ", "Needs:", "Excludes:", "=36", "TEXT", "UINT"}) {
-      EXPECT_THAT(text, testing::Not(HasSubstr(notation))) << command;
+      EXPECT_THAT(text, Not(HasSubstr(notation))) << command;
     }
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {

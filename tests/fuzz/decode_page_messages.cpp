@@ -3,7 +3,7 @@
 
 #include "common/http/address.h"
 #include "gateway/page_message.h"
-#include "gateway/target.h"
+#include "gateway/request_fields.h"
 #include "tests/fuzz/decoders.h"
 
 namespace slabstream {

@@ -32,7 +32,7 @@ bool DecodeSweep(std::span<const std::byte> bytes) {
                             sweep->workers.size() * sweep->links.size();
   CHECK(cases >= 1 && cases <= kMaxSweepCases) << cases;
   // Whatever a sweep names can be asked for.
-  for (const SweepPolicy& policy : sweep->policies) CHECK(CheckNames(policy.policy).ok()) << policy.name;
+  for (const NamedPolicy& policy : sweep->policies) CHECK(CheckNames(policy.policy).ok()) << policy.name;
   for (const SweepRenderer& renderer : sweep->renderers) {
     FrameRequest request;
     request.dataset = "volume";

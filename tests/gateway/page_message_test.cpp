@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/http/address.h"
-#include "gateway/target.h"
+#include "gateway/request_fields.h"
 
 namespace slabstream {
 namespace {

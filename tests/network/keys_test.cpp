@@ -14,8 +14,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 constexpr char kSecretName[] = "a-name-that-nobody-else-has";
 constexpr int kCoordinator = 0, kClient = 1, kFirstWorker = 2, kWorkers = 3;
 

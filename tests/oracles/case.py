@@ -18,6 +18,13 @@ class Case:
     refused: str = ""  # what the error says instead; "": it is read
 
 
+def one_of_each(write, folder, random, count, **choices):
+    """A case by `write` for each choice of each argument, the others at random, and `count` cases that are random in all of them."""
+    chosen = [{argument: choice} for argument, of_argument in choices.items() for choice in of_argument]
+    for number, arguments in enumerate(chosen + count * [{}]):
+        yield write(folder, random, number, **arguments)
+
+
 def values(random, shape, dtype):
     """Half of them smooth, half noise, over the whole range of the type."""
     dtype = np.dtype(dtype)

@@ -5,7 +5,7 @@ import h5py
 import hdf5plugin
 import numpy as np
 
-from case import TYPES, Case, chunks, fill_value, halved, pick, sides, sparse, values, with_options
+from case import TYPES, Case, chunks, fill_value, halved, one_of_each, pick, sides, sparse, values, with_options
 
 FILTERS = {
     "none": {}, "gzip": {"compression": "gzip"}, "gzip9+shuffle": {"compression": "gzip", "compression_opts": 9, "shuffle": True},
@@ -124,14 +124,8 @@ def big_data_viewer(folder, random, number):
 
 
 def cases(folder, random, count):
-    number = iter(range(1 << 30))
-    for filters in FILTERS:
-        yield plain(folder, random, next(number), filters=filters)
-    for dtype in TYPES:
-        yield plain(folder, random, next(number), dtype=dtype)
-    for _ in range(count):
-        yield plain(folder, random, next(number))
-    for _ in range(8):
-        yield imaris(folder, random, next(number))
-        yield big_data_viewer(folder, random, next(number))
+    yield from one_of_each(plain, folder, random, count, filters=FILTERS, dtype=TYPES)
+    for number in range(8):
+        yield imaris(folder, random, number)
+        yield big_data_viewer(folder, random, number)
     yield from refused(folder)

@@ -4,7 +4,7 @@ import os
 
 import tensorstore
 
-from case import TYPES, Case, chunks, halved, pick, sides, sparse, values, with_options
+from case import TYPES, Case, chunks, halved, one_of_each, pick, sides, sparse, values, with_options
 
 CODECS = {"raw": {"type": "raw"}, "gzip": {"type": "gzip"}, "zlib": {"type": "gzip", "useZlib": True}, "zstd": {"type": "zstd"},
           "bzip2": {"type": "bzip2"}, "xz": {"type": "xz"},
@@ -100,14 +100,8 @@ def refused(folder, random):
 
 
 def cases(folder, random, count):
-    number = iter(range(1 << 30))
-    for codec in CODECS:
-        yield single(folder, random, next(number), codec=codec)
-    for dtype in TYPES:
-        yield single(folder, random, next(number), dtype=dtype)
-    for _ in range(count):
-        yield single(folder, random, next(number))
-    for _ in range(6):
-        yield levels(folder, random, next(number))
-        yield views(folder, random, next(number))
+    yield from one_of_each(single, folder, random, count, codec=CODECS, dtype=TYPES)
+    for number in range(6):
+        yield levels(folder, random, number)
+        yield views(folder, random, number)
     yield from refused(folder, random)

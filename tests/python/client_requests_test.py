@@ -84,6 +84,16 @@ class RequestsTest(unittest.TestCase):
         self.assertEqual([type(told) for told in self.watcher.told], [ss.Unavailable] * 2)
         self.assertEqual(str(self.watcher.told[0]), "the service at ipc:///s has not answered for 5000 ms")
 
+    def test_a_question_fails_if_the_service_is_silent(self) -> None:
+        answer: concurrent.futures.Future[object] = concurrent.futures.Future()
+        self.requests.ask(7, "status_query", schema.StatusQuery(), answer, self.now)
+        self.now += PING_SECONDS
+        self.requests.tick(self.now)
+        self.assertEqual(len(self.pings()), 1)
+        self.now += SILENCE_SECONDS
+        self.requests.tick(self.now)
+        self.assertIsInstance(answer.exception(0), ss.Unavailable)
+
     def answer_pings(self, known: list[int]) -> None:
         self.now += PING_SECONDS
         self.requests.tick(self.now)
@@ -154,8 +164,8 @@ class RequestsTest(unittest.TestCase):
         one: concurrent.futures.Future = concurrent.futures.Future()
         two: concurrent.futures.Future = concurrent.futures.Future()
         first, second = next(self.requests.numbers), next(self.requests.numbers)
-        self.requests.ask(first, "status_query", schema.StatusQuery(), one)
-        self.requests.ask(second, "data_order", schema.DataOrder(action=1), two)
+        self.requests.ask(first, "status_query", schema.StatusQuery(), one, self.now)
+        self.requests.ask(second, "data_order", schema.DataOrder(action=1), two, self.now)
         self.receive(order_refused=schema.OrderRefused(nonce=second, status=schema.Status(code=1, message="not an admin")))
         self.receive(status_reply=schema.StatusReply(nonce=first, pid=7))
         self.assertEqual(one.result(0).pid, 7)
@@ -165,11 +175,11 @@ class RequestsTest(unittest.TestCase):
     def test_a_refused_key_ends_everything_for_good(self) -> None:
         answer: concurrent.futures.Future = concurrent.futures.Future()
         self.submit()
-        self.requests.ask(1001, "status_query", schema.StatusQuery(), answer)
+        self.requests.ask(1001, "status_query", schema.StatusQuery(), answer, self.now)
         self.requests.fail_all("refuses the key", for_good=True)
         self.submit()
         later: concurrent.futures.Future = concurrent.futures.Future()
-        self.requests.ask(1002, "status_query", schema.StatusQuery(), later)
+        self.requests.ask(1002, "status_query", schema.StatusQuery(), later, self.now)
         for error in (*self.watcher.told, answer.exception(0), later.exception(0)):
             self.assertIsInstance(error, ss.Unavailable)
 

@@ -14,9 +14,9 @@
 #include <optional>
 
 #include "client/embedded/embedded_service.h"
-#include "data/zarr_writer/ome_zarr_writer.h"
 #include "tests/data/sources/memory_source.h"
 #include "tests/service/pictures.h"
+#include "tests/service/small_shards.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -105,15 +105,9 @@ class BadStoresTest : public testing::Test {
     service_ = std::move(*started);
     client_.emplace(service_->Connect().value());
   }
-  // In shards of 32 voxels a side.
   std::string Zarr() const {
     const std::string path = directory_ / "ball.ome.zarr";
-    fs::remove_all(path);
-    OmeZarrOptions options;
-    options.chunk_side = 16;
-    options.shard_side = 32;
-    const Status written = WriteOmeZarr(*MakeMemorySource(ball_, {.format = "NRRD", .file_type = "uint8"}), path, options);
-    CHECK(written.ok()) << written.message();
+    WriteSmallShards(ball_, path);
     return path;
   }
   static FrameRequest Request(const std::string& dataset = "ball") {

@@ -28,6 +28,7 @@
 #include "data/volume_io/volume_writer.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
+#include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -81,15 +82,6 @@ TEST(PeerTable, SilentConnectionsAreForgotten) {
   EXPECT_EQ(peers.size(), 1U);
 }
 
-std::shared_ptr<const Volume> RandomVolume(Index3 size, ScalarType type, Random& random) {
-  Volume volume;
-  volume.description.geometry.size = size;
-  volume.description.type = type;
-  volume.block = MakeVoxelBlock(volume.description.geometry.bounds(), type);
-  for (std::byte& byte : volume.block.bytes) byte = std::byte(random.Integer(0, 255));
-  return std::make_shared<const Volume>(std::move(volume));
-}
-
 // The samples of a box, one by one.
 std::vector<std::byte> SamplesByDefinition(const Volume& volume, const Box& box) {
   std::vector<std::byte> samples;
@@ -116,7 +108,7 @@ TEST_F(BoxSamplesTest, AnyPieceOfAnyBoxIsWhatTheDefinitionSays) {
   for (int round = 0; round < 300; ++round) {
     const auto type = static_cast<ScalarType>(Pick(1, 3));
     const Index3 size = {Pick(1, 9), Pick(1, 9), Pick(1, 9)};
-    const auto volume = RandomVolume(size, type, random_);
+    const auto volume = std::make_shared<const Volume>(RandomVolume(random_, size, type));
     Box box;
     for (int axis = 0; axis < 3; ++axis) {
       const bool whole = Pick(0, 1) == 1;
@@ -133,7 +125,7 @@ TEST_F(BoxSamplesTest, AnyPieceOfAnyBoxIsWhatTheDefinitionSays) {
 }
 
 TEST_F(BoxSamplesTest, SlabsAlongZAreNotCopied) {
-  const auto volume = RandomVolume({5, 4, 6}, ScalarType::kUint16, random_);
+  const auto volume = std::make_shared<const Volume>(RandomVolume(random_, {5, 4, 6}, ScalarType::kUint16));
   const Bytes piece = BoxSamples(volume, {{0, 0, 2}, {5, 4, 5}}, 0, 5 * 4 * 3 * 2);
   EXPECT_EQ(piece.span().data(), volume->block.bytes.data() + 2 * 5 * 4 * 2);
 }
@@ -142,7 +134,7 @@ TEST_F(BoxSamplesTest, SlabsAlongZAreNotCopied) {
 TEST(DatasetId, IsTheSameForTheSameVoxelsUnderTheSameNameOnly) {
   Random random(7);
   SCOPED_TRACE(random.trace());
-  const auto volume = RandomVolume({30, 20, 10}, ScalarType::kUint8, random);
+  const auto volume = std::make_shared<const Volume>(RandomVolume(random, {30, 20, 10}, ScalarType::kUint8));
   Volume copy;
   copy.description = volume->description;
   copy.block = MakeVoxelBlock(volume->block.box, volume->block.type);
@@ -164,7 +156,7 @@ class VoxelServerTest : public testing::Test {
 
   VoxelServerTest()
       : random_(1),
-        volume_(RandomVolume({300, 70, 60}, ScalarType::kUint8, random_)),  // two chunks
+        volume_(std::make_shared<const Volume>(RandomVolume(random_, {300, 70, 60}, ScalarType::kUint8))),  // two chunks
         server_(VoxelServer::Start(context_, {"inproc://voxel-server-test"}, kEpoch).value()),
         worker_(Socket::Dealer(context_).value()) {
     server_->Publish(5, {.volume = volume_});

@@ -9,6 +9,7 @@
 #include "data/layers/layer_reader.h"
 #include "data/volume_io/volume_writer.h"
 #include "tests/service/multi_process_fixture.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -264,11 +265,8 @@ TEST_F(DatasetsTest, FilesOfAWatchedFolderComeChangeAndGo) {
 }
 
 TEST_F(DatasetsTest, AFileThatIsNotThereAsAWholeIsAnErrorUntilItIs) {
-  const std::string whole = [&] {
-    Replace(directory_ / "whole.nrrd", *volume_);
-    std::ifstream file(directory_ / "whole.nrrd", std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  }();
+  Replace(directory_ / "whole.nrrd", *volume_);
+  const std::string whole = ReadFile(directory_ / "whole.nrrd");
   std::ofstream file(folder_ / "slow.nrrd", std::ios::binary);
   file << whole.substr(0, whole.size() / 2) << std::flush;
   const Status status = FailureOf("slow");

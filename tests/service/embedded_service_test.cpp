@@ -12,6 +12,7 @@
 
 #include "common/image/sample_codes.h"
 #include "tests/common/mesh/mesh_samples.h"
+#include "tests/service/next_picture.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 
@@ -46,6 +47,17 @@ class EmbeddedServiceTest : public testing::Test {
     Result<Client> client = service_->Connect();
     CHECK(client.ok()) << client.status().message();
     return std::move(*client);
+  }
+  // A frame that takes long.
+  static FrameRequest LargeRequest() {
+    FrameRequest request = TestRequest(Splatting(), 10, 8);
+    request.size = {2048, 2048};
+    return request;
+  }
+  static void ExpectIdle(Client& client) {
+    const Result<StatusReply> status = client.QueryStatus();
+    ASSERT_TRUE(status.ok()) << status.status().message();
+    EXPECT_EQ(status->running + status->queued, 0U);
   }
   // Asks for the picture and compares it with the direct one.
   FrameStatistics ExpectRightPicture(Client& client, const FrameRequest& request) {
@@ -212,14 +224,11 @@ TEST_F(EmbeddedServiceTest, OneClientKeepsSeveralFramesInFlight) {
     open.emplace(client.Submit(request, seconds(60)), request);
   }
   while (!open.empty()) {
-    const std::optional<ClientEvent> event = client.Next(seconds(60));
-    ASSERT_TRUE(event.has_value());
-    ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
-    const auto* picture = std::get_if<Picture>(&event->what);
-    if (picture == nullptr) continue;
-    const FrameRequest& request = open.at(event->request);
-    EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
-    open.erase(event->request);
+    const std::optional<AnsweredRequest> answered = NextPicture(client);
+    ASSERT_TRUE(answered.has_value());
+    const FrameRequest& request = open.at(answered->request);
+    EXPECT_LE(LargestDifference(answered->picture.image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+    open.erase(answered->request);
   }
 }
 
@@ -232,20 +241,18 @@ TEST_F(EmbeddedServiceTest, PreviewsComeGroupByGroupAndThenThePicture) {
   std::uint32_t groups_done = 0;
   double alpha = 0;
   for (bool final = false; !final;) {
-    const std::optional<ClientEvent> event = client.Next(seconds(60));
-    ASSERT_TRUE(event.has_value());
-    EXPECT_EQ(event->request, id);
-    ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
-    const auto* picture = std::get_if<Picture>(&event->what);
-    if (picture == nullptr) continue;
-    EXPECT_GT(picture->groups_done, groups_done);
-    EXPECT_GE(HighestAlpha(picture->image), alpha - 1e-6);  // what lies behind can only add
-    groups_done = picture->groups_done;
-    alpha = HighestAlpha(picture->image);
-    final = picture->final;
-    EXPECT_EQ(final, groups_done == picture->group_count);
+    const std::optional<AnsweredRequest> answered = NextPicture(client);
+    ASSERT_TRUE(answered.has_value());
+    EXPECT_EQ(answered->request, id);
+    const Picture& picture = answered->picture;
+    EXPECT_GT(picture.groups_done, groups_done);
+    EXPECT_GE(HighestAlpha(picture.image), alpha - 1e-6);  // what lies behind can only add
+    groups_done = picture.groups_done;
+    alpha = HighestAlpha(picture.image);
+    final = picture.final;
+    EXPECT_EQ(final, groups_done == picture.group_count);
     if (final) {
-      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+      EXPECT_LE(LargestDifference(picture.image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
     }
   }
   EXPECT_EQ(groups_done, 4U);
@@ -255,8 +262,7 @@ TEST_F(EmbeddedServiceTest, CancelEndsTheRequestAndFreesTheWorkers) {
   volume_ = TestSphere(128);
   Start(2);
   Client client = Connect();
-  FrameRequest large = TestRequest(Splatting(), 10, 8);
-  large.size = {2048, 2048};
+  const FrameRequest large = LargeRequest();
   const RequestId id = client.Submit(large, seconds(60));
   std::optional<ClientEvent> event = client.Next(seconds(60));
   ASSERT_TRUE(event.has_value());  // progress: it has arrived
@@ -269,9 +275,7 @@ TEST_F(EmbeddedServiceTest, CancelEndsTheRequestAndFreesTheWorkers) {
   ASSERT_TRUE(event.has_value());
   EXPECT_EQ(event->request, id);
   EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kCancelled);
-  const Result<StatusReply> status = client.QueryStatus();
-  ASSERT_TRUE(status.ok()) << status.status().message();
-  EXPECT_EQ(status->running + status->queued, 0U);
+  ExpectIdle(client);
   ExpectRightPicture(client, TestRequest(ZBuffer(), 10));
 }
 
@@ -280,15 +284,12 @@ TEST_F(EmbeddedServiceTest, ClientThatGoesAwayFreesItsWork) {
   Start(1);
   {
     Client client = Connect();
-    FrameRequest large = TestRequest(Splatting(), 10, 8);
-    large.size = {2048, 2048};
+    const FrameRequest large = LargeRequest();
     for (int i = 0; i < 8; ++i) client.Submit(large, std::chrono::minutes(60));
   }
   Client client = Connect();
   ExpectRightPicture(client, TestRequest(ZBuffer(), 10));
-  const Result<StatusReply> status = client.QueryStatus();
-  ASSERT_TRUE(status.ok());
-  EXPECT_EQ(status->running + status->queued, 0U);
+  ExpectIdle(client);
 }
 
 TEST_F(EmbeddedServiceTest, WorkersLeaveAndJoinWhileFramesRun) {
@@ -300,17 +301,10 @@ TEST_F(EmbeddedServiceTest, WorkersLeaveAndJoinWhileFramesRun) {
     const RequestId id = client.Submit(request, seconds(60));
     service_->worker(frame).RequestStop();
     ASSERT_TRUE(service_->AddWorker().ok());
-    bool rendered = false;
-    while (!rendered) {
-      const std::optional<ClientEvent> event = client.Next(seconds(60));
-      ASSERT_TRUE(event.has_value());
-      EXPECT_EQ(event->request, id);
-      ASSERT_FALSE(std::holds_alternative<Status>(event->what)) << std::get<Status>(event->what).message();
-      const auto* picture = std::get_if<Picture>(&event->what);
-      if (picture == nullptr) continue;
-      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
-      rendered = true;
-    }
+    const std::optional<AnsweredRequest> answered = NextPicture(client);
+    ASSERT_TRUE(answered.has_value());
+    EXPECT_EQ(answered->request, id);
+    EXPECT_LE(LargestDifference(answered->picture.image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
     service_->worker(frame).WaitUntilStopped();
   }
 }

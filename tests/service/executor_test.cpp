@@ -12,12 +12,13 @@
 #include <semaphore>
 
 #include "common/kernels/combine.h"
-#include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/wire/payload.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
+#include "tests/support/same_image.h"
 #include "worker/renderers/for_each_piece.h"
 #include "worker/service/stored_box.h"
 
@@ -106,9 +107,7 @@ TEST_F(ExecutorTest, SharesOfALargeFrameBecomeOneImage) {
   }
   LocalImage expected = front;
   Combine(expected, back, Side::kBack);
-  const LocalImage whole = PixelsOf(1, {0, kPixels}, kLarge);
-  EXPECT_EQ(whole.bounds, expected.bounds);
-  EXPECT_TRUE(std::ranges::equal(whole.rgba, expected.rgba));
+  ExpectSameBits(PixelsOf(1, {0, kPixels}, kLarge), expected);
 }
 
 // In strips, say: the report goes with the last one.
@@ -408,9 +407,7 @@ TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
       start(1);
       for (int each = 0; each < 2; ++each) ASSERT_TRUE(outputs_.NextEvent<RenderDone>().status.ok());
       for (const ClientId client : {0, 1}) {
-        const LocalImage beside = pixels_of(image - 1 + client);
-        EXPECT_EQ(beside.bounds, alone[client].bounds);
-        EXPECT_EQ(beside.rgba, alone[client].rgba);
+        ExpectSameBits(pixels_of(image - 1 + client), alone[client]);
       }
     }
     for (; image > 0; --image) executor_.Perform(ReleaseImage{image});

@@ -21,6 +21,7 @@
 #include "tests/support/raw_peer.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/text_of.h"
 #include "worker/service/service.h"
 
 namespace slabstream {
@@ -183,8 +184,6 @@ void SendParts(zmq::socket_t& socket, const std::vector<std::string>& parts) {
     if (!socket.send(zmq::buffer(parts[i]), more)) return;  // not admitted: nothing leaves
   }
 }
-
-std::string TextOf(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
 std::string Noise(Random& random, std::size_t most) {
   std::string noise(random.Integer<std::size_t>(0, most), '\0');

@@ -16,10 +16,9 @@
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 #include "data/survey/survey.h"
-#include "data/zarr_writer/ome_zarr_writer.h"
-#include "tests/data/sources/memory_source.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
+#include "tests/service/small_shards.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
 
@@ -52,15 +51,9 @@ class InPartsTest : public testing::Test {
     file.write(reinterpret_cast<const char*>(volume.block.bytes.data()), std::streamsize(volume.block.bytes.size()));
     return path;
   }
-  // In chunks of 16 voxels a side.
   std::string Zarr(const std::shared_ptr<const Volume>& volume) const {
     const std::string path = (directory_ / "ball.ome.zarr").string();
-    fs::remove_all(path);
-    OmeZarrOptions options;
-    options.chunk_side = 16;
-    options.shard_side = 32;
-    const Status written = WriteOmeZarr(*MakeMemorySource(volume, {.format = "NRRD", .file_type = "uint8"}), path, options);
-    CHECK(written.ok()) << written.message();
+    WriteSmallShards(volume, path);
     return path;
   }
   static std::shared_ptr<const Volume> Level(const std::string& path, int level) {

@@ -14,6 +14,7 @@
 #include "common/wire/any_message.h"
 #include "coordinator/service/service.h"
 #include "data/volume_io/volume_writer.h"
+#include "tests/service/next_picture.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
@@ -111,16 +112,13 @@ TEST_F(KeysOfServiceTest, PicturesGoStraightToClientsAndAreTheSame) {
   direct.Submit(request);
   int pictures = 0;
   for (bool final = false; !final;) {
-    const std::optional<ClientEvent> event = direct.Next(seconds(30));
-    ASSERT_TRUE(event.has_value());
-    ASSERT_EQ(std::get_if<Status>(&event->what), nullptr);
-    const auto* picture = std::get_if<Picture>(&event->what);
-    if (picture == nullptr) continue;
+    const std::optional<AnsweredRequest> answered = NextPicture(direct);
+    ASSERT_TRUE(answered.has_value());
     ++pictures;
-    final = picture->final;
-    EXPECT_TRUE(picture->direct);
+    final = answered->picture.final;
+    EXPECT_TRUE(answered->picture.direct);
     if (final) {
-      EXPECT_EQ(LargestDifference(picture->image, other->image, request.size), 0);
+      EXPECT_EQ(LargestDifference(answered->picture.image, other->image, request.size), 0);
     }
   }
   EXPECT_GE(pictures, 2) << "a preview at least";

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 
 #include "common/planning/frame_plan.h"
@@ -14,6 +13,7 @@
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -23,8 +23,7 @@ using testing::HasSubstr;
 
 // The most that a process has held in memory so far, bytes.
 std::uint64_t PeakResidentBytes(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/status");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = ReadFile("/proc/" + std::to_string(pid) + "/status");
   const std::size_t at = text.find("VmHWM:");
   CHECK(at != std::string::npos) << pid;
   return std::stoull(text.substr(at + 6)) * 1024;

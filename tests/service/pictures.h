@@ -11,8 +11,8 @@
 
 #include "client/client.h"
 #include "common/image/sample_codes.h"
-#include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/renderer_choice.h"
 #include "common/volume/sphere.h"

@@ -5,10 +5,9 @@
 #include <atomic>
 
 #include "client/embedded/embedded_service.h"
-#include "data/zarr_writer/ome_zarr_writer.h"
-#include "tests/data/sources/memory_source.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/service/pictures.h"
+#include "tests/service/small_shards.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -20,12 +19,7 @@ using testing::HasSubstr;
 class RemoteVolumesTest : public testing::Test {
  protected:
   void SetUp() override {
-    OmeZarrOptions options;
-    options.chunk_side = 16;
-    options.shard_side = 32;
-    const Status written =
-        WriteOmeZarr(*MakeMemorySource(ball_, {.format = "NRRD", .file_type = "uint8"}), directory_ / "ball.zarr", options);
-    ASSERT_TRUE(written.ok()) << written.message();
+    WriteSmallShards(ball_, directory_ / "ball.zarr");
     const ScriptedServer::Script serves = ServesFolder(directory_.path());
     server_ = std::make_unique<ScriptedServer>(
         [this, serves](const ServerRequest& request) { return broken_ ? AnswerText("403 Forbidden", "") : serves(request); });

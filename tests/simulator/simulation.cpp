@@ -263,20 +263,15 @@ void Simulation::CheckTables() {
     EXPECT_EQ(sizes.boxes, workers_[node].boxes()) << node;
   }
   const FrameSizes sizes = service_.coordinator().sizes();
-  EXPECT_EQ(sizes.clients, 0U);
-  EXPECT_EQ(sizes.queued, 0U);
-  EXPECT_EQ(sizes.running, 0U);
-  EXPECT_EQ(sizes.over, 0U);
-  EXPECT_EQ(sizes.planning, 0U);
-  EXPECT_EQ(sizes.counting, 0U);
-  EXPECT_LE(sizes.grids, OccupancyTable::kMaxKept);
   const DatasetSizes of_datasets = datasets_->sizes();
-  EXPECT_EQ(of_datasets.uses, 0U);
-  EXPECT_EQ(of_datasets.orders, 0U);
-  EXPECT_EQ(of_datasets.awaited, 0U);
-  EXPECT_EQ(of_datasets.retired, 0U);
-  EXPECT_EQ(of_datasets.questions, 0U);
-  EXPECT_EQ(of_datasets.uploads, 0U);
+  const std::pair<const char*, std::size_t> none_left[] = {{"clients", sizes.clients},           {"queued", sizes.queued},
+                                                           {"running", sizes.running},           {"over", sizes.over},
+                                                           {"planning", sizes.planning},         {"counting", sizes.counting},
+                                                           {"uses", of_datasets.uses},           {"orders", of_datasets.orders},
+                                                           {"awaited", of_datasets.awaited},     {"retired", of_datasets.retired},
+                                                           {"questions", of_datasets.questions}, {"uploads", of_datasets.uploads}};
+  for (const auto& [what, count] : none_left) EXPECT_EQ(count, 0U) << what;
+  EXPECT_LE(sizes.grids, OccupancyTable::kMaxKept);
   EXPECT_EQ(stored_.size(), 0U) << "memory of a volume whose client has gone";
   EXPECT_EQ(sizes.workers, registered);
   EXPECT_EQ(sizes.slots, registered);
@@ -384,7 +379,7 @@ void Simulation::Perform(const AnswerQuestion& action) {
 }
 
 void Simulation::Perform(const BeginUpload& action) {
-  EXPECT_TRUE(stored_.emplace(action.upload, Stored{0, action.order.bytes()}).second);
+  EXPECT_TRUE(stored_.emplace(action.upload, Stored{0, BytesToSend(action.order)}).second);
   UploadBegun begun{action.upload, Status::Ok()};
   if (random_.Chance(current_.fail_load)) begun.status = Status::ResourceExhausted("not enough memory for a volume");
   TellDatasets(service_.now() + random_.Real(0, 0.1), begun);

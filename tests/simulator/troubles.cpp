@@ -161,7 +161,7 @@ void Simulation::OrderData() {
 void Simulation::SendVolume() {
   AddVolume order{.nonce = sending_.nonce + 1, .name = random_.Chance(0.9) ? "sent" : "volume"};
   order.description.geometry.size = {512, 512, random_.Integer(1, 60)};
-  sending_ = {.nonce = order.nonce, .sent = 0, .bytes = order.bytes()};
+  sending_ = {.nonce = order.nonce, .sent = 0, .bytes = BytesToSend(order)};
   AskDatasets(Admin(), order);
 }
 

@@ -18,8 +18,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 constexpr int kNodes = 3;
 
 class SlurmTest : public EndToEndTest {

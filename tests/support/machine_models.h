@@ -13,7 +13,6 @@ inline MachineModel WithoutDelays() {
   machine.combining.run_bytes = 0;
   machine.wake_ups = {.awake = 0, .asleep = 0};
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-  machine.serial_share = 0;
   return machine;
 }
 

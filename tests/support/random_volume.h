@@ -12,10 +12,11 @@ inline constexpr ScalarType kTypes[] = {ScalarType::kUint8, ScalarType::kUint16,
 
 // A volume whose sample at voxel v is value(v), converted to the type.
 template <class Value>
-Volume MakeTestVolume(const Index3& size, ScalarType type, const Value& value) {
+Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const Value& value) {
   Volume volume;
-  volume.description = {{size, {1, 1, 1}}, type, {}};
-  volume.block = MakeVoxelBlock(volume.description.geometry.bounds(), type);
+  volume.description = {geometry, type, {}};
+  volume.block = MakeVoxelBlock(geometry.bounds(), type);
+  const Index3& size = geometry.size;
   VisitScalarType(type, [&]<class T>(const T*) {
     T* sample = volume.block.samples<T>();
     for (std::int32_t z = 0; z < size.z; ++z) {
@@ -25,6 +26,11 @@ Volume MakeTestVolume(const Index3& size, ScalarType type, const Value& value) {
     }
   });
   return volume;
+}
+
+template <class Value>
+Volume MakeTestVolume(const Index3& size, ScalarType type, const Value& value) {
+  return MakeVolume({size}, type, value);
 }
 
 // Integers over the type's whole range, floats in [-1000, 1000).

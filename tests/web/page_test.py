@@ -110,10 +110,22 @@ class PageTest(unittest.TestCase):
         self.programs.run(kind, drawn["options"]["dataset"], "--endpoint", self.endpoint, "-o", "cli.png", *arguments)
         return png_pixels((self.programs.folder / "cli.png").read_bytes())
 
+    def at_the_same_address(self, viewer):
+        """Another tab with what the address of this one says; it is closed at the end."""
+        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
+        self.addCleanup(other.close)
+        return other
+
     def assertSamePixels(self, one, other):
         self.assertEqual(one[:2], other[:2])
         different = sum(a != b for a, b in zip(one[2], other[2]))
         self.assertEqual(different, 0, f"{different} of {len(one[2])} bytes differ")
+
+    def assertFinal(self, viewer, condition):
+        """The lossless picture whose options fulfil a condition (Viewer.final) is that of the command line. Returns it."""
+        drawn = viewer.final(condition)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        return drawn
 
     # ---- the picture
 
@@ -316,8 +328,7 @@ class PageTest(unittest.TestCase):
         viewer.settled()
         drop = "(() => { const d = new DataTransfer(); d.items.add(new File([arguments[0]], 'map.json')); document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"
         viewer.js(drop, json.dumps([{"Name": "mine", "RGBPoints": [0, 0, 0, 1, 200, 1, 1, 0]}]))
-        drawn = viewer.final("Array.isArray(o.transfer) && o.transfer[0].Name === 'mine'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "Array.isArray(o.transfer) && o.transfer[0].Name === 'mine'")
         for text, why in (("{", "map.json"), ('{"a": 1}', "no RGBPoints"), ('[{"RGBPoints": [2,0,0,0,1,1,1,1]}]', "ascend"), ('[{"RGBPoints": [2,0,0]}]', "groups of four")):
             viewer.js(drop, text)
             viewer.until("document.querySelector('.message.error')?.textContent.includes(arguments[0])", why)
@@ -355,8 +366,7 @@ class PageTest(unittest.TestCase):
         field.send_keys("-4", Keys.ENTER)
         viewer.final("/^:11,-4:,/.test(o['clip-box'])")
         viewer.driver.find_element(By.XPATH, "//button[contains(., 'Cut here')]").click()
-        drawn = viewer.final("o['clip-plane'] !== undefined")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o['clip-plane'] !== undefined")
         viewer.save(SHOTS, "clip")
 
     def test_opacity_by_the_gradient(self):
@@ -382,9 +392,8 @@ class PageTest(unittest.TestCase):
         self.assertTrue(0.3 < opacity < 0.7, opacity)
         viewer.save(SHOTS, "gradient")
         viewer.until("location.hash.includes('gradient-opacity=')")
-        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
+        other = self.at_the_same_address(viewer)
         self.assertEqual(other.final("o['gradient-opacity'] !== undefined")["options"], drawn["options"])
-        other.close()
         viewer.focus()
         viewer.keys("k")
         self.assertIn(" --gradient-opacity ", viewer.until("document.querySelector('dialog pre')?.textContent"))
@@ -443,8 +452,7 @@ class PageTest(unittest.TestCase):
         viewer.driver.find_element(By.XPATH, "//button[. = 'Add a region']").click()
         drawn = viewer.final(f"{regions}.length === 3")
         viewer.js("(e => { e.value = '#00ff00'; e.dispatchEvent(new Event('input')); return true; })(document.querySelector('[aria-label=\"Colour of the region\"]'))")
-        drawn = viewer.final(f"{regions}[2].Color.join() === '0,1,0'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        drawn = self.assertFinal(viewer, f"{regions}[2].Color.join() === '0,1,0'")
         self.assertEqual(viewer.js("new Set([...document.querySelectorAll('.joint ~ .button-row button')].map(b => b.offsetTop)).size"), 1, "the buttons stand in one row")
         viewer.save(SHOTS, "regions")
         for theme in ("dark", "light"):
@@ -456,8 +464,7 @@ class PageTest(unittest.TestCase):
         viewer.find("[aria-label='Copy for --transfer']").click()
         copied = viewer.until("window.copied[0]")
         viewer.js("new Promise(done => setTimeout(done, 300))")
-        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
-        self.addCleanup(other.close)
+        other = self.at_the_same_address(viewer)
         self.assertEqual(other.final(f"{regions}?.length === 3")["options"], drawn["options"])
         viewer.focus()
         self.assertEqual(json.loads(copied)[0]["Regions"], drawn["options"]["transfer"][0]["Regions"])
@@ -489,8 +496,7 @@ class PageTest(unittest.TestCase):
         preset = "[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'ct-bone-2d'))"
         viewer.js(f"{choose}({renderer})", "mip")
         viewer.js(f"{choose}({preset})", "ct-bone-2d")
-        drawn = viewer.final("o.transfer === 'ct-bone-2d' && o.renderer === 'raycast'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.transfer === 'ct-bone-2d' && o.renderer === 'raycast'")
         viewer.until("document.querySelectorAll('.joint .region').length === 2 && !document.querySelector('.joint').parentElement.hidden")
         viewer.until("location.hash.includes('transfer=ct-bone-2d')")
         viewer.find(switch).click()
@@ -514,28 +520,23 @@ class PageTest(unittest.TestCase):
         viewer.save(SHOTS, "labels")
         # Of highlights, those that do not show leave the volume as it is; names do as well as numbers.
         viewer.driver.find_element(By.XPATH, "//input[@value = 'highlight']").click()
-        drawn = viewer.final("o['label-mode'] === 'highlight' && o['label-tint'] === 0.5")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o['label-mode'] === 'highlight' && o['label-tint'] === 0.5")
         field = viewer.driver.find_element(By.XPATH, "//div[label[. = 'Shown']]/input")
         field.clear()
         field.send_keys("m*,3", Keys.ENTER)
-        drawn = viewer.final("o['labels-shown'] === 'm*,3'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o['labels-shown'] === 'm*,3'")
         viewer.find("[data-label='2'] input[type=checkbox]").click()
-        drawn = viewer.final("o['labels-shown'] === '3'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o['labels-shown'] === '3'")
         viewer.save(SHOTS, "labels-highlight")
         viewer.open_section("Isosurfaces")
         viewer.driver.find_element(By.XPATH, "//button[contains(., 'Add a surface')]").click()
-        drawn = viewer.final("o.isovalue !== undefined && o.transfer === undefined")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.isovalue !== undefined && o.transfer === undefined")
         viewer.open_section("Light")
         viewer.driver.find_element(By.XPATH, "//div[@class='button-row']/button[. = 'Left']").click()
         viewer.final("o.light && o.light.length === 1")
         for renderer in ("mip", "zbuffer", "splat", "shear"):
             viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'mip')))", renderer)
-            drawn = viewer.final(f"o.renderer === '{renderer}'")
-            self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+            self.assertFinal(viewer, f"o.renderer === '{renderer}'")
 
     def test_the_cells_of_a_grid_are_offered_where_there_are_any(self):
         renderers = "[...[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'shear')).options].map(o => o.value)"
@@ -553,8 +554,7 @@ class PageTest(unittest.TestCase):
         self.assertEqual(viewer.js(renderers)[0], "auto")
         self.assertFalse(viewer.js(f"{light}.querySelector('.button-row').hidden"), "cells are lit, too")
         viewer.js("(s => { s.value = 'slice'; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'slice')))")
-        drawn = viewer.final("o.renderer === 'slice' && o['sampling-rate'] === '2'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.renderer === 'slice' && o['sampling-rate'] === '2'")
         viewer.save(SHOTS, "grid")
 
     def test_each_renderer_shows_what_it_has(self):
@@ -571,14 +571,12 @@ class PageTest(unittest.TestCase):
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.save(SHOTS, "radiograph")
         viewer.until("location.hash.includes('energy=90') && location.hash.includes('polarity=dark-bone')")
-        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
+        other = self.at_the_same_address(viewer)
         self.assertEqual(other.final("o.energy === '90'")["options"], drawn["options"])
-        other.close()
         viewer.focus()
         control("Renderer").find_element(By.XPATH, "option[. = 'Multi-pass shears']").click()
         control("Kernel").find_element(By.XPATH, "option[. = 'B spline']").click()
-        drawn = viewer.final("o.renderer === 'shear' && o.kernel === 'b-spline' && o.energy === undefined")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.renderer === 'shear' && o.kernel === 'b-spline' && o.energy === undefined")
         self.assertFalse(viewer.js(f"{section}.hidden"))
         wrong = self.viewer(renderer="xray", energy="1e9", polarity="both")
         options = wrong.settled()["options"]
@@ -600,8 +598,7 @@ class PageTest(unittest.TestCase):
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         for name, value in (("from", "20"), ("to", "150")):
             viewer.find(f"[aria-label='Overlay {name}']").send_keys(value, Keys.ENTER)
-        drawn = viewer.final("o['overlay-range'] === '20:150'")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o['overlay-range'] === '20:150'")
         viewer.save(SHOTS, "overlay")
 
     def test_lengths_have_the_unit_of_the_file(self):
@@ -672,8 +669,7 @@ class PageTest(unittest.TestCase):
         self.addCleanup(viewer.close)
         viewer.settled()
         viewer.drag(40, 10)
-        drawn = viewer.final("o.azimuth !== 180")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.azimuth !== 180")
         viewer.until("document.querySelector('.facts dd') !== null")
         viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
         viewer.open_section("Layers")
@@ -840,8 +836,7 @@ class PageTest(unittest.TestCase):
         self.assertAlmostEqual(far, geometry["pixel_size"] * 120, delta=0.5 * SPACING)
         viewer.save(SHOTS, "measure")
         viewer.until("(location.hash.match(/distance:/g) ?? []).length === 2")
-        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
-        self.addCleanup(other.close)
+        other = self.at_the_same_address(viewer)
         other.settled()
         other.until("document.querySelectorAll('[data-measure]').length === 3 && document.querySelectorAll('[data-pane=\"3d\"] .measure').length === 3")
         self.assertEqual(float(other.js("document.querySelectorAll('[data-measure=distance] .measure-text')[1].textContent").split()[0]), far)
@@ -953,8 +948,7 @@ class PageTest(unittest.TestCase):
             document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"""
         data = (self.programs.folder / "o.nrrd").read_bytes()
         viewer.js(drop, base64.b64encode(data).decode(), "my brain.nrrd")
-        drawn = viewer.final("o.dataset === 'my_brain' && o['look-at'] !== undefined")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.dataset === 'my_brain' && o['look-at'] !== undefined")
         viewer.until("document.querySelector('.dataset select').value === 'my_brain' && document.querySelector('.sending').hidden")
         viewer.save(SHOTS, "dropped")
         viewer.js(drop, base64.b64encode(b"nothing").decode(), "notes.txt")
@@ -1255,8 +1249,7 @@ class PageTest(unittest.TestCase):
         viewer.driver.execute_script("window.drawn.length = 0")
         for _ in range(12):
             viewer.drag(20, 3, steps=2)
-        drawn = viewer.final("Math.abs(o.azimuth - 84) < 0.01")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        drawn = self.assertFinal(viewer, "Math.abs(o.azimuth - 84) < 0.01")
         self.assertGreater(drawn["header"]["statistics"]["round_trip_ms"], 150)
 
     def test_it_connects_again(self):
@@ -1305,8 +1298,7 @@ class PageTest(unittest.TestCase):
         viewer.until("document.querySelector('.worker[data-state=lost]') !== null")
         self.assertSamePixels(viewer.pixels(), picture)
         viewer.drag(30, 0)
-        drawn = viewer.final("o.azimuth < 180")
-        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(viewer, "o.azimuth < 180")
         viewer.save(SHOTS, "worker-lost")
 
     def test_the_service_ends_and_comes_back(self):

@@ -7,10 +7,7 @@
 namespace slabstream {
 namespace {
 
-using std::chrono::milliseconds;
 using testing::Each;
-using testing::IsEmpty;
-using testing::SizeIs;
 using testing::VariantWith;
 
 class DisplayWorkerTest : public WorkerMachineTest {};

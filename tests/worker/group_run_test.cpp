@@ -120,6 +120,21 @@ class Cluster {
   std::size_t messages_sent_ = 0;
 };
 
+// The images of which its group image consists; that of a message has no handle.
+void ReleaseGroupImage(Worker& worker) {
+  std::set<ImageHandle> images;
+  for (const ImagePiece& piece : worker.group_image->pieces) images.insert(piece.image);
+  images.erase(0);
+  for (const ImageHandle image : images) worker.images.Release(image);
+}
+
+void ExpectNothingLeft(Cluster& cluster) {
+  for (Worker& worker : cluster.workers()) {
+    EXPECT_TRUE(worker.run->finished());
+    EXPECT_EQ(worker.images.size(), 0U);
+  }
+}
+
 GroupAssignment MakeAssignment(Rank ranks, const std::string& combining, Rank root) {
   GroupAssignment assignment;
   assignment.epoch = 5;
@@ -169,14 +184,8 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       std::multiset<Rank> reported;
       for (const RankReport& report : display.group_image->reports) reported.insert(report.rank);
       EXPECT_EQ(reported, std::multiset<Rank>(all.begin(), all.end()));
-      std::set<ImageHandle> handed_over;
-      for (const ImagePiece& piece : display.group_image->pieces) handed_over.insert(piece.image);
-      handed_over.erase(0);
-      for (const ImageHandle image : handed_over) display.images.Release(image);
-      for (Worker& worker : cluster.workers()) {
-        EXPECT_TRUE(worker.run->finished());
-        EXPECT_EQ(worker.images.size(), 0U);
-      }
+      ReleaseGroupImage(display);
+      ExpectNothingLeft(cluster);
     }
   }
 }
@@ -223,15 +232,10 @@ TEST(GroupRun, EveryScheduleGivesEachDisplayItsShare) {
         }
         EXPECT_EQ(pixels, PixelCount(Share(kFrame, share, roots.size())));
         for (const RankReport& report : display.group_image->reports) reported.insert(report.rank);
-        std::set<ImageHandle> handed_over;
-        for (const ImagePiece& piece : display.group_image->pieces) handed_over.insert(piece.image);
-        for (const ImageHandle image : handed_over) display.images.Release(image);
+        ReleaseGroupImage(display);
       }
       EXPECT_EQ(reported, std::multiset<Rank>(all.begin(), all.end()));
-      for (Worker& worker : cluster.workers()) {
-        EXPECT_TRUE(worker.run->finished());
-        EXPECT_EQ(worker.images.size(), 0U);
-      }
+      ExpectNothingLeft(cluster);
     }
   }
 }
@@ -251,12 +255,7 @@ TEST(GroupRun, DropReleasesWhateverItHolds) {
       for (Worker& worker : cluster.workers()) {
         WorkerActions actions;
         worker.run->Drop(actions);
-        std::set<ImageHandle> images;  // a taken group image is no longer the run's
-        if (worker.group_image) {
-          for (const ImagePiece& piece : worker.group_image->pieces) images.insert(piece.image);
-        }
-        images.erase(0);
-        for (const ImageHandle image : images) worker.images.Release(image);
+        if (worker.group_image) ReleaseGroupImage(worker);  // it is no longer the run's
         for (const WorkerAction& action : actions) worker.images.Release(std::get<ReleaseImage>(action).image);
         EXPECT_EQ(worker.images.size(), 0U) << scheme.name << ", trial " << trial;
       }

@@ -8,10 +8,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 class HiddenTilesTest : public WorkerMachineTest {
  protected:
   // Of a frame that may leave out what is hidden.

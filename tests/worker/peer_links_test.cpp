@@ -8,12 +8,6 @@
 namespace slabstream {
 namespace {
 
-using std::chrono::milliseconds;
-using std::chrono::seconds;
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 constexpr std::uint64_t kHere = 7, kElsewhere = 8;  // memory scopes
 
 class PeerLinksTest : public WorkerMachineTest {

@@ -13,10 +13,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 class RenderTurnsTest : public WorkerMachineTest {
  protected:
   // One box of a frame of this client, of a dataset of its own unless it is given.

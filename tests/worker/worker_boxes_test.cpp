@@ -13,12 +13,8 @@
 namespace slabstream {
 namespace {
 
-using std::chrono::seconds;
-using testing::ElementsAre;
-using testing::IsEmpty;
 using testing::Le;
 using testing::Not;
-using testing::SizeIs;
 
 class WorkerBoxesTest : public WorkerMachineTest {
  public:

@@ -9,10 +9,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 class WorkerGroupsTest : public WorkerMachineTest {};
 
 TEST_F(WorkerGroupsTest, RendersOneRankAtATimeInOrderOfFrameAndGroup) {

@@ -1,15 +1,23 @@
 // What tests of the worker machine have in common. They are scripted events: what it does about each, in each state.
 #pragma once
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <vector>
 
 #include "worker/machine/worker_machine.h"
 
 namespace slabstream {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
 
 inline constexpr Epoch kEpoch = 77;
 inline constexpr WorkerId kSelf = 3, kPeer = 4;
@@ -149,7 +157,7 @@ class WorkerMachineTest : public testing::Test {
   }
 
   std::optional<WorkerMachine> machine;
-  Time now{std::chrono::seconds(100)};
+  Time now{seconds(100)};
 };
 
 }  // namespace slabstream

@@ -7,12 +7,6 @@
 namespace slabstream {
 namespace {
 
-using std::chrono::milliseconds;
-using std::chrono::seconds;
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::SizeIs;
-
 class WorkerRegistrationTest : public WorkerMachineTest {};
 
 TEST_F(WorkerRegistrationTest, RegistersUntilWelcome) {

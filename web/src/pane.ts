@@ -2,16 +2,12 @@
 import { Drawing } from "./annotations";
 import { h, put } from "./dom";
 import { LevelBadge } from "./level_badge";
-import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
+import { type Frame, Session, type SessionEvents, type View } from "./session";
 import type { Shown } from "./shown";
 
-export interface PaneEvents {
+export interface PaneEvents extends Omit<SessionEvents, "frame"> {
   drawn?(shown: Shown): void;
   resized?(): void;
-  status?(status: ServiceStatus): void;
-  progress?(progress: Progress): void;
-  error?(message: string): void;
-  connection?(state: Connection, reason: string): void;
 }
 
 const LEAST_SIDE = 16, MOST_SIDE = 8192;

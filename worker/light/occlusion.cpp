@@ -13,6 +13,7 @@
 
 #include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
+#include "common/volume/indices.h"
 #include "worker/light/exponential-inl.h"
 
 #ifndef SLABSTREAM_WORKER_LIGHT_OCCLUSION_CPP_  // shared by all instruction sets
@@ -172,20 +173,16 @@ std::array<Way, 26> WaysOf(const PaddedExtinction& extinction, const Vec3& spaci
   constexpr std::array<double, 3> kWeights = {1.0 / 21, 4.0 / 105, 9.0 / 280};
   std::array<Way, 26> ways;
   std::size_t number = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        const int axes = std::abs(x) + std::abs(y) + std::abs(z);
-        if (axes == 0) continue;
-        const double step = Length(Vec3{double(x), double(y), double(z)} * spacing);
-        const auto count = std::clamp(std::int32_t(std::lround(radius / step)), 1, kMostOcclusionSteps);
-        // A way of a whole number of steps stands for one of the radius.
-        ways[number++] = {.stride = z * extinction.slice + y * extinction.row + x,
-                          .count = count,
-                          .step = float(std::min(radius / count, 2 * step)),
-                          .weight = float(kWeights[std::size_t(axes) - 1])};
-      }
-    }
+  for (const Index3& to : IndicesIn(Box{Uniform(-1), Uniform(2)})) {
+    const int axes = std::abs(to.x) + std::abs(to.y) + std::abs(to.z);
+    if (axes == 0) continue;
+    const double step = Length(ToVec3(to) * spacing);
+    const auto count = std::clamp(std::int32_t(std::lround(radius / step)), 1, kMostOcclusionSteps);
+    // A way of a whole number of steps stands for one of the radius.
+    ways[number++] = {.stride = to.z * extinction.slice + to.y * extinction.row + to.x,
+                      .count = count,
+                      .step = float(std::min(radius / count, 2 * step)),
+                      .weight = float(kWeights[std::size_t(axes) - 1])};
   }
   return ways;
 }

@@ -155,8 +155,8 @@ void WorkerService::Impl::Run() {
     });
   }
   executor.reset();
+  stopped = true;  // first: who waits to be registered reads why it ended
   SetRegistered();
-  stopped = true;
   stopped.notify_all();
 }
 

@@ -22,19 +22,17 @@ double Extinction(const CostBasis& basis) {
 
 // The time of a box is that of the pixels that it covers and of their shaded samples. Of isosurfaces alone, voxels are read where a surface
 // passes through: in cells that are drawn in part. Rays leap through the others.
-class RaycastCost : public AnalyticCost {
- public:
-  explicit RaycastCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters, kSamplesAVoxel)) {
-    const double extinction = Extinction(basis);
-    opaque_depth_ = kEnd / std::max(extinction, 1e-9);
-    surfaces_alone_ = !(extinction > 0) && !basis.transfer->isosurfaces.empty();
-  }
-
-  double Seconds(const Box& box, const CostView& view) const override {
+AnalyticCost CostOf(const CostBasis& basis) {
+  constexpr double kEnd = 6.9;  // -ln of the transmittance at which rays end by default, 1/1024
+  const double extinction = Extinction(basis);
+  const double opaque_depth = kEnd / std::max(extinction, 1e-9);  // voxel lengths of material after which rays end
+  const bool surfaces_alone = !(extinction > 0) && !basis.transfer->isosurfaces.empty();
+  const double sampling_rate = SamplingRateOf(basis.parameters, kSamplesAVoxel);
+  return [=, &drawn = *basis.drawn](const Box& box, const CostView& view) {
     // Columns of cells along the view: material behind opaque material is not sampled.
     const auto [c, u, v] = AxesOf(view.along);
     const CellsAlong along(box, c), across_u(box, u), across_v(box, v);
-    const Index3 cells = OccupancyCells(drawn_.size);
+    const Index3 cells = OccupancyCells(drawn.size);
     constexpr double kCellArea = double(kOccupancyCell) * kOccupancyCell;
     double depths = 0, covered = 0;  // voxel lengths of sampled material, and rays, at a pixel a voxel
     Index3 cell;
@@ -42,34 +40,26 @@ class RaycastCost : public AnalyticCost {
       for (cell[u] = across_u.begin; cell[u] < across_u.end; ++cell[u]) {
         double depth = 0;  // voxel lengths of material
         for (cell[c] = along.begin; cell[c] < along.end; ++cell[c]) {
-          const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
-          if (!surfaces_alone_) {
+          const std::uint32_t voxels = drawn.cells[NumberIn(cells, cell)].voxels;
+          if (!surfaces_alone) {
             depth += along.ShareInside(cell[c]) * voxels / kCellArea;
           } else if (voxels != 0) {
-            const bool full = voxels == OccupancyCellBox(cell, drawn_.size).voxel_count();
+            const bool full = voxels == OccupancyCellBox(cell, drawn.size).voxel_count();
             depth += along.ShareInside(cell[c]) * (full ? 1 : kOccupancyCell);
           }
         }
         if (depth <= 0) continue;
         const double area = kCellArea * across_u.ShareInside(cell[u]) * across_v.ShareInside(cell[v]);
-        depths += area * std::min(depth, opaque_depth_);
+        depths += area * std::min(depth, opaque_depth);
         covered += area;
       }
     }
-    if (covered <= 0) return 0;
+    if (covered <= 0) return 0.0;
     namespace cost = calibration::raycast;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return cost::kBox + pixels * (cost::kPixel * covered + cost::kSample * sampling_rate_ * depths);
-  }
-
- private:
-  static constexpr double kEnd = 6.9;  // -ln of the transmittance at which rays end by default, 1/1024
-
-  const OccupancyGrid& drawn_;
-  const double sampling_rate_;
-  double opaque_depth_;  // voxel lengths of material after which rays end
-  bool surfaces_alone_;
-};
+    return cost::kBox + pixels * (cost::kPixel * covered + cost::kSample * sampling_rate * depths);
+  };
+}
 
 class RaycastKind : public RendererKind {
  public:
@@ -94,7 +84,7 @@ class RaycastKind : public RendererKind {
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);
   }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<RaycastCost>(basis); }
+  AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
 };
 
 }  // namespace

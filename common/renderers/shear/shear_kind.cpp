@@ -12,32 +12,24 @@ namespace slabstream::shear {
 namespace {
 
 // Every beam near drawn voxels is resampled, even if it is hidden: time grows with cells that are drawn at all, and with pixels.
-class ShearCost : public AnalyticCost {
- public:
-  explicit ShearCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
-    if (basis.parameters.size() > kSupersampling) supersampling_ = SupersamplingOf(basis.parameters);
-  }
-
-  double Seconds(const Box& box, const CostView& view) const override {
-    double resampled = 0, drawn = 0;  // voxels
-    const Index3 cells = OccupancyCells(drawn_.size);
+AnalyticCost CostOf(const CostBasis& basis) {
+  const double sampling_rate = SamplingRateOf(basis.parameters);
+  const double supersampling = basis.parameters.size() > kSupersampling ? SupersamplingOf(basis.parameters) : 1;
+  return [=, &drawn = *basis.drawn](const Box& box, const CostView& view) {
+    double resampled = 0, shown = 0;  // voxels
+    const Index3 cells = OccupancyCells(drawn.size);
     VisitCells(box, [&](const Index3& cell, double inside) {
-      const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
+      const std::uint32_t voxels = drawn.cells[NumberIn(cells, cell)].voxels;
       if (voxels == 0) return;
-      resampled += inside * double(OccupancyCellBox(cell, drawn_.size).voxel_count());
-      drawn += inside * voxels;
+      resampled += inside * double(OccupancyCellBox(cell, drawn.size).voxel_count());
+      shown += inside * voxels;
     });
-    if (drawn <= 0) return 0;
+    if (shown <= 0) return 0.0;
     namespace cost = calibration::shear;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return cost::kBox + pixels * (cost::kResample * resampled * supersampling_ + cost::kSample * sampling_rate_ * drawn);
-  }
-
- private:
-  const OccupancyGrid& drawn_;
-  const double sampling_rate_;
-  double supersampling_ = 1;
-};
+    return cost::kBox + pixels * (cost::kResample * resampled * supersampling + cost::kSample * sampling_rate * shown);
+  };
+}
 
 class ShearKind : public RendererKind {
  public:
@@ -59,7 +51,7 @@ class ShearKind : public RendererKind {
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);
   }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<ShearCost>(basis); }
+  AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
 };
 
 }  // namespace

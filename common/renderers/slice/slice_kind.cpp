@@ -1,5 +1,5 @@
 // The planning half of slicing: the frame is the picture, supersampled where it is minified; images blend front to back.
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include "common/calibration/calibration.h"
@@ -15,40 +15,32 @@ constexpr double kPlanes = 8;
 
 // Every tetrahedron that may show is cut, even if it is hidden: time grows with their number and with samples in drawn voxels of the
 // lattice. Those of a brick lie evenly in its voxels, as far as is known.
-class SliceCost : public AnalyticCost {
- public:
-  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters, kPlanes)) {
-    const VolumeSummary& summary = *basis.summary;
-    const Index3 cells = OccupancyCells(drawn_.size);
-    tetrahedra_.resize(drawn_.cells.size());
-    static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
-    for (std::size_t i = 0; i < tetrahedra_.size() && !summary.cells.empty(); ++i) {
-      const Index3 brick = kOccupancyCell * PlaceIn(cells, i) / kBrick;
-      const Box voxels = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary.description.geometry.bounds());
-      const double each = double(summary.cells[NumberIn(summary.brick_counts, brick)]) / double(voxels.voxel_count());
-      tetrahedra_[i] = float(each * drawn_.cells[i].voxels);
-    }
+AnalyticCost CostOf(const CostBasis& basis) {
+  const OccupancyGrid& drawn = *basis.drawn;
+  const VolumeSummary& summary = *basis.summary;
+  const Index3 cells = OccupancyCells(drawn.size);
+  std::vector<float> tetrahedra(drawn.cells.size());  // by cell of `drawn`: those that may show
+  static_assert(kBrick % kOccupancyCell == 0, "a cell lies in one brick");
+  for (std::size_t i = 0; i < tetrahedra.size() && !summary.cells.empty(); ++i) {
+    const Index3 brick = kOccupancyCell * PlaceIn(cells, i) / kBrick;
+    const Box voxels = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary.description.geometry.bounds());
+    const double each = double(summary.cells[NumberIn(summary.brick_counts, brick)]) / double(voxels.voxel_count());
+    tetrahedra[i] = float(each * drawn.cells[i].voxels);
   }
-
-  double Seconds(const Box& box, const CostView& view) const override {
-    double drawn = 0, tetrahedra = 0;  // voxels of the lattice
-    const Index3 cells = OccupancyCells(drawn_.size);
+  const double sampling_rate = SamplingRateOf(basis.parameters, kPlanes);
+  return [=, &drawn, tetrahedra = std::move(tetrahedra)](const Box& box, const CostView& view) {
+    double voxels = 0, cut = 0;  // of the lattice; tetrahedra
     VisitCells(box, [&](const Index3& cell, double inside) {
       const std::size_t number = NumberIn(cells, cell);
-      drawn += inside * drawn_.cells[number].voxels;
-      tetrahedra += inside * double(tetrahedra_[number]);
+      voxels += inside * drawn.cells[number].voxels;
+      cut += inside * double(tetrahedra[number]);
     });
-    if (drawn <= 0) return 0;
+    if (voxels <= 0) return 0.0;
     namespace cost = calibration::slice;
     const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    return cost::kBox + tetrahedra * cost::kTetrahedron + drawn * pixels * cost::kSample * sampling_rate_;
-  }
-
- private:
-  const OccupancyGrid& drawn_;
-  std::vector<float> tetrahedra_;  // by cell of `drawn_`: those that may show
-  const double sampling_rate_;
-};
+    return cost::kBox + cut * cost::kTetrahedron + voxels * pixels * cost::kSample * sampling_rate;
+  };
+}
 
 class SliceKind : public RendererKind {
  public:
@@ -60,7 +52,7 @@ class SliceKind : public RendererKind {
                       .stages = {Stage::kTransform, Stage::kSample},
                       .parameters = {SamplingRate(kPlanes)}}) {}
 
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SliceCost>(basis); }
+  AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/calibration/calibration.h"
+#include "common/renderers/splat/splat_work.h"
 
 namespace slabstream::splat {
 double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& summary) {
@@ -34,20 +35,21 @@ double MedianExtinction(const TransferFunction& transfer, const VolumeSummary& s
   return 0;
 }
 
-// Counts are for one pixel a voxel. The number of rows and the length of segments both grow with the scale.
-double SplatCost::SecondsAlong(const Box& box, Axis along, double scale) const {
-  const SplatCounts counts = work_.Count(box, along);
-  if (counts.rows == 0) return 0;
-  namespace cost = calibration::splat;
-  return cost::kBox + cost::kSlice * counts.slices +
-         scale * (cost::kRow * counts.rows + scale * cost::kSegment * counts.segments + cost::kRun * counts.runs) +
-         cost::kOctet * counts.octets;
-}
-
-double SplatCost::Seconds(const Box& box, const CostView& view) const {
-  const double scale = std::clamp(view.pixels_per_voxel, kMinGridPixelsPerVoxel, kMaxGridPixelsPerVoxel);
-  if (view.along != Axis::kZ) return SecondsAlong(box, view.along, scale);
-  return (SecondsAlong(box, Axis::kX, scale) + SecondsAlong(box, Axis::kY, scale)) / 2;  // lines along z are not known
+AnalyticCost SplatCost(const OccupancyGrid& drawn, const Vec3& spacing, double extinction) {
+  return [work = SplatWork(drawn, spacing, extinction)](const Box& box, const CostView& view) {
+    const double scale = std::clamp(view.pixels_per_voxel, kMinGridPixelsPerVoxel, kMaxGridPixelsPerVoxel);
+    // Counts are for one pixel a voxel. The number of rows and the length of segments both grow with the scale.
+    const auto seconds_along = [&](Axis axis) {
+      const SplatCounts counts = work.Count(box, axis);
+      if (counts.rows == 0) return 0.0;
+      namespace cost = calibration::splat;
+      return cost::kBox + cost::kSlice * counts.slices +
+             scale * (cost::kRow * counts.rows + scale * cost::kSegment * counts.segments + cost::kRun * counts.runs) +
+             cost::kOctet * counts.octets;
+    };
+    if (view.along != Axis::kZ) return seconds_along(view.along);
+    return (seconds_along(Axis::kX) + seconds_along(Axis::kY)) / 2;  // lines along z are not known
+  };
 }
 
 }  // namespace slabstream::splat

@@ -41,7 +41,9 @@ class SplatKind : public RendererKind {
     setup.sheets = MakeSheetGrid(setup.camera, geometry, setup.parameters.front());
     return CheckGrid(setup.sheets);
   }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SplatCost>(basis); }
+  AnalyticCost MakeCost(const CostBasis& basis) const override {
+    return SplatCost(*basis.drawn, basis.summary->description.geometry.spacing, MedianExtinction(*basis.transfer, *basis.summary));
+  }
 };
 
 }  // namespace

@@ -12,33 +12,27 @@ namespace slabstream::zbuffer {
 namespace {
 
 // The time of a box is that of the cells through which surfaces pass, and of its pixels.
-class ZBufferCost : public AnalyticCost {
- public:
-  explicit ZBufferCost(const OccupancyGrid& drawn) : drawn_(drawn) {}
-
-  double Seconds(const Box& box, const CostView& view) const override {
-    const Index3 cells = OccupancyCells(drawn_.size);
+AnalyticCost CostOf(const CostBasis& basis) {
+  return [&drawn = *basis.drawn](const Box& box, const CostView& view) {
+    const Index3 cells = OccupancyCells(drawn.size);
     double surface_cells = 0;
     Box hull;  // of the cells that hold anything
     VisitCells(box, [&](const Index3& cell, double inside) {
-      const std::uint32_t voxels = drawn_.cells[NumberIn(cells, cell)].voxels;
+      const std::uint32_t voxels = drawn.cells[NumberIn(cells, cell)].voxels;
       if (voxels == 0) return;
-      const Box whole = OccupancyCellBox(cell, drawn_.size);
+      const Box whole = OccupancyCellBox(cell, drawn.size);
       hull = Hull(hull, Intersection(whole, box));
       if (voxels != whole.voxel_count()) surface_cells += inside;  // else no surface is inside
     });
-    if (hull.empty()) return 0;
+    if (hull.empty()) return 0.0;
     // The area of the hull's projection at a small elevation, on average over all azimuths: the mean of |cos| and |sin| is 2 / pi, and a
     // third of what lies flat is seen.
     const Index3 size = hull.size();
     const double width = 0.64 * (size.x + size.y), pixels = width * (size.z + width / 3);
     namespace cost = calibration::zbuffer;
     return cost::kBox + cost::kSurfaceCell * surface_cells + cost::kPixel * pixels * view.pixels_per_voxel * view.pixels_per_voxel;
-  }
-
- private:
-  const OccupancyGrid& drawn_;
-};
+  };
+}
 
 class ZBufferKind : public RendererKind {
  public:
@@ -67,7 +61,7 @@ class ZBufferKind : public RendererKind {
     table.max_opacity = *std::ranges::max_element(table.opacity);
     return table;
   }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<ZBufferCost>(*basis.drawn); }
+  AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
     const bool by_depth = setup.shading.model == ShadingModel::kDepthGradient;

@@ -21,21 +21,13 @@ std::vector<FrameCase> ClaimedFrames(const PaperSetup& setup) {
 
 }  // namespace
 
-std::vector<Trial> ClaimTrials(const PaperSetup& setup) {
-  std::vector<Trial> trials;
-  for (const FrameCase& frame : ClaimedFrames(setup)) {
-    trials.push_back(BoxCostTrial(setup.context(), frame));
-    trials.push_back(FinishTrial(setup.context(), frame));
-  }
-  return trials;
-}
+std::vector<Trial> ClaimTrials(const PaperSetup& setup) { return setup.TrialsOf(ClaimedFrames(setup)); }
 
 void AddClaims(const PaperSetup& setup, Results& results) {
   const MachineModel machine = setup.Machines(Splatting()).front();  // any: what is sent does not depend on it
   for (const FrameCase& frame : ClaimedFrames(setup)) {
     const MeasuredFrame measured = Recall(setup.context(), frame);
-    Json of = {{"part", "claims"}};
-    of.update(ColumnsOf(frame));
+    Json of = ColumnsOf(frame, {{"part", "claims"}});
     const auto add = [&](const char* variant, const char* metric, double value, Origin origin) {
       of["variant"] = variant;
       results.Add(of, metric, value, origin);

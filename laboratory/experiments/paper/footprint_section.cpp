@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "laboratory/experiments/paper/setup.h"
@@ -56,14 +57,11 @@ std::vector<FrameCase> WorkerFrames(const PaperSetup& setup) {
 
 // Of the slab that takes longest. The paper's splatting stage turns voxels into pixels of sheets; ours also finds where these pixels are.
 std::vector<double> SlowestSplat(const PaperSetup& setup, const FrameCase& frame) {
-  std::vector<double> slowest;
-  for (const MeasuredFrame& repeat : RecallRepeats(setup.context(), frame)) {
-    double& most = slowest.emplace_back(0);
-    for (const MeasuredFrame::Cost& box : repeat.boxes) {
-      most = std::max(most, box.stage_seconds[std::size_t(Stage::kTransform)] + box.stage_seconds[std::size_t(Stage::kSplat)]);
-    }
-  }
-  return slowest;
+  const auto splat = [](const MeasuredFrame::Cost& box) {
+    return box.stage_seconds[std::size_t(Stage::kTransform)] + box.stage_seconds[std::size_t(Stage::kSplat)];
+  };
+  return EachOf(RecallRepeats(setup.context(), frame),
+                [&](const MeasuredFrame& repeat) { return std::ranges::max(EachOf(repeat.boxes, splat)); });
 }
 
 }  // namespace
@@ -71,17 +69,13 @@ std::vector<double> SlowestSplat(const PaperSetup& setup, const FrameCase& frame
 std::vector<Trial> FootprintTrials(const PaperSetup& setup) {
   std::vector<Trial> trials;
   for (const SliceCase& slice : SlicesOf(setup)) trials.push_back(Measure(slice));
-  for (const FrameCase& frame : WorkerFrames(setup)) {
-    trials.push_back(BoxCostTrial(setup.context(), frame));
-    trials.push_back(FinishTrial(setup.context(), frame));
-  }
+  std::ranges::move(setup.TrialsOf(WorkerFrames(setup)), std::back_inserter(trials));
   return trials;
 }
 
 void AddFootprint(const PaperSetup& setup, Results& results) {
   for (const FrameCase& frame : WorkerFrames(setup)) {
-    Json of = {{"part", "splat over workers"}};
-    of.update(ColumnsOf(frame));
+    Json of = ColumnsOf(frame, {{"part", "splat over workers"}});
     of["stage"] = "transform and splat";
     results.Add(of, "run_time", SlowestSplat(setup, frame), Origin::kMeasured);
   }

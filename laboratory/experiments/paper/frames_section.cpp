@@ -65,8 +65,7 @@ void Add(const PaperSetup& setup, const Asked& asked, const std::vector<MachineM
     counts["covered pixels of the worker that renders longest"].push_back(longest.covered_pixels);
   }
 
-  Json of = {{"part", "frames"}, {"variant", images == Images::kWhole ? "whole images" : "without empty pixels"}, {"link", "paper"}};
-  of.update(ColumnsOf(frame));
+  Json of = ColumnsOf(frame, {{"part", "frames"}, {"variant", NameOf(images)}, {"link", "paper"}});
   const Origin origin = frame.workers > 1 ? Origin::kSimulated : Origin::kMeasured;
   for (const auto& [metric, values] : figures) results.Add(of, metric, values, origin);
   if (images != Images::kWhole || frame.policy.combine != EqualSlabs().policy.combine) return;  // the rest is that of any images and scheme
@@ -87,12 +86,9 @@ void Add(const PaperSetup& setup, const Asked& asked, const std::vector<MachineM
 }  // namespace
 
 std::vector<Trial> FrameTrials(const PaperSetup& setup) {
-  std::vector<Trial> trials;
-  for (const Asked& asked : Frames(setup)) {
-    trials.push_back(BoxCostTrial(setup.context(), asked.frame));
-    trials.push_back(FinishTrial(setup.context(), asked.frame));
-  }
-  return trials;
+  std::vector<FrameCase> frames;
+  for (const Asked& asked : Frames(setup)) frames.push_back(asked.frame);
+  return setup.TrialsOf(frames);
 }
 
 void AddFrames(const PaperSetup& setup, Results& results) {

@@ -35,30 +35,15 @@ double HeldCells(const MeshCutter& cells, const FramePlan& plan) {
 
 }  // namespace
 
-std::vector<Trial> GridTrials(const PaperSetup& setup) {
-  std::vector<Trial> trials;
-  for (const FrameCase& frame : GridFrames(setup)) {
-    trials.push_back(BoxCostTrial(setup.context(), frame));
-    trials.push_back(FinishTrial(setup.context(), frame));
-  }
-  return trials;
-}
+std::vector<Trial> GridTrials(const PaperSetup& setup) { return setup.TrialsOf(GridFrames(setup)); }
 
 void AddGrids(const PaperSetup& setup, Results& results) {
   for (const FrameCase& frame : GridFrames(setup)) {
     const std::vector<MeasuredFrame> repeats = RecallRepeats(setup.context(), frame);
-    Json of = {{"part", "grids"}};
-    of.update(ColumnsOf(frame));
-    std::vector<double> sum, longest, imbalance;
-    for (const MeasuredFrame& repeat : repeats) {
-      const std::vector<double> seconds = repeat.WorkerSeconds();
-      sum.push_back(repeat.RenderSeconds());
-      longest.push_back(std::ranges::max(seconds));
-      imbalance.push_back(Imbalance(seconds));
-    }
-    results.Add(of, "render_time", sum, Origin::kMeasured);
-    results.Add(of, "longest_render_time", longest, Origin::kMeasured);
-    results.Add(of, "imbalance", imbalance, Origin::kMeasured);
+    Json of = ColumnsOf(frame, {{"part", "grids"}});
+    results.Add(of, "render_time", EachOf(repeats, &MeasuredFrame::RenderSeconds), Origin::kMeasured);
+    results.Add(of, "longest_render_time", EachOf(repeats, &MeasuredFrame::LongestSeconds), Origin::kMeasured);
+    results.Add(of, "imbalance", EachOf(repeats, &MeasuredFrame::ImbalanceOfWorkers), Origin::kMeasured);
     const std::shared_ptr<const Mesh> mesh = setup.context().volumes().Get(frame.volume).volume->cells;
     of["variant"] = "cells";
     results.Add(of, "count", double(mesh->tetrahedra.size()), Origin::kMeasured);

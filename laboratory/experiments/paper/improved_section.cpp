@@ -47,35 +47,6 @@ FrameCase With(FrameCase frame, const Policy& policy) {
   return frame;
 }
 
-// Frames of one renderer on the paper's machine or on one of today.
-class Beyond {
- public:
-  Beyond(const PaperSetup& setup, const RendererKind* renderer, bool paper, Results& results)
-      : setup_(setup),
-        machines_(paper ? setup.Machines(renderer) : Clusters(setup.context(), Link(kLink))),
-        paper_(paper),
-        results_(results) {}
-
-  // Latency and period of `workers` in teams of frame.workers.
-  void Add(const FrameCase& frame, int workers, Images images) const {
-    const int teams = workers / frame.workers;
-    std::vector<MeasuredFrame> repeats = RecallCosts(setup_.context(), frame);
-    for (MeasuredFrame& repeat : repeats) {
-      if (paper_) repeat = PaperSetup::AsPaper(std::move(repeat), images);
-    }
-    Json of = {{"part", "beyond"}, {"variant", images == Images::kWhole ? "whole images" : "without empty pixels"}};
-    of.update(ColumnsOf(frame));
-    of.update(Json{{"workers", workers}, {"teams", teams}, {"link", paper_ ? "paper" : kLink}});
-    AddFigures(results_, of, FindFigures(repeats, machines_, teams));
-  }
-
- private:
-  const PaperSetup& setup_;
-  std::vector<MachineModel> machines_;
-  bool paper_;
-  Results& results_;
-};
-
 }  // namespace
 
 std::vector<Trial> ImprovedTrials(const PaperSetup& setup) {
@@ -83,32 +54,40 @@ std::vector<Trial> ImprovedTrials(const PaperSetup& setup) {
   for (const int p : Workers(setup)) {
     for (const int team : TeamSizes(p)) teams.insert(team);
   }
-  std::vector<Trial> trials = {HostTrial()};
+  std::vector<FrameCase> frames;
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     for (const int team : teams) {
-      const FrameCase frame = setup.Frame(renderer, setup.table_size(), team);
-      trials.push_back(BoxCostTrial(setup.context(), frame));
-      trials.push_back(FinishTrial(setup.context(), frame));
-      for (const Policy& policy : Partitions(team)) trials.push_back(CostTrial(setup.context(), With(frame, policy)));
+      const FrameCase frame = frames.emplace_back(setup.Frame(renderer, setup.table_size(), team));
+      for (const Policy& policy : Partitions(team)) frames.push_back(With(frame, policy));
     }
   }
+  std::vector<Trial> trials = setup.TrialsOf(frames);
+  trials.insert(trials.begin(), HostTrial());
   return trials;
 }
 
 void AddImproved(const PaperSetup& setup, Results& results) {
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     for (const bool paper : {true, false}) {
-      const Beyond beyond(setup, renderer, paper, results);
+      const std::vector<MachineModel> machines = paper ? setup.Machines(renderer) : Clusters(setup.context(), Link(kLink));
+      // Latency and period of `workers` in teams of frame.workers.
+      const auto add = [&](const FrameCase& frame, int workers, Images images) {
+        const int teams = workers / frame.workers;
+        std::vector<MeasuredFrame> repeats = RecallCosts(setup.context(), frame);
+        for (MeasuredFrame& repeat : repeats) {
+          if (paper) repeat = PaperSetup::AsPaper(std::move(repeat), images);
+        }
+        Json of = ColumnsOf(frame, {{"part", "beyond"}, {"variant", NameOf(images)}});
+        of.update(Json{{"workers", workers}, {"teams", teams}, {"link", paper ? "paper" : kLink}});
+        AddFigures(results, of, FindFigures(repeats, machines, teams));
+      };
       for (const int p : Workers(setup)) {
         for (const int team : TeamSizes(p)) {
           const FrameCase frame = setup.Frame(renderer, setup.table_size(), team);
-          if (paper && team == p) beyond.Add(frame, p, Images::kWhole);
-          beyond.Add(frame, p, Images::kWithoutEmpty);
-          for (Policy policy : Partitions(team)) {
-            for (const std::string& scheme : UsualSchemes()) {
-              policy.combine = scheme;
-              beyond.Add(With(frame, policy), p, Images::kWithoutEmpty);
-            }
+          if (paper && team == p) add(frame, p, Images::kWhole);
+          add(frame, p, Images::kWithoutEmpty);
+          for (const Policy& policy : Partitions(team)) {
+            for (const std::string& scheme : UsualSchemes()) add(With(frame, Combined(policy, scheme)), p, Images::kWithoutEmpty);
           }
         }
       }

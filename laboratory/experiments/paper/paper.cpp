@@ -22,7 +22,7 @@ void DeclarePaper(const Command& app, OwnOptions& options) {
 
 void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
-  if (context.options().own.at_service()) return RunPaperAtService(context, setup, results);
+  if (context.options().own.at_service()) return RunPaperAtService(setup, results);
   std::vector<Trial> trials;
   for (auto* make : {TransformTrials, FootprintTrials, PointsTrials, GridTrials, FrameTrials, OccupancyTrials, ConstantsTrials,
                      ImprovedTrials, ClaimTrials, ValidationTrials}) {

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "client/pictures/picture_writer.h"
-#include "laboratory/experiments/paper/render_alone.h"
 #include "laboratory/experiments/paper/setup.h"
 
 namespace slabstream {
@@ -33,7 +32,7 @@ void AddPictures(const PaperSetup& setup, Results& results) {
   for (Shown& shown : all) {
     for (const RendererKind* renderer : {ZBuffer(), Splatting()}) {
       shown.volume.renderer = renderer;
-      const Picture picture = RenderAlone(setup.context(), shown.volume, kView, kPixels);
+      const Picture picture = setup.RenderAlone(shown.volume, kView, kPixels);
       const std::string name = fmt::format("{}-{}", shown.volume.dataset, renderer->name());
       PictureFormat format;
       format.background = {0, 0, 0, 1};

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "laboratory/experiments/paper/render_alone.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/point_zbuffer.h"
 #include "laboratory/measure/thread_time.h"
@@ -44,8 +43,8 @@ PointZBuffer Draw(const PointsCase& of, const Volume& volume, double* seconds = 
 }
 
 // Of the whole picture; +infinity where there is no face.
-std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& of) {
-  const Picture picture = RenderAlone(context, of.frame.volume, of.frame.view, of.side());
+std::vector<float> DepthsOfFaces(const PaperSetup& setup, const PointsCase& of) {
+  const Picture picture = setup.RenderAlone(of.frame.volume, of.frame.view, of.side());
   const PixelBounds& bounds = picture.image.bounds();
   std::vector<float> depths(std::size_t(of.side()) * std::size_t(of.side()), std::numeric_limits<float>::infinity());
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
@@ -56,11 +55,8 @@ std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& o
 
 // Transform and Z-buffer without shading, which is all that the points do.
 std::vector<double> SecondsOfFaces(const PaperSetup& setup, const PointsCase& of) {
-  std::vector<double> seconds;
-  for (const MeasuredFrame& repeat : RecallRepeats(setup.context(), of.frame)) {
-    seconds.push_back(repeat.StageSeconds(Stage::kTransform) + repeat.StageSeconds(Stage::kZBuffer));
-  }
-  return seconds;
+  return EachOf(RecallRepeats(setup.context(), of.frame),
+                [](const MeasuredFrame& repeat) { return repeat.StageSeconds(Stage::kTransform) + repeat.StageSeconds(Stage::kZBuffer); });
 }
 
 }  // namespace
@@ -93,7 +89,7 @@ void AddPoints(const PaperSetup& setup, Results& results) {
     add("points", "run_time", ValuesOf(setup.context().log(), of.Key(), "seconds"));
     add("faces", "run_time", SecondsOfFaces(setup, of));
     const PointZBuffer points = Draw(of, *setup.context().volumes().Get(of.frame.volume).volume);
-    const PointZBuffer::Holes holes = points.HolesIn(DepthsOfFaces(setup.context(), of));
+    const PointZBuffer::Holes holes = points.HolesIn(DepthsOfFaces(setup, of));
     const Volume& volume = *setup.context().volumes().Get(of.frame.volume).volume;
     const TransformMatrix matrix = MatrixOf(MakeCamera(of.frame.view, of.frame.size, volume.description.geometry));
     const std::size_t doubled = points.CountDoubled(matrix, volume.description.geometry.size, volume.block.samples<std::uint8_t>());

@@ -1,8 +1,6 @@
 // The frames of tables 2, 5 and 6 and figures 9, 10 and 11 at a running service: real processes, with as many workers as it has.
-#include "client/cli/service_connection.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/experiments/service_frames.h"
-#include "laboratory/experiments/service_roster.h"
 
 namespace slabstream {
 namespace {
@@ -22,21 +20,12 @@ std::vector<FrameCase> Frames(const PaperSetup& setup, int workers) {
 
 }  // namespace
 
-void RunPaperAtService(ExperimentContext& context, const PaperSetup& setup, Results& results) {
-  ServiceConnection connection = OrThrow(ServiceConnection::OpenService(context.options().own.service));
-  const StatusReply begin = OrThrow(connection.client().QueryStatus());
-  const Json roster = RosterOf(begin);
-  const std::vector<FrameCase> frames = Frames(setup, int(roster.size()));
-  std::vector<Trial> trials;
-  trials.reserve(frames.size());
-  for (const FrameCase& frame : frames) trials.push_back(ServiceFramesTrial(connection.client(), begin, frame));
-  context.Run(trials);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    Json of = {{"part", "service frames"}};
-    of.update(ColumnsOf(frames[i]));
-    AddServiceFrames(results, of, context.log(), trials[i]);
-  }
-  AttachRoster(results, roster);
+void RunPaperAtService(const PaperSetup& setup, Results& results) {
+  MeasureAtService(setup.context(), results, [&](int workers) {
+    std::vector<ServedFrame> served;
+    for (const FrameCase& frame : Frames(setup, workers)) served.push_back({frame, ColumnsOf(frame, {{"part", "service frames"}})});
+    return served;
+  });
 }
 
 }  // namespace slabstream

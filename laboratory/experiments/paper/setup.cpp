@@ -3,7 +3,9 @@
 #include <numbers>
 
 #include "laboratory/bench/bench_machine.h"
+#include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/policies.h"
+#include "laboratory/measure/lab_service.h"
 
 namespace slabstream {
 namespace {
@@ -53,6 +55,15 @@ FrameCase PaperSetup::Frame(const RendererKind* renderer, int size, int workers)
   return frame;
 }
 
+std::vector<Trial> PaperSetup::TrialsOf(const std::vector<FrameCase>& frames) const {
+  std::vector<Trial> trials;
+  for (const FrameCase& frame : frames) {
+    trials.push_back(CostTrial(context_, frame));
+    trials.push_back(FinishTrial(context_, frame));
+  }
+  return trials;
+}
+
 MeasuredFrame PaperSetup::AsPaper(MeasuredFrame frame, Images images) {
   frame.finish_seconds = frame.receive_seconds = 0;
   if (images == Images::kWhole) FillImages(frame);
@@ -66,6 +77,13 @@ std::vector<MachineModel> PaperSetup::Machines(const RendererKind* renderer) con
                                     double(FrameBounds(one.plan.setup).pixel_count())));
   }
   return machines;
+}
+
+Picture PaperSetup::RenderAlone(const BenchCase& volume, const ViewParameters& view, int pixels) const {
+  ServiceConnection connection = OrThrow(OpenLabService(1, {context_.volumes().Get(volume).volume}));
+  FrameRequest request = BenchRequest(volume, view, {pixels, pixels});
+  request.dataset = connection.dataset();
+  return OrThrow(connection.client().Render(request));
 }
 
 }  // namespace slabstream

@@ -1,8 +1,10 @@
 // The sizes, workers and frames that the sections of `experiment paper` share.
 #pragma once
 
+#include <string_view>
 #include <vector>
 
+#include "client/client.h"
 #include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/frame_case.h"
 #include "laboratory/measure/paper_model.h"
@@ -14,6 +16,7 @@ inline constexpr int kRunsOfALoop = 3;  // the median of so many runs is taken
 
 // Images are sent whole, as in the paper, or without their empty pixels, as in Slabstream.
 enum class Images { kWhole, kWithoutEmpty };
+constexpr std::string_view NameOf(Images images) { return images == Images::kWhole ? "whole images" : "without empty pixels"; }
 
 class PaperSetup {
  public:
@@ -31,11 +34,17 @@ class PaperSetup {
   // turned. As in the paper, a slab is N/p whole slices, of those that are traversed; one group, combined hierarchically.
   FrameCase Frame(const RendererKind* renderer, int size, int workers) const;
 
+  // The trials that Recall needs of each of these.
+  std::vector<Trial> TrialsOf(const std::vector<FrameCase>& frames) const;
+
   // What the paper counts: neither the picture nor its way to a client.
   static MeasuredFrame AsPaper(MeasuredFrame frame, Images images);
 
   // PaperMachine for the time of a frame of the tables' N on this machine, one for each repeat.
   std::vector<MachineModel> Machines(const RendererKind* renderer) const;
+
+  // A square picture by the embedded service with one worker of one thread.
+  Picture RenderAlone(const BenchCase& volume, const ViewParameters& view, int pixels) const;
 
  private:
   ExperimentContext& context_;
@@ -43,7 +52,7 @@ class PaperSetup {
 };
 
 // Instead of the sections: the frames of tables 2, 5 and 6 and figures 9 to 11 at a running service, with as many workers as it has.
-void RunPaperAtService(ExperimentContext& context, const PaperSetup& setup, Results& results);
+void RunPaperAtService(const PaperSetup& setup, Results& results);
 
 // Sections: the measurements that they need, and what they add to the results.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);

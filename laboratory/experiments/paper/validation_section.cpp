@@ -26,8 +26,7 @@ std::vector<Trial> ValidationTrials(const PaperSetup& setup) {
 
 void AddValidation(const PaperSetup& setup, Results& results) {
   for (const FrameCase& frame : Frames(setup)) {
-    Json of = {{"part", "validation"}, {"link", "host"}};
-    of.update(ColumnsOf(frame));
+    const Json of = ColumnsOf(frame, {{"part", "validation"}, {"link", "host"}});
     const Json key = ValidationKey(setup.context(), frame, kTurns);
     const auto add = [&](const char* number, Origin origin) {
       results.Add(of, "latency", ValuesOf(setup.context().log(), key, number, 1e-3), origin);

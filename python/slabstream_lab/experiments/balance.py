@@ -7,7 +7,7 @@ from typing import Any, Mapping, Sequence
 from .. import plots
 from ..page import Page, Section, Table
 from ..ranking import Ranking, decide, rankings, ties_text
-from ..results import ResultsError, Run, value_of
+from ..results import ResultsError, Run, values_by
 from ..value import Value, speed_text
 
 OURS = "kd-tree by occupied, dynamic"
@@ -62,7 +62,7 @@ def _values(run: Run, case: Case, metric: str, variant: str | None = None) -> di
     """By method."""
     volume, renderer, p, path = case
     rows = run.select(part="path", metric=metric, variant=variant, volume=volume, renderer=renderer, workers=p, view=path)
-    return {_method(row): value_of(row) for _, row in rows.iterrows()}
+    return values_by(rows, _method)
 
 
 def _text(case: Case) -> str:

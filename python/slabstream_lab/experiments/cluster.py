@@ -1,11 +1,10 @@
 """A time-dilated cluster (bench/cluster): real processes on up to 16 hosts, measured and simulated side by side."""
 from __future__ import annotations
 
-from .. import plots
 from ..page import Page, Section, Table
 from ..results import Run
 from ..value import Value
-from .scaling import efficiency
+from .scaling import efficiency, times
 
 CLOSE = 0.15  # relative error of a simulated time that is good enough
 CHECKED = (4, 8, 16)  # numbers of workers at which the simulation is checked
@@ -190,7 +189,7 @@ def _scaling(run: Run, part: str, link: str, name: str) -> Section:
         "Efficiency by period, against one worker of the same policy.",
         f"Efficiency: {'; '.join(text for _, text in sorted(best, reverse=True))}." if best else "",
         [
-            plots.lines(name, f"From picture to picture, {link}", lines, "workers", "time", "Both axes logarithmic.", log_x=True, log_y=True, marks=True),
+            times(name, f"From picture to picture, {link}", lines),
             Table(part, ["policy", "p", "latency", "period", "efficiency", "rendering, longest", "imbalance", "idle", "image bytes"], rows),
         ],
     )

@@ -23,9 +23,8 @@ LINKS = ("paper", "10gbit")
 
 
 class _Beyond:
-    def __init__(self, run: Run, n: int):
-        self.n = n
-        self.rows = Run(run.select(part="beyond"), run.info)
+    def __init__(self, run: Run):
+        self.rows = run.narrowed(part="beyond")
 
     def find(self, metric: str, renderer: str, link: str, p: int, variant: str = "without empty pixels") -> Value:
         """Of the paper's slabs, shared by all workers."""
@@ -58,7 +57,7 @@ def _short(found: Ranking) -> str:
 
 
 def _beyond(run: Run, frames: Frames) -> Section:
-    beyond = _Beyond(run, frames.table_n)
+    beyond = _Beyond(run)
     workers = [p for p in sorted(run.distinct("workers", part="beyond")) if p > 1]
     rows, teams_rows, answers, blocks = [], [], [], []
     p_last = workers[-1]
@@ -71,12 +70,9 @@ def _beyond(run: Run, frames: Frames) -> Section:
                 kinds = {"without empty pixels": "", **({"whole images": ", whole images"} if whole else {})}
                 values = {}
                 for variant, suffix in kinds.items():
-                    values["one at a time" + suffix] = beyond.efficiency(
-                        "latency", renderer, link, p, beyond.find("latency", renderer, link, p, variant)
-                    )
-                    values["asked ahead" + suffix] = beyond.efficiency(
-                        "period", renderer, link, p, beyond.find("period", renderer, link, p, variant)
-                    )
+                    for kind, metric in (("one at a time", "latency"), ("asked ahead", "period")):
+                        found = beyond.find(metric, renderer, link, p, variant)
+                        values[kind + suffix] = beyond.efficiency(metric, renderer, link, p, found)
                 best = ranked[renderer, link, p, 1]
                 values["asked ahead, best partition"] = beyond.efficiency("period", renderer, link, p, best.values[best.best[0]])
                 for name, value in values.items():
@@ -112,8 +108,7 @@ def _beyond(run: Run, frames: Frames) -> Section:
                 "workers p",
                 "efficiency",
                 "One at a time: by latency. Asked ahead: by throughput. Each against one worker by the same measure.",
-                from_zero=True,
-                marks=True,
+                **plots.FROM_ZERO,
             )
         )
     blocks.append(
@@ -174,7 +169,7 @@ def _claims(run: Run, frames: Frames) -> Section:
     rows = []
 
     gains: dict[Any, Value] = {}
-    beyond = _Beyond(run, n)
+    beyond = _Beyond(run)
     if service := _measured_speed_up(run, "zbuffer", least):
         gains["small"] = service
     for renderer in ("splat", "zbuffer"):

@@ -7,7 +7,7 @@ from .. import plots
 from ..page import Section, Table
 from ..results import Run
 from ..value import Value
-from .paper_frames import SPLAT, ZBUFFER, Frames, Pipeline, fit, rounded, size_text
+from .paper_frames import SPLAT, ZBUFFER, Cases, Frames, Pipeline, fit, over_workers, rounded, size_text
 
 PART = "service frames"
 
@@ -19,22 +19,11 @@ def sections(run: Run) -> list[Section]:
     return [_combining(frames, measured), *(_pipeline(frames, measured, pipeline) for pipeline in (SPLAT, ZBUFFER))]
 
 
-class Measured:
+class Measured(Cases):
     """Frames of real processes: what a client waits for, without making and encoding the picture, which the paper does not count."""
 
     def __init__(self, run: Run):
-        self._rows = Run(run.select(part=PART), run.info)
-        self.workers = sorted(self._rows.distinct("workers"))
-        self.sizes = sorted(self._rows.distinct("n"))
-
-    def find(self, metric: str, renderer: str, n: int, p: int, **columns) -> Value | None:
-        asked = {"axis": "view", "combine": "fan-in", "stage": None} | columns
-        return self._rows.find(metric, renderer=renderer, n=n, workers=p, **asked)
-
-    def value(self, metric: str, renderer: str, n: int, p: int, **columns) -> Value:
-        found = self.find(metric, renderer, n, p, **columns)
-        assert found is not None, (metric, renderer, n, p, columns)
-        return found
+        super().__init__(run, PART, axis="view", combine="fan-in", stage=None)
 
     def time(self, renderer: str, n: int, p: int, **columns) -> Value:
         latency, picture = (self.value(metric, renderer, n, p, **columns) for metric in ("latency", "picture_time"))
@@ -43,12 +32,6 @@ class Measured:
     def rest(self, renderer: str, n: int, p: int, **columns) -> Value:
         """What a frame takes beyond its longest rendering: combining, planning, messages and the picture's way to the client."""
         return self.time(renderer, n, p, **columns).minus(self.value("longest_render_time", renderer, n, p, **columns))
-
-    def speed_up(self, renderer: str, n: int, p: int) -> Value:
-        return Value.exact(1) if p == 1 else self.time(renderer, n, 1).over(self.time(renderer, n, p))
-
-    def efficiency(self, renderer: str, n: int, p: int) -> Value:
-        return self.speed_up(renderer, n, p).times(1 / p).percent()
 
 
 HOW = (
@@ -97,7 +80,7 @@ def _combining(frames: Frames, measured: Measured) -> Section:
                 rows,
             ),
             plots.lines(
-                "cluster-figure-9", "Figure 9 by real processes: a frame beyond its longest rendering", curves, "workers p", "time", from_zero=True, marks=True
+                "cluster-figure-9", "Figure 9 by real processes: a frame beyond its longest rendering", curves, "workers p", "time", **plots.FROM_ZERO
             ),
             Table(
                 "Fits",
@@ -120,12 +103,10 @@ def _pipeline(frames: Frames, measured: Measured, pipeline: Pipeline) -> Section
         row += [measured.speed_up(renderer, n, p), frames.speed_up(renderer, n, p) if p in frames.workers else None]
         rows.append(row + [printed_one.over(printed) if printed_one and printed else None])
     shared = [p for p in workers if p > 1]
-    curves: dict[str, dict[str, list]] = {"time": {}, "speed-up": {}, "efficiency": {}}
-    for size in measured.sizes:
-        label = f"N = {size}"
-        curves["time"][label] = [(p, measured.time(renderer, size, p)) for p in workers]
-        curves["speed-up"][label] = [(p, measured.speed_up(renderer, size, p)) for p in workers]
-        curves["efficiency"][label] = [(p, measured.efficiency(renderer, size, p)) for p in workers]
+    curves: dict[str, dict[str, list]] = {
+        what: {f"N = {size}": [(p, of(renderer, size, p)) for p in workers] for size in measured.sizes}
+        for what, of in (("time", measured.time), ("speed-up", measured.speed_up), ("efficiency", measured.efficiency))
+    }
     label = f"N = {n}, model"
     curves["speed-up"][label] = [(p, frames.speed_up(renderer, n, p)) for p in frames.workers]
     curves["efficiency"][label] = [(p, frames.efficiency(renderer, n, p)) for p in frames.workers]
@@ -154,16 +135,12 @@ def _pipeline(frames: Frames, measured: Measured, pipeline: Pipeline) -> Section
                 rows,
             ),
             *(
-                plots.lines(
+                over_workers(
                     f"cluster-figure-{number}{letter}",
                     f"Figure {number}{letter} by real processes: {what}",
                     curves[what],
-                    "workers p",
                     what,
                     "Solid: measured; dashed: the model; dotted: the paper.",
-                    log_y=what == "time",
-                    from_zero=what != "time",
-                    marks=True,
                 )
                 for letter, what in zip("abc", curves)
             ),

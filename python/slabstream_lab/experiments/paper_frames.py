@@ -3,10 +3,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import statistics
 from typing import Callable, Sequence
 
 from .. import plots
-from ..page import Section, Table
+from ..page import Figure, Section, Table
 from ..ranking import decide
 from ..results import Run
 from ..value import Value, speed_text
@@ -19,42 +20,51 @@ def sections(run: Run) -> list[Section]:
     return [_combining(frames), _splatting(frames), _pipeline(frames, SPLAT), _pipeline(frames, ZBUFFER), _compositing(frames), _grain(frames)]
 
 
-class Frames:
-    """The frames of a run, as the paper counts them, and the printed ones. `axis`: "view" as in the paper, "auto" as Slabstream does."""
+class Cases:
+    """A part of the results by renderer, N and p. `usual`: what the other columns hold, unless a question says otherwise."""
 
-    def __init__(self, run: Run):
-        self.run = run
-        self.sizes = sorted(run.distinct("n", part="frames"))
-        self.workers = sorted(run.distinct("workers", part="frames"))
-        self.table_n = run.distinct("n", part="frames", combine="centralized")[0]
-        self.printed_workers = sorted(run.distinct("workers", part="printed"))
-        self._rows = Run(run.select(part="frames"), run.info)
-        self._printed = Run(run.select(part="printed"), run.info)
+    def __init__(self, run: Run, part: str, **usual):
+        self._rows = run.narrowed(part=part)
+        self._usual = usual
+        self.sizes = sorted(self._rows.distinct("n"))
+        self.workers = sorted(self._rows.distinct("workers"))
 
     def find(self, metric: str, renderer: str, n: int, p: int, **columns) -> Value | None:
-        asked = {"axis": "view", "combine": "fan-in", "variant": "whole images", "stage": None} | columns
-        return self._rows.find(metric, renderer=renderer, n=n, workers=p, **asked)
+        return self._rows.find(metric, renderer=renderer, n=n, workers=p, **self._usual | columns)
+
+    def value(self, metric: str, renderer: str, n: int, p: int, **columns) -> Value:
+        return self._rows.value(metric, renderer=renderer, n=n, workers=p, **self._usual | columns)
 
     def time(self, renderer: str, n: int, p: int, **columns) -> Value:
-        value = self.find("frame_time", renderer, n, p, **columns)
-        assert value is not None, (renderer, n, p, columns)
-        return value
-
-    def printed(self, metric: str, table: str, p: int, combine: str = "fan-in", stage: str | None = None) -> Value | None:
-        return self._printed.find(metric, variant=table, workers=p, combine=combine, stage=stage)
+        return self.value("frame_time", renderer, n, p, **columns)
 
     def speed_up(self, renderer: str, n: int, p: int, **columns) -> Value:
-        if p == 1:
-            return Value.exact(1, "1", "measured")
-        return self.time(renderer, n, 1).over(self.time(renderer, n, p, **columns))
+        return Value.exact(1) if p == 1 else self.time(renderer, n, 1).over(self.time(renderer, n, p, **columns))
 
     def efficiency(self, renderer: str, n: int, p: int, **columns) -> Value:
         return self.speed_up(renderer, n, p, **columns).times(1 / p).percent()
 
+
+class Frames(Cases):
+    """The frames of a run, as the paper counts them, and the printed ones. `axis`: "view" as in the paper, "auto" as Slabstream does."""
+
+    def __init__(self, run: Run):
+        super().__init__(run, "frames", axis="view", combine="fan-in", variant="whole images", stage=None)
+        self.run = run
+        self.table_n = run.distinct("n", part="frames", combine="centralized")[0]
+        self.printed_workers = sorted(run.distinct("workers", part="printed"))
+        self._printed = run.narrowed(part="printed")
+
+    def printed(self, metric: str, table: str, p: int, combine: str = "fan-in", stage: str | None = None) -> Value | None:
+        return self._printed.find(metric, variant=table, workers=p, combine=combine, stage=stage)
+
     def grain(self, renderer: str, n: int, p: int) -> float:
-        value = self.find("grain", renderer, n, p)
-        assert value is not None
-        return value.value
+        return self.value("grain", renderer, n, p).value
+
+
+def over_workers(name: str, title: str, series: plots.Series, what: str, caption: str) -> Figure:
+    """Time, speed-up or efficiency."""
+    return plots.lines(name, title, series, "workers p", what, caption, log_y=what == "time", from_zero=what != "time", marks=True)
 
 
 def shares_of(parts: dict[str, Value | None], whole: float) -> dict[str, float]:
@@ -84,8 +94,8 @@ class Fit:
 
 def fit(points: Sequence[tuple[float, float]], shape: Callable[[float], float]) -> Fit:
     constant = sum(shape(x) * y for x, y in points) / sum(shape(x) ** 2 for x, _ in points)
-    left = math.sqrt(sum((y - constant * shape(x)) ** 2 for x, y in points) / len(points))
-    mean = sum(y for _, y in points) / len(points)
+    left = math.sqrt(statistics.fmean((y - constant * shape(x)) ** 2 for x, y in points))
+    mean = statistics.fmean(y for _, y in points)
     return Fit(constant, left / mean if mean > 0 else 0)
 
 
@@ -174,8 +184,7 @@ def _combining(frames: Frames) -> Section:
                 "workers p",
                 "combining",
                 "N = 200: table 2 less T(1) / p, and the share of combining in table 5. The paper prints figure 9 without numbers.",
-                from_zero=True,
-                marks=True,
+                **plots.FROM_ZERO,
             ),
             fit_table,
         ],
@@ -226,11 +235,9 @@ def _splatting(frames: Frames) -> Section:
 
 def _straight_line(points: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Of y = a + b x by least squares: a, and the root mean square of what is left over the mean of y."""
-    count = len(points)
-    mean_x, mean_y = sum(x for x, _ in points) / count, sum(y for _, y in points) / count
-    slope = sum((x - mean_x) * (y - mean_y) for x, y in points) / sum((x - mean_x) ** 2 for x, _ in points)
-    start = mean_y - slope * mean_x
-    return start, math.sqrt(sum((y - start - slope * x) ** 2 for x, y in points) / count) / mean_y
+    xs, ys = zip(*points)
+    slope, start = statistics.linear_regression(xs, ys)
+    return start, math.sqrt(statistics.fmean((y - start - slope * x) ** 2 for x, y in points)) / statistics.fmean(ys)
 
 
 # ---------------------------------------------------------------- pipelines
@@ -345,6 +352,9 @@ def _pipeline(frames: Frames, pipeline: Pipeline) -> Section:
         f"default axis the frame is {default}."
     )
     caption = "Slanted in the table: simulated. p = 1 is measured."
+    times = curves(frames.time, lambda one, v, q: v)
+    speed_ups = curves(frames.speed_up, lambda one, v, q: one.over(v))
+    efficiencies = curves(frames.efficiency, lambda one, v, q: one.over(v).times(1 / q).percent(), True)
     return Section(
         pipeline.title,
         f"How long does a frame by {TITLES[renderer]} take, how much do p workers gain, and where does the time go?",
@@ -359,36 +369,11 @@ def _pipeline(frames: Frames, pipeline: Pipeline) -> Section:
             plots.stacked(
                 f"figure-{number}-stages", f"Where a frame's time goes, N = {n}", bars, "share (%)", "By workers, ours and the paper's."
             ),
-            plots.lines(
-                f"figure-{number}a-time",
-                f"Figure {number}a: time of a frame",
-                curves(frames.time, lambda one, v, q: v),
-                "workers p",
-                "time",
-                caption,
-                log_y=True,
-                marks=True,
+            over_workers(f"figure-{number}a-time", f"Figure {number}a: time of a frame", times, "time", caption),
+            over_workers(
+                f"figure-{number}b-speed-up", f"Figure {number}b: speed-up", speed_ups, "speed-up", "Time of one worker over that of p (Eq. 6)."
             ),
-            plots.lines(
-                f"figure-{number}b-speed-up",
-                f"Figure {number}b: speed-up",
-                curves(frames.speed_up, lambda one, v, q: one.over(v)),
-                "workers p",
-                "speed-up",
-                "Time of one worker over that of p (Eq. 6).",
-                from_zero=True,
-                marks=True,
-            ),
-            plots.lines(
-                f"figure-{number}c-efficiency",
-                f"Figure {number}c: efficiency",
-                curves(frames.efficiency, lambda one, v, q: one.over(v).times(1 / q).percent(), True),
-                "workers p",
-                "efficiency",
-                "Speed-up over p (Eq. 7).",
-                from_zero=True,
-                marks=True,
-            ),
+            over_workers(f"figure-{number}c-efficiency", f"Figure {number}c: efficiency", efficiencies, "efficiency", "Speed-up over p (Eq. 7)."),
             axes,
         ],
     )
@@ -401,13 +386,8 @@ def _compositing(frames: Frames) -> Section:
     """Equation 17: T_cp = c_cp I^2 N / p."""
     times = {(n, p): frames.find("stage_time", "splat", n, p, stage="composite") for n in frames.sizes for p in frames.workers}
 
-    def constant(n: int, p: int) -> Value:
-        pixels = n**3 / p / frames.grain("splat", n, p)
-        found = times[n, p]
-        assert found is not None
-        return found.times(p / (pixels * n))
-
-    constants = {case: constant(*case) for case, time in times.items() if time is not None}
+    # I^2 is N^3/p over the grain.
+    constants = {(n, p): time.times(p**2 * frames.grain("splat", n, p) / n**4) for (n, p), time in times.items() if time is not None}
     ordered = sorted(constants, key=lambda case: constants[case].value)
     (least_n, least_p), (most_n, most_p) = ordered[0], ordered[-1]
     least, most = constants[ordered[0]], constants[ordered[-1]]
@@ -426,9 +406,7 @@ def _compositing(frames: Frames) -> Section:
                 "workers p",
                 "time of the stage",
                 "Both axes logarithmic.",
-                log_x=True,
-                log_y=True,
-                marks=True,
+                **plots.LOG_LOG,
             ),
             plots.lines(
                 "equation-17-constant",
@@ -436,8 +414,7 @@ def _compositing(frames: Frames) -> Section:
                 {f"p = {p}": [(n, constants[n, p]) for n in frames.sizes if (n, p) in constants] for p in frames.workers},
                 "N",
                 "c",
-                from_zero=True,
-                marks=True,
+                **plots.FROM_ZERO,
             ),
         ],
     )

@@ -9,7 +9,7 @@ from ..value import Value, speed_text
 
 
 def sections(run: Run) -> list[Section]:
-    rows = Run(run.select(part="grids"), run.info)
+    rows = run.narrowed(part="grids")
     partitions = {d: f"{d} by {rows.distinct('balance_by', decomposition=d)[0]}" for d in rows.distinct("decomposition")}
     workers = sorted(rows.distinct("workers"))
 
@@ -69,9 +69,7 @@ def sections(run: Run) -> list[Section]:
                     {partition: [(q, efficiency(d, q)) for q in workers] for d, partition in partitions.items()},
                     "workers p",
                     "efficiency",
-                    log_x=True,
-                    from_zero=True,
-                    marks=True,
+                    **plots.LOG_X_FROM_ZERO,
                 ),
             ],
         )

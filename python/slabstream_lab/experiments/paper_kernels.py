@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from typing import Any, Iterable, Mapping, Sequence
 
@@ -29,8 +30,7 @@ def power_text(points: Points, x: str) -> str:
     logs = [(math.log(at), math.log(y.value)) for at, y in points if y.value > 0]
     if len(logs) < 2:
         return ""
-    mean_x, mean_y = (sum(column) / len(logs) for column in zip(*logs))
-    power = sum((a - mean_x) * (b - mean_y) for a, b in logs) / sum((a - mean_x) ** 2 for a, _ in logs)
+    power = statistics.linear_regression(*zip(*logs)).slope
     over = f"({x} = {points[0][0]} to {points[-1][0]}{', one repeat each' if any(y.repeats == 1 for _, y in points) else ''})"
     if abs(power) < 0.1:
         return f"stays within {x} to the power of {number_text(power, 1)} {over}"
@@ -166,9 +166,7 @@ def _transform(run: Run) -> Section:
                 "N",
                 "error in pixels",
                 "Of N x N x N voxels at about a pixel a voxel, in 32-bit floats, against the product in 64 bits. Both axes logarithmic.",
-                log_x=True,
-                log_y=True,
-                marks=True,
+                **plots.LOG_LOG,
             ),
             tables[2],
         ],
@@ -280,9 +278,7 @@ def _splatting(run: Run) -> Section:
                 "footprint width k",
                 "time",
                 "Both axes logarithmic, so a straight line is a power of k.",
-                log_x=True,
-                log_y=True,
-                marks=True,
+                **plots.LOG_LOG,
             ),
             Table(
                 f"Figure 8b in numbers: a filled slice, {side} x {side}",
@@ -369,8 +365,7 @@ def _points(run: Run) -> Section:
                 "pixels a voxel",
                 "share of holes",
                 "Counted, so without whiskers.",
-                from_zero=True,
-                marks=True,
+                **plots.FROM_ZERO,
             ),
         ],
     )

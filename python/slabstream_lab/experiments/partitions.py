@@ -9,7 +9,7 @@ import pandas
 from .. import plots
 from ..page import Page, Section, Table
 from ..ranking import rankings
-from ..results import Run, value_of
+from ..results import Run, value_of, values_by
 from ..value import Value, number_text
 
 LINK, SCHEME = "10gbit", "radix-k"
@@ -39,10 +39,6 @@ def _partition(row: pandas.Series) -> str:
     return f"{row['decomposition']} by {row['balance_by']}"
 
 
-def _by(rows: pandas.DataFrame, name: Any) -> dict[str, Value]:
-    return {name(row): value_of(row) for _, row in rows.iterrows()}
-
-
 def _shared(run: Run, part: str, subject: Subject) -> list[int]:
     """The numbers of workers, above one."""
     return [p for p in sorted(run.distinct("workers", part=part, volume=subject[0], renderer=subject[1])) if p > 1]
@@ -60,7 +56,7 @@ def _workers_of(run: Run, part: str) -> int:
 def _latencies(run: Run, subject: Subject, p: int) -> dict[str, Value]:
     """Of the partitions with one group in the view of the partition section."""
     of = {"part": "policy", "metric": "latency", "volume": subject[0], "renderer": subject[1]}
-    return _by(run.select(workers=p, groups=1, combine=SCHEME, link=LINK, **of), _partition)
+    return values_by(run.select(workers=p, groups=1, combine=SCHEME, link=LINK, **of), _partition)
 
 
 def _efficiency(run: Run, subjects: list[Subject]) -> Section:
@@ -82,7 +78,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         for p in shared:
             latencies = _latencies(run, (volume, renderer), p)
             columns = {
-                metric: _by(run.select(part="partition", metric=metric, workers=p, **of), _partition)
+                metric: values_by(run.select(part="partition", metric=metric, workers=p, **of), _partition)
                 for metric in ("imbalance", "render_time", "longest_render_time", "memory")
             }
             for partition, latency in latencies.items():
@@ -115,9 +111,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
                     "workers",
                     "longest / mean render time",
                     "1 is perfect. A worker whose box shows nothing counts with no time.",
-                    log_x=True,
-                    log_y=True,
-                    marks=True,
+                    **plots.LOG_LOG,
                 )
             )
         blocks.append(
@@ -128,9 +122,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
                 "workers",
                 "efficiency",
                 "Latency of one worker over p times the latency of p workers.",
-                log_x=True,
-                from_zero=True,
-                marks=True,
+                **plots.LOG_X_FROM_ZERO,
             )
         )
         for partition, decomposition in (("slab by voxels", "slab"), ("kd-tree by occupied", "kd-tree")):
@@ -167,7 +159,7 @@ def _recommended(run: Run, subjects: list[Subject]) -> Section:
             for link in run.distinct("link", part="default"):
                 of = {"volume": volume, "renderer": renderer, "workers": p, "link": link}
                 usual = value_of(run.select(part="default", metric="latency", **of).iloc[0])
-                tried = _by(run.select(part="policy", metric="latency", **of), _policy)
+                tried = values_by(run.select(part="policy", metric="latency", **of), _policy)
                 best = min(tried, key=lambda name: tried[name].value)
                 own = tried[best].value >= usual.value
                 ratio = usual.over(usual if own else tried[best])
@@ -201,7 +193,7 @@ def _assignments(run: Run, subjects: list[Subject]) -> Section:
     rows, cases = [], {}
     for volume, renderer in subjects:
         found = run.select(part="assignment", metric="imbalance", volume=volume, renderer=renderer)
-        values = _by(found, lambda row: f"{_partition(row)}, {row['assignment']}")
+        values = values_by(found, lambda row: f"{_partition(row)}, {row['assignment']}")
         names = run.distinct("assignment", part="assignment")
         for partition in dict.fromkeys(found.apply(_partition, axis=1)):
             rows.append([volume, renderer, partition, *[values[f"{partition}, {name}"] for name in names]])

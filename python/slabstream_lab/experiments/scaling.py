@@ -22,8 +22,8 @@ def page(run: Run) -> Page:
     )
 
 
-def _times(name: str, title: str, series: dict[str, list[tuple[int, Value]]]) -> Figure:
-    return plots.lines(name, title, series, "workers", "time", "Both axes logarithmic.", log_x=True, log_y=True, marks=True)
+def times(name: str, title: str, series: dict[str, list[tuple[int, Value]]]) -> Figure:
+    return plots.lines(name, title, series, "workers", "time", "Both axes logarithmic.", **plots.LOG_LOG)
 
 
 MANY = "many workers"
@@ -62,7 +62,7 @@ def _many_workers(run: Run) -> Section:
         "time for a frame grows with the square of the number of workers.",
         f"At p = {most} the coordinator's time is {' and '.join(shares)} of the latency of a frame.",
         [
-            _times(
+            times(
                 "many-workers-latency",
                 "Latency of a frame alone",
                 {
@@ -166,7 +166,7 @@ def _section(run: Run, part: str, renderer: str) -> Section:
         f"At p = {common}, the greatest that all series have, least time from picture to picture: "
         f"{least['period'].sentence()}; least latency: {least['latency'].sentence()}.",
         [
-            _times(
+            times(
                 f"{name}-period",
                 "From picture to picture",
                 {label: [(x.workers, x.period) for x in points] for label, points in series.items()},
@@ -179,9 +179,7 @@ def _section(run: Run, part: str, renderer: str) -> Section:
                     "workers",
                     "efficiency",
                     "Against one worker of the same series.",
-                    log_x=True,
-                    from_zero=True,
-                    marks=True,
+                    **plots.LOG_X_FROM_ZERO,
                 )
                 for metric, title, efficiencies in (
                     ("period", "time from picture to picture", by_period),

@@ -1,8 +1,11 @@
 """Groups of slabs: what streaming costs and what it saves."""
 from __future__ import annotations
 
+from functools import partial
+from typing import Callable
+
 from .. import plots
-from ..page import Page, Section, Table
+from ..page import Figure, Page, Section, Table
 from ..ranking import decide
 from ..results import Run
 from ..value import Value, speed_text
@@ -29,6 +32,11 @@ def _section(run: Run, volume: str) -> Section:
 
     def efficiency(p: int, g: int) -> Value:
         return get("period", 1, 1).over(get("period", p, g)).times(1 / p).percent()
+
+    def over_groups(plot: str, title: str, values: dict[str, Callable[[int, int], Value]], y: str, caption: str) -> Figure:
+        """A line for each number of workers and each of these values of p and groups, by what follows p in its name."""
+        series = {f"p = {p}{what}": [(g, of(p, g)) for g in groups] for p in shared for what, of in values.items()}
+        return plots.lines(f"{plot}-{name}", title, series, "groups", y, caption, **plots.FROM_ZERO)
 
     table = Table(
         f"{volume}: groups",
@@ -66,35 +74,17 @@ def _section(run: Run, volume: str) -> Section:
         "and one group. A worker must hold the slabs of two groups and their halos. The last column is the service on this machine.",
         answer,
         [
-            plots.lines(
-                f"efficiency-{name}",
-                "Efficiency, frames requested ahead",
-                {f"p = {p}": [(g, efficiency(p, g)) for g in groups] for p in shared},
-                "groups",
-                "efficiency",
+            over_groups(
+                "efficiency", "Efficiency, frames requested ahead", {"": efficiency}, "efficiency",
                 "Halos are rendered again in every group, and every group has its own combining.",
-                from_zero=True,
-                marks=True,
             ),
-            plots.lines(
-                f"memory-{name}",
-                "Voxels that a worker must hold",
-                {f"p = {p}": [(g, get("memory", p, g, "measured")) for g in groups] for p in shared},
-                "groups",
-                "memory",
+            over_groups(
+                "memory", "Voxels that a worker must hold", {"": lambda p, g: get("memory", p, g, "measured")}, "memory",
                 "Counted from the boxes: two groups with their halos.",
-                from_zero=True,
-                marks=True,
             ),
-            plots.lines(
-                f"preview-{name}",
-                "Time to the first preview",
-                {f"p = {p}, {what}": [(g, get(metric, p, g)) for g in groups] for p in shared for what, metric in (("preview", "preview"), ("whole frame", "latency"))},
-                "groups",
-                "time",
+            over_groups(
+                "preview", "Time to the first preview", {", preview": partial(get, "preview"), ", whole frame": partial(get, "latency")}, "time",
                 "The nearest group alone, and all of the frame.",
-                from_zero=True,
-                marks=True,
             ),
             table,
             plots.timeline(

@@ -49,20 +49,19 @@ class JobScriptTest : public testing::Test {
   TemporaryDirectory directory_;
 };
 
-JobScript SomeScript() {
-  return {.data = {"head=/data/head.nrrd"}, .dataset = "head", .programs = "/opt/slabstream/bin", .folder = "/shared/jobs"};
-}
+SlurmOptions SomeJob() { return {.data = {"head=/data/head.nrrd"}, .folder = "/shared/jobs"}; }
+std::string TextOf(const SlurmOptions& options) { return JobScript(options, "head", "/opt/slabstream/bin"); }
 
 TEST_F(JobScriptTest, BashReadsEveryPathAsItIs) {
-  JobScript script = SomeScript();
+  SlurmOptions job = SomeJob();
   std::string expected;
-  for (const std::string& text : kOddTexts) script.data.push_back("x=/" + text);
-  for (const std::string& data : script.data) expected += "--data\n" + data + "\n";
-  script.programs = "/pro grams' of $HOME";
-  script.folder = "/a shared `folder`";
-  expected += script.programs + "\n" + script.folder + "/slabstream-17\n";
+  for (const std::string& text : kOddTexts) job.data.push_back("x=/" + text);
+  for (const std::string& data : job.data) expected += "--data\n" + data + "\n";
+  const std::string programs = "/pro grams' of $HOME";
+  job.folder = "/a shared `folder`";
+  expected += programs + "\n" + job.folder + "/slabstream-17\n";
   // The values alone, printed a line each.
-  std::string text = TextOf(script);
+  std::string text = JobScript(job, "head", programs);
   const std::size_t body = text.find("\nservice_file()");
   ASSERT_NE(body, std::string::npos);
   text.resize(body);
@@ -77,35 +76,35 @@ TEST_F(JobScriptTest, ShellWordsComeBack) {
 
 TEST_F(JobScriptTest, ShellcheckFindsNothing) {
   if (!IsInstalled("shellcheck")) GTEST_SKIP() << "needs shellcheck";
-  JobScript script = SomeScript();
-  for (const std::string& text : kOddTexts) script.data.push_back("x=/" + text);
+  SlurmOptions job = SomeJob();
+  for (const std::string& text : kOddTexts) job.data.push_back("x=/" + text);
   for (const int threads : {0, 3}) {
     for (const char* folder : {"", "/a shared 'folder'"}) {
-      script.threads = threads;
-      script.folder = folder;
+      job.threads = threads;
+      job.folder = folder;
       // SC2016: a $ in single quotes stands for itself, as it should.
-      EXPECT_EQ(OutputOf("shellcheck --shell=bash --exclude=SC2016 " + Written(TextOf(script))), "");
+      EXPECT_EQ(OutputOf("shellcheck --shell=bash --exclude=SC2016 " + Written(TextOf(job))), "");
     }
   }
 }
 
 TEST_F(JobScriptTest, SlurmSeesTheOptions) {
-  JobScript script = SomeScript();
-  script.nodes = 4;
-  script.workers_per_node = 2;
-  script.time = "1:30:00";
-  script.notice_seconds = 90;
-  script.directives = {"--partition=long"};
-  const std::string whole_nodes = TextOf(script);
+  SlurmOptions job = SomeJob();
+  job.nodes = 4;
+  job.workers_per_node = 2;
+  job.time.text = "1:30:00";
+  job.notice_seconds = 90;
+  job.directives = {"--partition=long"};
+  const std::string whole_nodes = TextOf(job);
   for (const char* line :
        {"--array=0-3", "--nodes=1", "--ntasks=2", "--time=1:30:00", "--signal=TERM@90", "--requeue", "--exclusive", "--partition=long"})
     EXPECT_THAT(whole_nodes, HasSubstr(std::string("\n#SBATCH ") + line + "\n"));
   EXPECT_THAT(whole_nodes, HasSubstr("\ndrain=68s ")) << "shorter than the notice";
   EXPECT_LT(whole_nodes.rfind("#SBATCH"), whole_nodes.find("set -u")) << "Slurm stops reading at the first command";
   EXPECT_GT(whole_nodes.find("--partition=long"), whole_nodes.find("--requeue")) << "of two options Slurm takes the later";
-  script.threads = 3;
-  EXPECT_THAT(TextOf(script), HasSubstr("\n#SBATCH --cpus-per-task=3\n"));
-  EXPECT_THAT(TextOf(script), Not(HasSubstr("--exclusive")));
+  job.threads = 3;
+  EXPECT_THAT(TextOf(job), HasSubstr("\n#SBATCH --cpus-per-task=3\n"));
+  EXPECT_THAT(TextOf(job), Not(HasSubstr("--exclusive")));
 }
 
 TEST(SlurmValues, Times) {

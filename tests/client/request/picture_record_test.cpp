@@ -45,10 +45,17 @@ PictureRecord RecordOf(const FrameOptions& options) {
   return *std::move(record);
 }
 
-// The same but for the dataset, which the connection decides.
-void ExpectSame(FrameRequest a, FrameRequest b) {
-  a.dataset = b.dataset = "";
-  EXPECT_EQ(a, b);
+// `asked`, a record or options, asks for the picture that was typed; not for the dataset, which the connection decides.
+template <class Asked>
+void ExpectSamePicture(const Asked& asked, const FrameOptions& typed) {
+  FrameRequest request = asked.request;
+  request.dataset = typed.request.dataset;
+  EXPECT_EQ(request, typed.request);
+  EXPECT_EQ(asked.format.background, typed.format.background);
+  EXPECT_EQ(asked.format.png_bits, typed.format.png_bits);
+  EXPECT_EQ(asked.format.quality, typed.format.quality);
+  EXPECT_EQ(asked.format.dots_per_inch, typed.format.dots_per_inch);
+  EXPECT_EQ(asked.format.annotations, typed.format.annotations);
 }
 
 std::string Joined(const std::vector<std::string>& words) {
@@ -115,12 +122,7 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       const FrameOptions typed = Parse(arguments);
       const PictureRecord record = RecordOf(typed);
       EXPECT_EQ(record.source, source);
-      ExpectSame(record.request, typed.request);
-      EXPECT_EQ(record.format.background, typed.format.background);
-      EXPECT_EQ(record.format.png_bits, typed.format.png_bits);
-      EXPECT_EQ(record.format.quality, typed.format.quality);
-      EXPECT_EQ(record.format.dots_per_inch, typed.format.dots_per_inch);
-      EXPECT_EQ(record.format.annotations, typed.format.annotations);
+      ExpectSamePicture(record, typed);
 
       std::vector<std::string> again = RenderArguments(record, "b.png");
       SCOPED_TRACE(Joined(again));
@@ -130,12 +132,7 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       EXPECT_EQ(parsed.source, source);
       EXPECT_EQ(parsed.layers, typed.layers);
       EXPECT_EQ(parsed.connection.local_workers > 0, source == "scans/head.nii.gz");
-      ExpectSame(parsed.request, typed.request);
-      EXPECT_EQ(parsed.format.background, typed.format.background);
-      EXPECT_EQ(parsed.format.png_bits, typed.format.png_bits);
-      EXPECT_EQ(parsed.format.quality, typed.format.quality);
-      EXPECT_EQ(parsed.format.dots_per_inch, typed.format.dots_per_inch);
-      EXPECT_EQ(parsed.format.annotations, typed.format.annotations);
+      ExpectSamePicture(parsed, typed);
     }
   }
 }
@@ -152,7 +149,7 @@ TEST(PictureRecordTest, ATransferFunctionOfAFileIsKeptWhole) {
   std::ofstream(map) << R"([{"RGBPoints": [0, 0.1, 0.2, 0.3, 255, 1, 1, 1], "Points": [0, 0, 0.5, 0, 255, 0.7, 0.25, 1]}])";
   const FrameOptions typed = Parse({"-o", "a.png", "brain", "--transfer", map});
   const PictureRecord record = RecordOf(typed);
-  ExpectSame(record.request, typed.request);
+  ExpectSamePicture(record, typed);
   EXPECT_EQ(Joined(RenderArguments(record, "b.png")), "render brain --transfer color-map.json -o b.png");
 }
 

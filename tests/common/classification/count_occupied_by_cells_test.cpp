@@ -6,6 +6,7 @@
 
 #include "common/classification/count_occupied.h"
 #include "common/mesh/lattice.h"
+#include "tests/common/classification/occupied_grid.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
 #include "tests/support/random_transfer.h"
@@ -39,20 +40,6 @@ Subject MakeSubject(Random& random) {
   subject.resampled = Resample(mesh, lattice);
   subject.table = Classify(RandomTransfer(random), subject.resampled.description, {0, 100});
   return subject;
-}
-
-// The grid of these voxels, x fastest.
-OccupancyGrid GridOf(const Index3& size, const std::vector<bool>& occupied) {
-  OccupancyGrid grid{size, std::vector<CellOccupancy>(CountIn(OccupancyCells(size)))};
-  for (std::size_t i = 0; i < occupied.size(); ++i) {
-    if (!occupied[i]) continue;
-    const Index3 v = PlaceIn(size, i);
-    CellOccupancy& cell = grid.cells[NumberIn(OccupancyCells(size), v / kOccupancyCell)];
-    ++cell.voxels;
-    cell.lines_x |= LineSet{1} << (8 * (v.z % 8) + v.y % 8);
-    cell.lines_y |= LineSet{1} << (8 * (v.z % 8) + v.x % 8);
-  }
-  return grid;
 }
 
 TEST(CountOccupiedByCells, TakesTheVoxelsThatCellsOfVisibleValuesTouch) {

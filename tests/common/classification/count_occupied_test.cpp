@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/common/classification/occupied_grid.h"
 #include "tests/support/random.h"
 #include "tests/support/random_transfer.h"
 #include "tests/support/random_volume.h"
@@ -13,26 +14,15 @@ namespace slabstream {
 namespace {
 
 OccupancyGrid CountOneByOne(const Volume& volume, const ClassificationTable& table) {
-  const Index3 size = volume.description.geometry.size, cells = OccupancyCells(size);
-  OccupancyGrid grid{size, std::vector<CellOccupancy>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
+  const Index3 size = volume.description.geometry.size;
+  std::vector<bool> occupied(CountIn(size));
   VisitScalarType(volume.block.type, [&]<class T>(const T*) {
-    for (Index3 v; v.z < size.z; ++v.z) {
-      for (v.y = 0; v.y < size.y; ++v.y) {
-        for (v.x = 0; v.x < size.x; ++v.x) {
-          const auto sample = double(volume.block.samples<T>()[volume.block.Offset(v)]);
-          if (!std::isfinite(sample) || table.opacity[std::size_t(table.BinOf(sample))] == 0) continue;
-          const Index3 cell = {v.x / kOccupancyCell, v.y / kOccupancyCell, v.z / kOccupancyCell};
-          const std::size_t number =
-              (std::size_t(cell.z) * std::size_t(cells.y) + std::size_t(cell.y)) * std::size_t(cells.x) + std::size_t(cell.x);
-          CellOccupancy& counts = grid.cells[number];
-          ++counts.voxels;
-          counts.lines_x |= LineSet{1} << (8 * (v.z % 8) + v.y % 8);
-          counts.lines_y |= LineSet{1} << (8 * (v.z % 8) + v.x % 8);
-        }
-      }
+    for (std::size_t i = 0; i < occupied.size(); ++i) {
+      const auto sample = double(volume.block.samples<T>()[volume.block.Offset(PlaceIn(size, i))]);
+      occupied[i] = std::isfinite(sample) && table.opacity[std::size_t(table.BinOf(sample))] != 0;
     }
   });
-  return grid;
+  return GridOf(size, occupied);
 }
 
 TEST(CountOccupied, CountsWhatTheTableShows) {

@@ -16,6 +16,7 @@
 namespace slabstream {
 namespace {
 
+constexpr PixelBounds kCodedFrame = {0, 0, 40, 30};
 constexpr ColorCoding kCodings[] = {ColorCoding::kHalf, ColorCoding::kFixed16};
 
 std::vector<float> ManyValues(Random& random) {
@@ -93,20 +94,19 @@ TEST(ColorCoding, EveryInstructionSetGivesTheBitsOfTheReference) {
 TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
   Random random(73);
   SCOPED_TRACE(random.trace());
-  constexpr PixelBounds kFrame = {0, 0, 40, 30};
   for (int i = 0; i < 100; ++i) {
-    const LocalImage image = RandomImage(random, PixelFormat::kRgba, RandomBounds(random, kFrame));
+    const LocalImage image = RandomImage(random, PixelFormat::kRgba, RandomBounds(random, kCodedFrame));
     const RunImage exact = EncodeRuns(ViewOf(image));
     for (const ColorCoding coding : kCodings) {
       RunImage coded = EncodeRuns(ViewOf(image), coding);
       EXPECT_EQ(coded.payload.size(), 12 * exact.header.run_count + 8 * exact.header.pixel_count);
-      const LocalImage a = ReadRuns(exact.header, exact.payload, kFrame).value();
-      const LocalImage b = ReadRuns(coded.header, coded.payload, kFrame).value();
+      const LocalImage a = ReadRuns(exact.header, exact.payload, kCodedFrame).value();
+      const LocalImage b = ReadRuns(coded.header, coded.payload, kCodedFrame).value();
       ASSERT_EQ(a.rgba.size(), b.rgba.size());
       for (std::size_t k = 0; k < a.rgba.size(); ++k) ASSERT_NEAR(a.rgba[k], b.rgba[k], coding == ColorCoding::kHalf ? 0x1p-11 : 8e-6);
       if (coding == ColorCoding::kHalf && coded.header.pixel_count > 0) {  // a code that is no colour
         coded.payload.back() = std::byte{0x7C};
-        EXPECT_EQ(ReadRuns(coded.header, coded.payload, kFrame).status().code(), StatusCode::kInvalidArgument);
+        EXPECT_EQ(ReadRuns(coded.header, coded.payload, kCodedFrame).status().code(), StatusCode::kInvalidArgument);
       }
     }
   }
@@ -114,22 +114,21 @@ TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
   LocalImage bright = MakeLocalImage(PixelFormat::kRgba, {0, 0, 4, 1});
   bright.rgba[0] = bright.rgba[3] = 2;
   EXPECT_EQ(EncodeRuns(ViewOf(bright), ColorCoding::kHalf).header.color, ColorCoding::kFloat32);
-  const LocalImage depth = RandomImage(random, PixelFormat::kDepth, kFrame);
+  const LocalImage depth = RandomImage(random, PixelFormat::kDepth, kCodedFrame);
   EXPECT_EQ(EncodeRuns(ViewOf(depth), ColorCoding::kFixed16).header.color, ColorCoding::kFloat32);
   RunImage wrong = EncodeRuns(ViewOf(depth));
   wrong.header.color = ColorCoding::kHalf;
-  EXPECT_FALSE(ReadRuns(wrong.header, wrong.payload, kFrame).ok());
+  EXPECT_FALSE(ReadRuns(wrong.header, wrong.payload, kCodedFrame).ok());
 }
 
 TEST(ColorCoding, ImagesWithVoxelsTravelWithColoursOf8Bits) {
   Random random(75);
   SCOPED_TRACE(random.trace());
-  constexpr PixelBounds kFrame = {0, 0, 40, 30};
   for (int i = 0; i < 100; ++i) {
-    const LocalImage image = RandomImage(random, PixelFormat::kDepth, RandomBounds(random, kFrame));
+    const LocalImage image = RandomImage(random, PixelFormat::kDepth, RandomBounds(random, kCodedFrame));
     const RunImage coded = EncodeRuns(ViewOf(image), ColorCoding::kStraight8);
     EXPECT_EQ(coded.payload.size(), 12 * (coded.header.run_count + coded.header.pixel_count));
-    const LocalImage read = ReadRuns(coded.header, coded.payload, kFrame).value();
+    const LocalImage read = ReadRuns(coded.header, coded.payload, kCodedFrame).value();
     EXPECT_EQ(read.bounds, image.bounds);
     EXPECT_TRUE(std::ranges::equal(read.depth, image.depth));
     std::vector<std::uint8_t> expected(image.rgba.size()), codes(image.rgba.size());

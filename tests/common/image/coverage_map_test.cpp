@@ -11,7 +11,7 @@
 namespace slabstream {
 namespace {
 
-// An ellipse that fills a part of its bounds, as the screen image of a box does, somewhere in the frame.
+// An ellipse that fills a part of its bounds, as the screen image of a box does, somewhere in the frame. `filled`: its pixels.
 LocalImage Ellipse(Random& random, std::int32_t width, std::int32_t height, std::uint64_t& filled) {
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {7, 11, 7 + width, 11 + height});
   const double x_radius = width * random.Real(0.3, 0.5), y_radius = height * random.Real(0.3, 0.5);
@@ -26,26 +26,21 @@ LocalImage Ellipse(Random& random, std::int32_t width, std::int32_t height, std:
   return image;
 }
 
-TEST(SamplePixels, CountsSmallImages) {
-  Random random(71);
+// Ellipses whose sides are at least `least` and at most `most` pixels; the error as a share of the filled pixels.
+void ExpectSamplePixelsNear(std::uint64_t seed, std::int32_t least, std::int32_t most, double error) {
+  Random random(seed);
   SCOPED_TRACE(random.trace());
   for (int i = 0; i < 100; ++i) {
     std::uint64_t filled = 0;
-    const LocalImage image = Ellipse(random, random.Integer(1, 64), random.Integer(1, 64), filled);
-    EXPECT_EQ(SamplePixels(image), filled);
-  }
-}
-
-TEST(SamplePixels, EstimatesLargeOnesToAFewPercent) {
-  Random random(72);
-  SCOPED_TRACE(random.trace());
-  for (int i = 0; i < 100; ++i) {
-    std::uint64_t filled = 0;
-    const LocalImage image = Ellipse(random, random.Integer(65, 700), random.Integer(65, 700), filled);
-    EXPECT_NEAR(double(SamplePixels(image)), double(filled), 0.05 * double(filled))
+    const LocalImage image = Ellipse(random, random.Integer(least, most), random.Integer(least, most), filled);
+    EXPECT_NEAR(double(SamplePixels(image)), double(filled), error * double(filled))
         << image.bounds.width() << " x " << image.bounds.height();
   }
 }
+
+TEST(SamplePixels, CountsSmallImages) { ExpectSamplePixelsNear(71, 1, 64, 0); }
+
+TEST(SamplePixels, EstimatesLargeOnesToAFewPercent) { ExpectSamplePixelsNear(72, 65, 700, 0.05); }
 
 TEST(SamplePixels, KnowsEmptyAndFullImagesOfAnyShape) {
   Random random(73);

@@ -6,6 +6,7 @@
 
 #include "common/image/local_image.h"
 #include "tests/support/random_image.h"
+#include "tests/support/same_image.h"
 
 namespace slabstream {
 namespace {
@@ -25,10 +26,7 @@ TEST(Resolve, OneIsTheIdentity) {
   Random random(41);
   SCOPED_TRACE(random.trace());
   const LocalImage image = RandomImage(random, PixelFormat::kDepth, {3, 1, 9, 7});
-  const LocalImage same = Resolve(image, 1);
-  EXPECT_EQ(same.bounds, image.bounds);
-  EXPECT_EQ(same.rgba, image.rgba);
-  EXPECT_EQ(same.depth, image.depth);
+  ExpectSameBits(Resolve(image, 1), image);
 }
 
 TEST(Resolve, AveragesColourAndKeepsTheNearestDepth) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/support/random_image.h"
+#include "tests/support/same_image.h"
 
 namespace slabstream {
 namespace {
@@ -115,11 +116,7 @@ TEST(RunImage, TallImagesAreCutIntoBands) {
     const RunImage runs = EncodeRuns(image, {0, 40 * 150}, 40);
     const Result<LocalImage> read = ReadRuns(runs.header, runs.payload, kTall);
     ASSERT_EQ(read.status(), Status::Ok());
-    const LocalImage& decoded = *read;
-    EXPECT_EQ(decoded.bounds, image.bounds);
-    EXPECT_EQ(decoded.rgba, image.rgba);
-    EXPECT_EQ(decoded.depth, image.depth);
-    EXPECT_EQ(decoded.voxel, image.voxel);
+    ExpectSameBits(*read, image);
   }
 }
 

@@ -4,29 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <vector>
 
 #include "tests/support/random_image.h"
+#include "tests/support/same_image.h"
 
 namespace slabstream {
 namespace {
 
 constexpr PixelBounds kFrame = {0, 0, 37, 13};
 constexpr PixelRange kWhole = {0, 37 * 13};
-
-template <class Vector>
-bool SameBits(const Vector& a, const Vector& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
-}
-
-void ExpectSameBits(const LocalImage& a, const LocalImage& b) {
-  EXPECT_EQ(a.bounds, b.bounds);
-  EXPECT_TRUE(SameBits(a.rgba, b.rgba));
-  EXPECT_TRUE(SameBits(a.depth, b.depth));
-  EXPECT_TRUE(SameBits(a.voxel, b.voxel));
-}
 
 LocalImage Combined(LocalImage image, const LocalImage& other, Side side) {
   Combine(image, other, side);

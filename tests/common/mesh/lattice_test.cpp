@@ -1,4 +1,5 @@
 #include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/parallel/task_arena.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // Boxes of a picture of several levels: each lies in zones of one level, and none is too large.
 #include "common/planning/level_partition.h"
+#include "common/volume/indices.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +21,8 @@ LevelMap RandomMap(Random& random, const Index3& size) {
   }
   constexpr std::array<std::uint8_t, 4> kLevels = {0, 1, 2, LevelMap::kOutside};
   const std::size_t kinds = random.Integer<std::size_t>(1, 4);
-  map.ForEachZone([&](const Index3&) { map.of_zone.push_back(kLevels.at(random.Integer<std::size_t>(0, kinds - 1))); });
+  for (std::size_t zone = 0; zone < CountIn(map.counts); ++zone)
+    map.of_zone.push_back(kLevels.at(random.Integer<std::size_t>(0, kinds - 1)));
   return map;
 }
 
@@ -44,9 +46,9 @@ TEST(LevelPartition, BoxesTileTheVolumeAndKeepToZonesOfOneLevel) {
     for (std::size_t i = 0; i < levels.size(); ++i) {
       const Box& box = partition.boxes()[i];
       std::set<std::uint8_t> met;
-      map.ForEachZone([&](const Index3& zone) {
+      for (const Index3& zone : IndicesIn(map.counts)) {
         if (!Intersection(map.BoxOf(zone, size), box).empty()) met.insert(map.Of(zone));
-      });
+      }
       ASSERT_EQ(met, (std::set{levels[i]}));
       if (levels[i] == LevelMap::kOutside) continue;
       ++shown;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/view/world_limits.h"
+#include "common/volume/indices.h"
 #include "tests/common/view/random_view.h"
 
 namespace slabstream {
@@ -381,7 +382,7 @@ TEST(LevelsOfTest, EachPartIsDrawnFromTheCoarsestLevelThatIsFineEnough) {
     };
     ASSERT_TRUE(std::ranges::is_sorted(map.levels));
     ASSERT_EQ(map.of_zone.size(), CountIn(map.counts));
-    map.ForEachZone([&](const Index3& zone) {
+    for (const Index3& zone : IndicesIn(map.counts)) {
       const Box box = map.BoxOf(zone, grid.size);
       double nearest = std::numeric_limits<double>::infinity();
       for (int corner = 0; corner < 8; ++corner) {
@@ -394,13 +395,13 @@ TEST(LevelsOfTest, EachPartIsDrawnFromTheCoarsestLevelThatIsFineEnough) {
       const Camera::ImagePoint seen = camera.Project(inside);
       if (map.Of(zone) == LevelMap::kOutside) {
         ASSERT_FALSE(seen.x > 0 && seen.y > 0 && seen.x < camera.width && seen.y < camera.height) << "what the picture shows is drawn";
-        return;
+        continue;
       }
       const int level = map.levels.at(map.Of(zone));
       ASSERT_FALSE(level != map.levels.front() && too_wide(level, nearest));
       const bool coarsest = level == 3 || width_of(level + 1) > (1 - 1e-6) * request.detail * camera.PixelSizeAt(nearest);
       ASSERT_TRUE(coarsest || LeastBeside(map, zone) < level) << "only beside a finer zone";
-    });
+    }
   }
 }
 
@@ -409,10 +410,10 @@ TEST(LevelsOfTest, NeighbouringZonesDifferByALevelAtMost) {
   SCOPED_TRACE(random.trace());
   for (int round = 0; round < 60; ++round) {
     const auto [levels, request, map] = RandomMixed(random);
-    map.ForEachZone([&](const Index3& zone) {
-      if (map.Of(zone) == LevelMap::kOutside) return;
+    for (const Index3& zone : IndicesIn(map.counts)) {
+      if (map.Of(zone) == LevelMap::kOutside) continue;
       ASSERT_GE(LeastBeside(map, zone), map.levels.at(map.Of(zone)) - 1) << "round " << round;
-    });
+    }
   }
 }
 

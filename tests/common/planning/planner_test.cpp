@@ -36,42 +36,47 @@ TEST(PlanFrame, IsSoundForAnyWorkersGroupsAndSizes) {
   }
 }
 
-TEST(PlanFrame, SlabsAlongTheViewDivideNoSlice) {
-  Random random(92);
+// Calls check(request) for requests that differ in nothing but their views.
+template <class Check>
+void ForRandomViews(std::uint64_t seed, FrameRequest request, Check&& check) {
+  Random random(seed);
   SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 50; ++i) {
+    request.view = RandomView(random);
+    check(request);
+  }
+}
+
+TEST(PlanFrame, SlabsAlongTheViewDivideNoSlice) {
   const VolumeSummary summary = FullSummary({40, 90, 50});
   const Roster roster = FullRoster(4);
   FrameRequest request = SomeRequest();
   request.policy.axis = AxisChoice::kView;
-  for (int i = 0; i < 50; ++i) {
-    request.view = RandomView(random);
-    const FramePlan plan = Plan(request, summary, roster);
+  ForRandomViews(92, request, [&](const FrameRequest& seen) {
+    const FramePlan plan = Plan(seen, summary, roster);
     EXPECT_EQ(plan.slab_axis, plan.setup.camera.traversal_axis);
     // As if the axis had been asked for: other views along it share the layout.
-    FrameRequest same = request;
+    FrameRequest same = seen;
     same.policy.axis = AxisChoice(plan.slab_axis);
     FramePlan other = Plan(same, summary, roster);
     EXPECT_EQ(*other.layout, *plan.layout);
     other.layout = plan.layout;  // plans are equal if they share it
     EXPECT_EQ(other, plan);
-  }
+  });
 }
 
 TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
-  Random random(91);
-  SCOPED_TRACE(random.trace());
   const VolumeSummary summary = FullSummary({40, 90, 50});
   const Roster roster = FullRoster(4);
   FrameRequest request = SomeRequest();
   request.policy.groups = 3;
   request.policy.axis = AxisChoice::kY;
   const FramePlan first = Plan(request, summary, roster);
-  for (int i = 0; i < 50; ++i) {
-    request.view = RandomView(random);
-    const FramePlan plan = Plan(request, summary, roster);
+  ForRandomViews(91, request, [&](const FrameRequest& seen) {
+    const FramePlan plan = Plan(seen, summary, roster);
     EXPECT_EQ(plan.layout->partition, first.layout->partition);
     std::vector<BoxId> forward = PlacedBoxes(first), boxes = PlacedBoxes(plan);
-    if (plan.setup.camera.view_direction.y < 0 && request.view.projection == Projection::kOrthographic) {
+    if (plan.setup.camera.view_direction.y < 0 && seen.view.projection == Projection::kOrthographic) {
       std::reverse(forward.begin(), forward.end());
       EXPECT_EQ(boxes, forward);
     }
@@ -83,12 +88,10 @@ TEST(PlanFrame, TurningTheViewReversesRanksButNeverOwnership) {
       }
       EXPECT_EQ(workers.size(), group.placements.size());  // nobody renders two slabs of a group
     }
-  }
+  });
 }
 
 TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
-  Random random(92);
-  SCOPED_TRACE(random.trace());
   const VolumeSummary summary = FullSummary({100, 300, 300});
   constexpr std::int64_t kTarget = 1 << 20;
   FrameRequest request = SomeRequest();
@@ -96,12 +99,11 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
   ASSERT_TRUE(first.ok());
   EXPECT_EQ(first->slab_axis, Axis::kZ);  // about which views turn
   EXPECT_GT(first->groups.size(), 1U);
-  for (int i = 0; i < 50; ++i) {
-    request.view = RandomView(random);
-    const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), kTarget);
+  ForRandomViews(92, request, [&](const FrameRequest& seen) {
+    const Result<FramePlan> plan = PlanFrame(seen, 7, summary, FullRoster(2), kTarget);
     ASSERT_TRUE(plan.ok());
     EXPECT_EQ(plan->layout->partition, first->layout->partition);
-  }
+  });
 }
 
 TEST(PlanFrame, ChoosesTheFewestGroupsWhoseBoxesStayUnderTheTarget) {

@@ -13,6 +13,7 @@
 #include "common/planning/layout.h"
 #include "common/renderers/sampling_rate.h"
 #include "common/renderers/splat/splat_cost.h"
+#include "common/renderers/splat/splat_work.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/random_box.h"
 #include "tests/support/renderers.h"
@@ -52,9 +53,7 @@ OccupancyGrid ShellGrid(std::int32_t side) {
 constexpr Vec3 kCubes = {1, 1, 1};
 
 using ByView = std::array<double, 2>;  // seconds seen along x and seen along y
-ByView Of(const AnalyticCost& cost, const Box& box) {
-  return {cost.Seconds(box, {.along = Axis::kX}), cost.Seconds(box, {.along = Axis::kY})};
-}
+ByView Of(const AnalyticCost& cost, const Box& box) { return {cost(box, {.along = Axis::kX}), cost(box, {.along = Axis::kY})}; }
 
 OccupancyGrid RandomGrid(Random& random, const Index3& size) {
   OccupancyGrid grid = EmptyGrid(size);
@@ -72,14 +71,14 @@ OccupancyGrid RandomGrid(Random& random, const Index3& size) {
 TEST(AnalyticCost, IsNothingWhereNothingIsNear) {
   OccupancyGrid grid = EmptyGrid({64, 64, 64});
   grid.cells[0] = FullCell({{0, 0, 0}, {8, 8, 8}});
-  const splat::SplatCost cost(grid, kCubes, 0.1);
+  const AnalyticCost cost = splat::SplatCost(grid, kCubes, 0.1);
   const ByView nothing{0, 0};
   EXPECT_EQ(Of(cost, {{10, 0, 0}, {64, 64, 64}}), nothing) << "footprints do not reach so far";
   EXPECT_EQ(Of(cost, {{9, 0, 0}, {64, 64, 64}})[0], 0) << "in no slice of the box";
   EXPECT_GT(Of(cost, {{9, 0, 0}, {64, 64, 64}})[1], 0);
   EXPECT_EQ(Of(cost, {{0, 0, 10}, {64, 64, 64}}), nothing);
   EXPECT_GT(Of(cost, {{0, 0, 9}, {64, 64, 64}})[0], 0);
-  EXPECT_EQ(Of(*ZBuffer()->MakeCost({.drawn = &grid}), {{8, 0, 0}, {64, 64, 64}}), nothing);
+  EXPECT_EQ(Of(ZBuffer()->MakeCost({.drawn = &grid}), {{8, 0, 0}, {64, 64, 64}}), nothing);
 }
 
 TEST(AnalyticCost, KnowsWhichRowsOfACellHoldAnything) {
@@ -136,8 +135,7 @@ TEST(AnalyticCost, GrowsWithTheBoxAndWithTheNumberOfBoxes) {
     const OccupancyGrid grid = RandomGrid(random, {random.Integer(8, 60), random.Integer(8, 60), random.Integer(8, 60)});
     const Box whole = RandomBox(random, {{0, 0, 0}, grid.size}), part = RandomBox(random, whole);
     for (const RendererKind* renderer : Renderers()) {
-      const std::unique_ptr<AnalyticCost> made = renderer->MakeCost({&grid, &summary, &transfer});
-      const AnalyticCost& cost = *made;
+      const AnalyticCost cost = renderer->MakeCost({&grid, &summary, &transfer});
       for (std::size_t view = 0; view < 2; ++view)
         EXPECT_LE(Of(cost, part)[view], Of(cost, whole)[view] * (1 + 1e-12)) << "round " << round;
     }
@@ -145,7 +143,7 @@ TEST(AnalyticCost, GrowsWithTheBoxAndWithTheNumberOfBoxes) {
     if (whole.size()[axis] < 2) continue;
     Box lower = whole, upper = whole;
     lower.end[axis] = upper.begin[axis] = random.Integer(whole.begin[axis] + 1, whole.end[axis] - 1);
-    const splat::SplatCost cost(grid, kCubes, 0);
+    const AnalyticCost cost = splat::SplatCost(grid, kCubes, 0);
     for (std::size_t view = 0; view < 2; ++view) {
       EXPECT_GE(Of(cost, lower)[view] + Of(cost, upper)[view], Of(cost, whole)[view] * (1 - 1e-12)) << "round " << round;
     }
@@ -166,10 +164,10 @@ TEST(AnalyticCost, FollowsTheSamplingRate) {
     for (const RendererParameter& parameter : renderer->parameters()) parameters.push_back(parameter.standard);
     const auto at_rate = [&](double rate) {
       parameters.front() = rate;
-      return renderer->MakeCost({&grid, &summary, &transfer, parameters})->Seconds({{0, 0, 0}, grid.size}, {});
+      return renderer->MakeCost({&grid, &summary, &transfer, parameters})({{0, 0, 0}, grid.size}, {});
     };
     const double standard = parameters.front();
-    EXPECT_EQ(at_rate(standard), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
+    EXPECT_EQ(at_rate(standard), renderer->MakeCost({&grid, &summary, &transfer})({{0, 0, 0}, grid.size}, {})) << "the default";
     // Shears resample slices once, and slicing sets up each cell once, whatever the rate.
     EXPECT_GT(at_rate(2) / at_rate(1), renderer->Can(Ability::kCells) ? 1.05 : 1.3);
     EXPECT_LT(at_rate(2) / at_rate(1), 2.2);
@@ -262,11 +260,11 @@ TEST(AnalyticCost, OfSurfacesAloneIsThatOfTheCellsTheyPassThrough) {
   for (std::size_t i = 0; i < 4; ++i) grid.cells[i] = FullCell({{0, 0, 0}, {8, 8, 8}});  // z < 8
   const auto raycast = FindRenderer("raycast")->MakeCost({&grid, &summary, &transfer});
   const Box lower{{0, 0, 0}, {16, 16, 8}}, upper{{0, 0, 8}, {16, 16, 16}};
-  const double full = Of(*raycast, lower)[0];
+  const double full = Of(raycast, lower)[0];
   EXPECT_GT(full, 0) << "rays leap through it, and boxes are cut before voxels are counted";
-  EXPECT_EQ(Of(*raycast, upper)[0], 0);
+  EXPECT_EQ(Of(raycast, upper)[0], 0);
   for (std::size_t i = 0; i < 4; ++i) grid.cells[i].voxels -= 1;
-  EXPECT_GT(Of(*raycast, lower)[0], full);
+  EXPECT_GT(Of(raycast, lower)[0], full);
 }
 
 // By what is predicted of the layout's boxes, each with a slot of its own: a frame on average over views, and how uneven the worse view is.
@@ -292,19 +290,19 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
   const VolumeSummary summary = FullSummary(grid.size);
   const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
   for (const RendererKind* renderer : Renderers()) {
-    const std::unique_ptr<AnalyticCost> cost = renderer->MakeCost({&grid, &summary, &transfer});
+    const AnalyticCost cost = renderer->MakeCost({&grid, &summary, &transfer});
     const ClassifiedVolume volume(1, transfer, renderer);
     for (const std::uint32_t slots : {2U, 3U, 5U, 8U, 13U}) {
       SCOPED_TRACE(std::to_string(slots) + " slots, renderer " + std::string(renderer->name()));
       ResolvedPolicy resolved = ResolvePolicy({.decomposition = "kd-tree", .groups = 1}, summary.description.geometry);
       const LayoutRequest request{
           .summary = &summary, .volume = &volume, .policy = &resolved, .slots = slots, .known = {.occupied = &grid}};
-      const Predicted occupied = PredictionOf(MakeLayout(request), *cost);
+      const Predicted occupied = PredictionOf(MakeLayout(request), cost);
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
       resolved.balance_by = BalanceBy::kVoxels;
-      EXPECT_LE(occupied.frame, PredictionOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
+      EXPECT_LE(occupied.frame, PredictionOf(MakeLayout(request), cost).frame) << "than boxes of equal volume";
     }
   }
 }

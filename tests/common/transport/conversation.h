@@ -13,6 +13,7 @@
 #include "common/base/time.h"
 #include "common/memory/bytes.h"
 #include "common/transport/socket.h"
+#include "tests/support/text_of.h"
 
 namespace slabstream {
 
@@ -22,7 +23,6 @@ inline std::vector<std::byte> BytesOf(std::string_view text) {
   const auto* data = reinterpret_cast<const std::byte*>(text.data());
   return {data, data + text.size()};
 }
-inline std::string TextOf(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
 // Calls `done` until it is true, while the socket takes notice of what happens. False: it never was.
 template <class Done>

@@ -53,6 +53,24 @@ std::string Describe(const Scene& scene) {
          std::to_string(grid.width) + " x " + std::to_string(grid.height);
 }
 
+// Calls check(scene, random) for many scenes, until one fails.
+template <class Check>
+void ForRandomScenes(std::uint64_t seed, int count, Check&& check) {
+  Random random(seed);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < count && !::testing::Test::HasFailure(); ++i) {
+    const Scene scene = RandomScene(random);
+    SCOPED_TRACE(Describe(scene));
+    check(scene, random);
+  }
+}
+
+Vec3 RandomPoint(const VolumeGeometry& geometry, Random& random) {
+  Vec3 point;
+  for (Axis axis : kAxes) point[axis] = random.Real(-0.5, geometry.size[axis] - 0.5);
+  return point;
+}
+
 struct GridPoint {
   double x, y, w;
 };
@@ -65,55 +83,44 @@ GridPoint FromPicture(const SheetGrid& grid, double x, double y) {
 // The identity that ties picture and grid: a point of the volume projected into the picture and mapped to the grid lies where its slice has
 // it.
 TEST(SheetGrid, PictureAndSlicesAgreeOnEveryPoint) {
-  Random random(31);
-  SCOPED_TRACE(random.trace());
-  for (int i = 0; i < 2000; ++i) {
-    const Scene scene = RandomScene(random);
+  ForRandomScenes(31, 2000, [&](const Scene& scene, Random& random) {
     const auto [c, u, v] = AxesOf(scene.camera.traversal_axis);
     for (int j = 0; j < 20; ++j) {
-      Vec3 point;
-      for (Axis axis : kAxes) point[axis] = random.Real(-0.5, scene.geometry.size[axis] - 0.5);
+      const Vec3 point = RandomPoint(scene.geometry, random);
       const SlicePlacement slice = PlaceSlice(scene.grid, point[c]);
       const double column = slice.scale_u * point[u] + slice.offset_u, row = slice.scale_v * point[v] + slice.offset_v;
       const auto in_picture = scene.camera.Project(point);
       const GridPoint in_grid = FromPicture(scene.grid, in_picture.x, in_picture.y);
-      ASSERT_GT(in_grid.w, 0) << Describe(scene);
+      ASSERT_GT(in_grid.w, 0);
       // Points of the picture are given to 1e-16 of their size, which grows with the zoom.
       const double tolerance = 1e-9 * (1 + std::hypot(in_picture.x, in_picture.y)) + 1e-9 * (std::abs(column) + std::abs(row));
-      ASSERT_NEAR(in_grid.x, column, tolerance) << Describe(scene);
-      ASSERT_NEAR(in_grid.y, row, tolerance) << Describe(scene);
+      ASSERT_NEAR(in_grid.x, column, tolerance);
+      ASSERT_NEAR(in_grid.y, row, tolerance);
     }
-  }
+  });
 }
 
 // A pixel of the picture whose ray meets the volume finds the pixels of the grid that it is made of, within the grid.
 TEST(SheetGrid, HoldsWhatThePictureSeesOfTheVolume) {
-  Random random(32);
-  SCOPED_TRACE(random.trace());
   int seen = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const Scene scene = RandomScene(random);
+  ForRandomScenes(32, 2000, [&](const Scene& scene, Random& random) {
     for (int j = 0; j < 20; ++j) {
-      Vec3 point;
-      for (Axis axis : kAxes) point[axis] = random.Real(-0.5, scene.geometry.size[axis] - 0.5);
+      const Vec3 point = RandomPoint(scene.geometry, random);
       const auto in_picture = scene.camera.Project(point);
       if (in_picture.x < 0 || in_picture.x > scene.camera.width || in_picture.y < 0 || in_picture.y > scene.camera.height) continue;
       const GridPoint in_grid = FromPicture(scene.grid, in_picture.x, in_picture.y);
       ++seen;
-      ASSERT_GE(in_grid.x, 0) << Describe(scene);
-      ASSERT_LE(in_grid.x, scene.grid.width) << Describe(scene);
-      ASSERT_GE(in_grid.y, 0) << Describe(scene);
-      ASSERT_LE(in_grid.y, scene.grid.height) << Describe(scene);
+      ASSERT_GE(in_grid.x, 0);
+      ASSERT_LE(in_grid.x, scene.grid.width);
+      ASSERT_GE(in_grid.y, 0);
+      ASSERT_LE(in_grid.y, scene.grid.height);
     }
-  }
+  });
   EXPECT_GT(seen, 5000);
 }
 
 TEST(SheetGrid, ResolutionIsThatOfThePictureWithinItsLimits) {
-  Random random(33);
-  SCOPED_TRACE(random.trace());
-  for (int i = 0; i < 1000; ++i) {
-    const Scene scene = RandomScene(random);
+  ForRandomScenes(33, 1000, [&](const Scene& scene, Random&) {
     const auto [c, u, v] = AxesOf(scene.camera.traversal_axis);
     const Vec3 centre = 0.5 * (ToVec3(scene.geometry.size) - Vec3{1, 1, 1});
     const SlicePlacement slice = PlaceSlice(scene.grid, centre[c]);
@@ -123,30 +130,27 @@ TEST(SheetGrid, ResolutionIsThatOfThePictureWithinItsLimits) {
       high[axis] += 0.001;
       const auto a = scene.camera.Project(low), b = scene.camera.Project(high);
       const double pixels = std::hypot(b.x - a.x, b.y - a.y) / 0.002;
-      EXPECT_NEAR(scale, std::clamp(pixels, kMinGridPixelsPerVoxel, kMaxGridPixelsPerVoxel), 1e-4) << Describe(scene);
+      EXPECT_NEAR(scale, std::clamp(pixels, kMinGridPixelsPerVoxel, kMaxGridPixelsPerVoxel), 1e-4);
     };
     expect_resolution(u, slice.scale_u);
     expect_resolution(v, slice.scale_v);
     EXPECT_EQ(scene.grid.width % kGridColumnStep, 0);
-  }
+  });
 }
 
 // No view asks for more halo than workers keep: what a footprint reaches from a sample, which lies up to half a voxel outside of the box's
 // outermost voxel centres, and a voxel for gradients.
 TEST(SheetGrid, FootprintsOfAnyViewStayInTheHalo) {
-  Random random(34);
-  SCOPED_TRACE(random.trace());
   double widest = 0;
-  for (int i = 0; i < 20000; ++i) {
-    const Scene scene = RandomScene(random);
+  ForRandomScenes(34, 20000, [&](const Scene& scene, Random&) {
     const Axis c = scene.camera.traversal_axis;
     for (double k : {0.0, scene.geometry.size[c] - 1.0}) {  // scales change monotonically
       const SlicePlacement slice = PlaceSlice(scene.grid, k);
-      ASSERT_LE(std::max(slice.scale_u, slice.scale_v), kMaxSliceScale) << Describe(scene);
+      ASSERT_LE(std::max(slice.scale_u, slice.scale_v), kMaxSliceScale);
       const FootprintSigma sigma = FootprintIn(scene.grid, slice);
       widest = std::max(widest, kFootprintCut * std::max(sigma.u, sigma.v));
     }
-  }
+  });
   EXPECT_LE(widest + 2, kHalo);
   RecordProperty("widest_footprint", std::to_string(widest));
 }
@@ -154,13 +158,10 @@ TEST(SheetGrid, FootprintsOfAnyViewStayInTheHalo) {
 // What a frame takes: a multiple of the picture (of a square round it, as it may be turned) or, where the view is minified, of the sheared
 // volume at half a pixel a voxel. The worst cases are wide perspective views along a diagonal.
 TEST(SheetGrid, SizeIsBoundedByThePictureOrTheVolume) {
-  Random random(35);
-  SCOPED_TRACE(random.trace());
-  for (int i = 0; i < 20000; ++i) {
-    const Scene scene = RandomScene(random);
+  ForRandomScenes(35, 20000, [&](const Scene& scene, Random&) {
     const SheetGrid& grid = scene.grid;
-    ASSERT_LE(grid.width, kMaxGridSide) << Describe(scene);
-    ASSERT_LE(grid.height, kMaxGridSide) << Describe(scene);
+    ASSERT_LE(grid.width, kMaxGridSide);
+    ASSERT_LE(grid.height, kMaxGridSide);
     const auto [c, u, v] = AxesOf(scene.camera.traversal_axis);
     constexpr double kBorder = 20;  // pixels: footprints and filters reach beyond
     const double side = std::max(scene.size.width, scene.size.height) + kBorder;
@@ -168,8 +169,8 @@ TEST(SheetGrid, SizeIsBoundedByThePictureOrTheVolume) {
       return kMinGridPixelsPerVoxel * (scene.geometry.size[axis] + std::abs(shear) * k) + kBorder;
     };
     const double bound = 8 * std::max(side * side, sheared(u, grid.shear_u) * sheared(v, grid.shear_v));
-    ASSERT_LE(double(grid.width) * grid.height, bound) << Describe(scene);
-  }
+    ASSERT_LE(double(grid.width) * grid.height, bound);
+  });
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image/run_image.h"
 #include "common/wire/digest.h"
 #include "common/wire/limits.h"
 #include "tests/support/random.h"

@@ -77,25 +77,14 @@ class BrickStoreTest : public testing::Test {
 TEST_F(BrickStoreTest, HasTheVoxelsOfEveryFormatTypeAndByteOrder) {
   Random random(61);
   SCOPED_TRACE(random.trace());
-  for (const SampleType type : {SampleType::kInt8, SampleType::kUint8, SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32}) {
-    for (const bool big : {false, true}) {
-      const FileSpec spec{.size = {25, 14, 70}, .type = type, .big_endian = big, .qform = 1};
-      std::vector<double> values(std::size_t{25} * 14 * 70);
-      for (double& value : values) value = random.Integer(0, 127);
-      const FileBytes samples = EncodeSamples(type, values, big), zlib = Zlib(samples);
-      const std::pair<std::string, FileBytes> files[] = {{"v.nii.gz", Gzip(NiftiHeader(spec) + samples)},
-                                                         {"v.nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)},
-                                                         {"v.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())) + zlib}};
-      for (const auto& [name, bytes] : files) {
-        SCOPED_TRACE(name);
-        WriteFile(directory_ / name, bytes);
-        for (const bool first : {true, false}) {
-          const Result<StoredStream> stored = Open(directory_ / name);
-          ASSERT_TRUE(stored.ok()) << stored.status().message();
-          EXPECT_EQ(ReadTheStream(), first) << "later ones use what is there";
-          ExpectVoxelsOf(directory_ / name, *stored);
-        }
-      }
+  for (const SampleFile& stream : CompressedStreams({25, 14, 70}, random)) {
+    SCOPED_TRACE(stream.file);
+    WriteFile(directory_ / stream.file, stream.bytes);
+    for (const bool first : {true, false}) {
+      const Result<StoredStream> stored = Open(directory_ / stream.file);
+      ASSERT_TRUE(stored.ok()) << stored.status().message();
+      EXPECT_EQ(ReadTheStream(), first) << "later ones use what is there";
+      ExpectVoxelsOf(directory_ / stream.file, *stored);
     }
   }
 }

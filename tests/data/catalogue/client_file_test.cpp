@@ -11,6 +11,7 @@
 #include <string>
 
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -37,8 +38,7 @@ class ClientFileTest : public testing::Test {
 
 TEST_F(ClientFileTest, ItIsPrivateAndGoesWithItsObject) {
   auto file = Write();
-  std::ifstream written(file->path());
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(written), {}), "voxels");
+  EXPECT_EQ(ReadFile(file->path()), "voxels");
   const auto others = fs::perms::group_all | fs::perms::others_all;
   EXPECT_EQ(fs::status(file->path()).permissions() & others, fs::perms::none);
   EXPECT_EQ(fs::status(fs::path(file->path()).parent_path()).permissions() & others, fs::perms::none);

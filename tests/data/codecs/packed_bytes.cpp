@@ -46,6 +46,7 @@ std::string PackBytes(const std::string& codec, const std::string& bytes, std::s
   constexpr int kWindow = 15, kGzip = 16;
   if (codec == "gzip") return Deflated(bytes, kWindow + kGzip);
   if (codec == "zlib") return Deflated(bytes, kWindow);
+  if (codec == "deflate") return Deflated(bytes, -kWindow);
   if (codec == "crc32c") return bytes + Little32(Crc32c(std::as_bytes(std::span(bytes))));
   if (codec == "blosc") return PackBlosc("zstd", BLOSC_SHUFFLE, element_bytes, bytes);
   if (codec == "zstd") {

@@ -7,8 +7,8 @@
 
 namespace slabstream {
 
-// The names that files give to codecs: "gzip", "zlib", "zstd", "blosc" (with zstd and a shuffle), "lz4", "crc32c", "bzip2", "xz",
-// "brotli"; "lz4 block", bare, and "lz4 java", in its frame. "": as they are.
+// The names that files give to codecs: "gzip", "zlib", "deflate" (without a header), "zstd", "blosc" (with zstd and a shuffle), "lz4",
+// "crc32c", "bzip2", "xz", "brotli"; "lz4 block", bare, and "lz4 java", in its frame. "": as they are.
 std::string PackBytes(const std::string& codec, const std::string& bytes, std::size_t element_bytes = 1);
 
 // shuffle: 0 none, 1 of bytes, 2 of bits. `inner`: "blosclz", "lz4", "lz4hc", "snappy", "zlib", "zstd". "": this libblosc does not have it.

@@ -15,6 +15,7 @@
 #include "tests/data/sources/read_array.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -184,11 +185,7 @@ TEST_F(Hdf5ArrayTest, NoticesDamage) {
   ASSERT_TRUE(array.ok()) << array.status().message();
   ASSERT_TRUE(ReadArray(**array).ok());
   const std::vector<std::uint64_t> first = {0};
-  std::string bytes;
-  {
-    std::ifstream in(path, std::ios::binary);
-    bytes.assign(std::istreambuf_iterator<char>(in), {});
-  }
+  const std::string bytes = ReadFile(path);
   const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(samples.data()), 2000));
   ASSERT_NE(at, std::string::npos);
   std::string damaged = bytes;

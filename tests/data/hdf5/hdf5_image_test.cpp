@@ -18,7 +18,6 @@ namespace slabstream {
 namespace {
 
 using testing::Contains;
-using testing::HasSubstr;
 
 class Hdf5ImageTest : public testing::Test {
  protected:

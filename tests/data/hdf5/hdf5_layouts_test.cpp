@@ -15,9 +15,6 @@
 namespace slabstream {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-
 // The library forgets what an external link is as soon as a source was opened (Hdf5Lock), so this file is made before any test.
 struct FileWithAnExternalLink {
   FileWithAnExternalLink() {

@@ -5,22 +5,10 @@
 
 #include <cmath>
 
-#include "tests/support/random.h"
+#include "tests/support/random_volume.h"
 
 namespace slabstream {
 namespace {
-
-template <class T>
-Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value,
-                  ValueMapping mapping = {}) {
-  Volume volume{{geometry, type, mapping}, MakeVoxelBlock(geometry.bounds(), type)};
-  for (Index3 v; v.z < geometry.size.z; ++v.z) {
-    for (v.y = 0; v.y < geometry.size.y; ++v.y) {
-      for (v.x = 0; v.x < geometry.size.x; ++v.x) volume.block.samples<T>()[volume.block.Offset(v)] = T(value(v));
-    }
-  }
-  return volume;
-}
 
 VolumeGeometry Placed(const Index3& size, const Vec3& spacing, const Vec3& origin, double turn = 0) {
   const double c = std::cos(turn), s = std::sin(turn);
@@ -31,7 +19,7 @@ Vec3 WorldOf(const VolumeGeometry& g, const Index3& v) { return g.orientation.or
 
 TEST(NearestOn, KeepsSamplesOnTheSameGrid) {
   const VolumeGeometry grid = Placed({5, 4, 3}, {0.7, 1.1, 1.3}, {-31.7, 12.9, 4.1}, 0.3);
-  const Volume labels = MakeVolume<std::uint16_t>(grid, ScalarType::kUint16, [](const Index3& v) { return v.x + 10 * v.y + 50 * v.z; });
+  const Volume labels = MakeVolume(grid, ScalarType::kUint16, [](const Index3& v) { return v.x + 10 * v.y + 50 * v.z; });
   EXPECT_EQ(NearestOn(grid, grid, labels.block, ScalarType::kUint16).bytes, labels.block.bytes);
 }
 
@@ -42,8 +30,7 @@ TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
     const auto real = [&](double low, double high) { return random.Real(low, high); };
     const VolumeGeometry grid = Placed({9, 8, 7}, {real(0.5, 2), 1, real(0.5, 2)}, {real(-3, 3), 1, 2}, real(-0.7, 0.7));
     const VolumeGeometry coarse = Placed({5, 6, 4}, {real(1, 3), 2, real(1, 3)}, {real(-3, 3), real(-3, 3), 0}, real(-0.7, 0.7));
-    const Volume labels =
-        MakeVolume<std::uint16_t>(coarse, ScalarType::kUint16, [](const Index3& v) { return 1 + v.x + 5 * v.y + 30 * v.z; });
+    const Volume labels = MakeVolume(coarse, ScalarType::kUint16, [](const Index3& v) { return 1 + v.x + 5 * v.y + 30 * v.z; });
     const VoxelBlock found = NearestOn(grid, coarse, labels.block, ScalarType::kUint16);
     for (Index3 v; v.z < grid.size.z; ++v.z) {
       for (v.y = 0; v.y < grid.size.y; ++v.y) {
@@ -75,8 +62,8 @@ TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
 
 TEST(InterpolatedOn, IsExactForLinearValuesAndNothingOutside) {
   const VolumeGeometry layer = Placed({6, 6, 6}, {2, 2, 2}, {0, 0, 0});
-  const Volume ramp = MakeVolume<std::uint8_t>(layer, ScalarType::kUint8, [](const Index3& v) { return v.x + 6 * v.y + 36 * v.z; },
-                                               {.scale = 0.5, .offset = -3});
+  Volume ramp = MakeVolume(layer, ScalarType::kUint8, [](const Index3& v) { return v.x + 6 * v.y + 36 * v.z; });
+  ramp.description.mapping = {.scale = 0.5, .offset = -3};
   const VolumeGeometry grid = Placed({9, 9, 9}, {1.5, 1.5, 1.5}, {-2, 0.25, 0.5});
   const VoxelBlock found = InterpolatedOn(grid, ramp);
   for (Index3 v; v.z < 9; ++v.z) {
@@ -98,7 +85,7 @@ TEST(InterpolatedOn, IsExactForLinearValuesAndNothingOutside) {
 
 TEST(InterpolatedOn, AVoxelWithoutAValueCountsOnlyWhereItHasAPart) {
   const VolumeGeometry layer = Placed({3, 1, 1}, {1, 1, 1}, {0, 0, 0});
-  const Volume values = MakeVolume<float>(layer, ScalarType::kFloat32, [](const Index3& v) { return v.x == 2 ? NAN : 4 + v.x; });
+  const Volume values = MakeVolume(layer, ScalarType::kFloat32, [](const Index3& v) { return v.x == 2 ? NAN : 4 + v.x; });
   const VoxelBlock found = InterpolatedOn(Placed({5, 1, 1}, {0.5, 1, 1}, {0, 0, 0}), values);
   const float* const samples = found.samples<float>();
   EXPECT_EQ(samples[0], 4);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include "common/files/files.h"
 #include "data/n5/n5_array.h"
@@ -17,17 +16,12 @@
 #include "tests/data/sources/read_array.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
 using Sizes = std::vector<std::uint64_t>;
-
-void WriteText(const std::filesystem::path& path, const std::string& text) {
-  std::filesystem::create_directories(path.parent_path());
-  std::ofstream(path, std::ios::binary) << text;
-}
 
 std::string BigEndian(std::uint64_t value, int bytes) {
   std::string text;
@@ -54,7 +48,7 @@ std::string AttributesOf(const Spec& spec, const std::string& more = "") {
 
 // Random elements; returns all of them, x fastest, in this machine's byte order. Those of missing blocks are 0.
 std::vector<std::byte> WriteDataset(const std::filesystem::path& folder, const Spec& spec, Random& random, const std::string& more = "") {
-  WriteText(folder / "attributes.json", AttributesOf(spec, more));
+  WriteFile(folder / "attributes.json", AttributesOf(spec, more));
   const std::size_t each = BytesPerSample(spec.type), axes = spec.size.size();
   std::uint64_t count = 1;
   Sizes reversed_counts;
@@ -97,7 +91,7 @@ std::vector<std::byte> WriteDataset(const std::filesystem::path& folder, const S
       std::ranges::reverse(element);
       std::memcpy(elements.data() + place * each, element.data(), each);
     } while (NextIndex(at, reversed));
-    WriteText(path, header + PackBytes(spec.compression == "raw"   ? ""
+    WriteFile(path, header + PackBytes(spec.compression == "raw"   ? ""
                                        : spec.compression == "lz4" ? "lz4 java"
                                                                    : spec.compression,
                                        bytes, each));
@@ -166,7 +160,7 @@ TEST_F(N5Test, DamagedBlocksAreNamed) {
   };
   const Sizes first = {0, 0};
   for (const auto& [bytes, why] : cases) {
-    WriteText(root_ + "/0/0", bytes);
+    WriteFile(root_ + "/0/0", bytes);
     const Status status = ReadChunkNow(**array, first).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
     EXPECT_THAT(status.message(), testing::AllOf(HasSubstr("scan.n5/0/0: "), HasSubstr(why)));
@@ -192,7 +186,7 @@ TEST_F(N5Test, WrongAttributesAreNamed) {
       {with("\"compression\"", "\"packing\""), "must be a text"},
   };
   for (const auto& [text, why] : cases) {
-    WriteText(root_ + "/attributes.json", text);
+    WriteFile(root_ + "/attributes.json", text);
     ExpectRefused({}, why);
   }
 }
@@ -202,15 +196,15 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   const std::string setup_attributes = R"({"downsamplingFactors": [[1, 1, 1], [2, 2, 1]], "dataType": "uint16"})";
   std::vector<std::byte> fine, coarse;
   for (const std::string setup : {"/setup0", "/setup2"}) {
-    WriteText(root_ + setup + "/attributes.json", setup_attributes);
+    WriteFile(root_ + setup + "/attributes.json", setup_attributes);
     for (const std::string time : {"/timepoint0", "/timepoint4"}) {
-      WriteText(root_ + setup + time + "/attributes.json", R"({"multiScale": true, "resolution": [1, 1, 1]})");
+      WriteFile(root_ + setup + time + "/attributes.json", R"({"multiScale": true, "resolution": [1, 1, 1]})");
       fine = WriteDataset(root_ + setup + time + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}, .compression = "gzip"}, random);
       coarse = WriteDataset(root_ + setup + time + "/s1", {.size = {4, 4, 5}, .block = {4, 4, 4}, .compression = "gzip"}, random);
     }
   }
-  WriteText(root_ + "/attributes.json", R"({"n5": "2.5.1"})");
-  WriteText(directory_ / "scan.xml",
+  WriteFile(root_ + "/attributes.json", R"({"n5": "2.5.1"})");
+  WriteFile(directory_ / "scan.xml",
             "<SpimData><SequenceDescription><ViewSetups><ViewSetup><id>2</id><name>green</name>"
             "<voxelSize><unit>um</unit><size>0.5 0.5 2</size></voxelSize></ViewSetup></ViewSetups></SequenceDescription></SpimData>");
   ExpectRefused({.channel = 2}, "scan.n5: has 2 channels, so channel must be 0 to 1 (0, 1: green)");
@@ -234,7 +228,7 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
 TEST_F(N5Test, GroupsOfLevels) {
   Random random(8);
   for (const std::string group : {"/raw", "/deep/labels"}) {
-    WriteText(root_ + group + "/attributes.json",
+    WriteFile(root_ + group + "/attributes.json",
               R"({"scales": [[1, 1, 1], [2, 2, 2], [4, 4, 4]], "pixelResolution": {"unit": "nm", "dimensions": [4, 4, 40]}})");
     WriteDataset(root_ + group + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
     WriteDataset(root_ + group + "/s1", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
@@ -267,7 +261,7 @@ TEST_F(N5Test, TransformsSayWhereLevelsLie) {
     "units": ["nm", "nm", "nm"]})";
   WriteDataset(root_ + "/em/fine", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random, zyx);
   WriteDataset(root_ + "/em/coarse", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random, xyz);
-  WriteText(root_ + "/em/attributes.json", R"({"multiscales": [{"datasets": [{"path": "fine"}, {"path": "coarse"}]}]})");
+  WriteFile(root_ + "/em/attributes.json", R"({"multiscales": [{"datasets": [{"path": "fine"}, {"path": "coarse"}]}]})");
   const auto check = [](const SourceInfo& info) {
     ASSERT_EQ(info.levels.size(), 2U);
     const VolumeGeometry &fine = info.levels[0].description.geometry, &coarse = info.levels[1].description.geometry;
@@ -285,10 +279,10 @@ TEST_F(N5Test, TransformsSayWhereLevelsLie) {
   // The group may say it of all levels, in COSEM's words or in those of OME-Zarr.
   WriteDataset(root_ + "/em/fine", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
   WriteDataset(root_ + "/em/coarse", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
-  WriteText(root_ + "/em/attributes.json",
+  WriteFile(root_ + "/em/attributes.json",
             R"({"multiscales": [{"datasets": [{"path": "fine")" + zyx + R"(}, {"path": "coarse")" + xyz + "}]}]}");
   check((*Open())->info());
-  WriteText(root_ + "/em/attributes.json",
+  WriteFile(root_ + "/em/attributes.json",
             R"({"multiscales": [{"axes": [{"name": "z", "unit": "nanometer"}, {"name": "y", "unit": "nanometer"},
     {"name": "x", "unit": "nanometer"}], "datasets": [
     {"path": "fine", "coordinateTransformations": [{"type": "scale", "scale": [5, 4, 3]}, {"type": "translation", "translation": [100, 200, 300]}]},
@@ -365,7 +359,7 @@ TEST_F(N5Test, ChannelsInFolders) {
   for (const char* const channel : {"/c0", "/c1"}) {
     second = WriteDataset(root_ + channel + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
     WriteDataset(root_ + channel + "/s1", {.size = {5, 4, 3}, .block = {4, 4, 4}}, random, R"(, "downsamplingFactors": [2, 2, 2])");
-    WriteText(root_ + channel + "/attributes.json", R"({"pixelResolution": [1, 1, 2]})");
+    WriteFile(root_ + channel + "/attributes.json", R"({"pixelResolution": [1, 1, 2]})");
   }
   const auto source = Open({.channel = 1});
   ASSERT_TRUE(source.ok()) << source.status().message();
@@ -414,9 +408,9 @@ TEST_F(N5Test, WhatCannotBeListedOpensLikeAFolder) {
   EXPECT_EQ(open()->levels.size(), 2U);
   std::filesystem::remove_all(root_);
   for (int setup = 0; setup < 3; ++setup) {
-    WriteText(fmt::format("{}/setup{}/attributes.json", root_, setup), "{}");
+    WriteFile(fmt::format("{}/setup{}/attributes.json", root_, setup), "{}");
     for (int time = 0; time < 21; ++time) {
-      WriteText(fmt::format("{}/setup{}/timepoint{}/s0/attributes.json", root_, setup, time), "{}");
+      WriteFile(fmt::format("{}/setup{}/timepoint{}/s0/attributes.json", root_, setup, time), "{}");
     }
     levels(fmt::format("{}/setup{}/timepoint20", root_, setup));
   }

@@ -20,8 +20,6 @@
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
-
 class RemoteSourceTest : public testing::Test {
  protected:
   // An OME-Zarr of two levels in chunks of 8 voxels, in the folder NAME.

@@ -70,21 +70,10 @@ TEST(SliceStream, GivesTheVolumeOfEveryFormatTypeAndByteOrder) {
   Random random(51);
   SCOPED_TRACE(random.trace());
   const TemporaryDirectory directory;
-  for (const SampleType type : {SampleType::kInt8, SampleType::kUint8, SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32}) {
-    for (const bool big : {false, true}) {
-      const FileSpec spec{.size = {5, 4, 7}, .type = type, .big_endian = big, .qform = 1};
-      std::vector<double> values(140);
-      for (double& value : values) value = random.Integer(0, 127);
-      const FileBytes samples = EncodeSamples(type, values, big), zlib = Zlib(samples);
-      const std::pair<std::string, FileBytes> files[] = {{"v.nii.gz", Gzip(NiftiHeader(spec) + samples)},
-                                                         {"v.nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)},
-                                                         {"v.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())) + zlib}};
-      for (const auto& [name, bytes] : files) {
-        SCOPED_TRACE(name);
-        WriteFile(directory / name, bytes);
-        ExpectStreamLikeWhole(directory / name);
-      }
-    }
+  for (const SampleFile& stream : CompressedStreams({5, 4, 7}, random)) {
+    SCOPED_TRACE(stream.file);
+    WriteFile(directory / stream.file, stream.bytes);
+    ExpectStreamLikeWhole(directory / stream.file);
   }
 }
 

@@ -7,7 +7,6 @@
 #include <bit>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 
 #include "data/open/open_source.h"
@@ -20,17 +19,12 @@
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
 
-using testing::HasSubstr;
 using Triple = std::array<std::uint64_t, 3>;
-
-void WriteText(const std::filesystem::path& path, const std::string& text) {
-  std::filesystem::create_directories(path.parent_path());
-  std::ofstream(path, std::ios::binary) << text;
-}
 
 Bytes BytesOf(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
@@ -145,7 +139,7 @@ std::uint16_t Value(int x, int y, int z, int channel) { return std::uint16_t(cha
 
 TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   const int size[3] = {10, 7, 5}, chunk[3] = {4, 4, 3}, offset[3] = {100, -3, 0};
-  WriteText(root_ + "/info", Info("image", "uint16", 2, R"({"key": "8_8_40", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
+  WriteFile(root_ + "/info", Info("image", "uint16", 2, R"({"key": "8_8_40", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
     "resolution": [8, 8, 40], "voxel_offset": [100, -3, 0], "encoding": "raw"},
     {"key": "16_16_40", "size": [5, 4, 5], "chunk_sizes": [[64, 64, 64]], "resolution": [16, 16, 40],
     "voxel_offset": [50, -2, 0], "encoding": "raw"})"));
@@ -168,7 +162,7 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
         const std::string name = fmt::format("{}/8_8_40/{}-{}_{}-{}_{}-{}", root_, offset[0] + x, offset[0] + end[0], offset[1] + y,
                                              offset[1] + end[1], offset[2] + z, offset[2] + end[2]);
         if (number == 5) continue;  // is not there
-        WriteText(name + (number % 3 == 2 ? ".gz" : ""), number % 3 == 0 ? bytes : Gzip(bytes));
+        WriteFile(name + (number % 3 == 2 ? ".gz" : ""), number % 3 == 0 ? bytes : Gzip(bytes));
       }
     }
   }
@@ -202,7 +196,7 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   EXPECT_GT(missing, 0);
   EXPECT_THAT(SamplesOf<std::uint16_t>(**source, 1).value(), testing::Each(0)) << "no chunk of this level is there";
 
-  WriteText(root_ + "/8_8_40/100-104_-3-1_0-3", "short");
+  WriteFile(root_ + "/8_8_40/100-104_-3-1_0-3", "short");
   const Status damaged = SamplesOf<std::uint16_t>(**Open({.channel = 0})).status();
   EXPECT_EQ(damaged.code(), StatusCode::kDataLoss);
   EXPECT_THAT(damaged.message(), HasSubstr("em/8_8_40/100-104_-3-1_0-3: has 5 bytes, expected 192"));
@@ -216,7 +210,7 @@ TEST_F(PrecomputedTest, FilesOfEveryEndingAreUnpacked) {
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = std::uint32_t(i / 5);
   for (const std::string encoding : {"raw", "compressed_segmentation"}) {
     std::filesystem::remove_all(root_);
-    WriteText(root_ + "/info", Info("segmentation", "uint32", 1,
+    WriteFile(root_ + "/info", Info("segmentation", "uint32", 1,
                                     fmt::format(R"({{"key": "s", "size": [4, 4, {}], "chunk_sizes": [[4, 4, 4]], "resolution": [1, 1, 1],
       "encoding": "{}", "compressed_segmentation_block_size": [2, 2, 2]}})",
                                                 4 * std::size(packings), encoding)));
@@ -224,14 +218,14 @@ TEST_F(PrecomputedTest, FilesOfEveryEndingAreUnpacked) {
       const std::vector<std::uint32_t> part(labels.begin() + std::ptrdiff_t(64 * i), labels.begin() + std::ptrdiff_t(64 * (i + 1)));
       const std::string bytes = encoding == "raw" ? std::string(reinterpret_cast<const char*>(part.data()), 256)
                                                   : Word(1) + Segmented(part, {4, 4, 4}, {2, 2, 2});
-      WriteText(fmt::format("{}/s/0-4_0-4_{}-{}{}", root_, 4 * i, 4 * i + 4, packings[i].first), PackBytes(packings[i].second, bytes));
+      WriteFile(fmt::format("{}/s/0-4_0-4_{}-{}{}", root_, 4 * i, 4 * i + 4, packings[i].first), PackBytes(packings[i].second, bytes));
     }
     const auto samples = SamplesOf<float>(**Open());
     ASSERT_TRUE(samples.ok()) << samples.status().message();
     EXPECT_TRUE(std::ranges::equal(*samples, labels)) << encoding;
   }
   // What is not packed as its ending says is no chunk of zeros.
-  WriteText(root_ + "/s/0-4_0-4_8-12.br", "no brotli");
+  WriteFile(root_ + "/s/0-4_0-4_8-12.br", "no brotli");
   const Status damaged = SamplesOf<float>(**Open()).status();
   EXPECT_EQ(damaged.code(), StatusCode::kDataLoss);
   EXPECT_THAT(damaged.message(), HasSubstr("em/s/0-4_0-4_8-12.br: damaged: these are no bytes of brotli"));
@@ -239,7 +233,7 @@ TEST_F(PrecomputedTest, FilesOfEveryEndingAreUnpacked) {
 
 TEST_F(PrecomputedTest, JpegChunks) {
   for (const int channels : {1, 3}) {
-    WriteText(root_ + "/info", Info("image", "uint8", channels, R"({"key": "0", "size": [8, 4, 8], "chunk_sizes": [[8, 4, 4]],
+    WriteFile(root_ + "/info", Info("image", "uint8", channels, R"({"key": "0", "size": [8, 4, 8], "chunk_sizes": [[8, 4, 4]],
       "resolution": [1, 1, 1], "encoding": "jpeg"})"));
     for (const int z : {0, 4}) {
       FileBytes pixels;
@@ -248,7 +242,7 @@ TEST_F(PrecomputedTest, JpegChunks) {
       }
       const std::string path = directory_ / "picture.jpg";
       WriteJpeg(path, {8, 16, 1}, channels, pixels, false);
-      WriteText(fmt::format("{}/0/0-8_0-4_{}-{}", root_, z, z + 4), ReadFile(path));
+      WriteFile(fmt::format("{}/0/0-8_0-4_{}-{}", root_, z, z + 4), ReadFile(path));
     }
     const auto source = Open({.channel = channels - 1});
     ASSERT_TRUE(source.ok()) << source.status().message();
@@ -263,7 +257,7 @@ TEST_F(PrecomputedTest, JpegChunks) {
        {std::pair<std::string, const char*>{small, "is a JPEG picture of 64 pixels of 3 components, must be of 128 of 3"},
         {"no picture", "not a JPEG picture"},
         {good.substr(0, good.size() - 2), "truncated or damaged"}}) {
-    WriteText(chunk, bytes);
+    WriteFile(chunk, bytes);
     const Status status = SamplesOf<std::uint8_t>(**Open({.channel = 0})).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
     EXPECT_THAT(status.message(), testing::AllOf(HasSubstr("em/0/0-8_0-4_0-4: "), HasSubstr(why)));
@@ -271,11 +265,11 @@ TEST_F(PrecomputedTest, JpegChunks) {
 }
 
 TEST_F(PrecomputedTest, SegmentationsAreLabels) {
-  WriteText(root_ + "/info", Info("segmentation", "uint32", 1, R"({"key": "seg", "size": [5, 6, 7], "chunk_sizes": [[8, 8, 8]],
+  WriteFile(root_ + "/info", Info("segmentation", "uint32", 1, R"({"key": "seg", "size": [5, 6, 7], "chunk_sizes": [[8, 8, 8]],
     "resolution": [4, 4, 4], "encoding": "compressed_segmentation", "compressed_segmentation_block_size": [4, 4, 4]})"));
   std::vector<std::uint32_t> labels(5 * 6 * 7);
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = std::uint32_t(i * 7 % 50);
-  WriteText(root_ + "/seg/0-5_0-6_0-7", Gzip(Word(1) + Segmented(labels, {5, 6, 7}, {4, 4, 4})));
+  WriteFile(root_ + "/seg/0-5_0-6_0-7", Gzip(Word(1) + Segmented(labels, {5, 6, 7}, {4, 4, 4})));
   const auto source = Open();
   ASSERT_TRUE(source.ok()) << source.status().message();
   EXPECT_TRUE((*source)->info().labels);
@@ -331,7 +325,7 @@ void WriteShards(const std::string& folder, const precomputed::Sharding& shardin
       index.replace(16 * minishard, 16, LongWord(data.size()) + LongWord(data.size() + packed.size()));
       data += packed;
     }
-    WriteText(folder + "/" + file, index + data);
+    WriteFile(folder + "/" + file, index + data);
   }
 }
 
@@ -339,7 +333,7 @@ TEST_F(PrecomputedTest, ChunksInShards) {
   for (const bool gzip : {false, true}) {
     for (const std::string hash : {"identity", "murmurhash3_x86_128"}) {
       std::filesystem::remove_all(root_);
-      WriteText(root_ + "/info", Info("image", "uint8", 1,
+      WriteFile(root_ + "/info", Info("image", "uint8", 1,
                                       R"({"key": "s", "size": [9, 7, 8], "chunk_sizes": [[4, 4, 4]],
         "resolution": [1, 1, 1], "encoding": "raw", "sharding": )" +
                                           ShardingText(hash, 2, 1, gzip) + "}"));
@@ -378,7 +372,7 @@ TEST_F(PrecomputedTest, ChunksInShards) {
   for (const auto& [bytes, why] : {std::pair<std::string, const char*>{good.substr(0, 7), "the shard ends within its index"},
                                    {good.substr(0, 70), "the shard ends within an index"},
                                    {far, "the index of the shard is damaged: a minishard lies from 1 to 18446744073709551615"}}) {
-    WriteText(path, bytes);
+    WriteFile(path, bytes);
     const Status status = SamplesOf<std::uint8_t>(**Open()).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
     EXPECT_THAT(status.message(), testing::AllOf(HasSubstr(".shard: chunk "), HasSubstr(why)));
@@ -418,20 +412,20 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
       {"{\"scales\"", "em/info: damaged: not JSON"},
   };
   for (const auto& [text, why] : cases) {
-    WriteText(root_ + "/info", text);
+    WriteFile(root_ + "/info", text);
     ExpectRefused({}, why);
   }
-  WriteText(root_ + "/info", with("\"key\": \"0\"", "\"key\": \"../elsewhere\""));
+  WriteFile(root_ + "/info", with("\"key\": \"0\"", "\"key\": \"../elsewhere\""));
   const auto outside = Open();
   ASSERT_TRUE(outside.ok()) << outside.status().message();
   EXPECT_FALSE(SamplesOf<std::uint8_t>(**outside).ok()) << "chunks lie in the folder";
-  WriteText(root_ + "/info", good);
+  WriteFile(root_ + "/info", good);
   ExpectRefused({.time = TimeRange{0, 0}}, "time is no option of Neuroglancer precomputed");
 }
 
 TEST_F(PrecomputedTest, OneLineTellsThatNoChunkIsThere) {
   const auto said = [&](const std::string& more) {
-    WriteText(root_ + "/info", Info("image", "uint8", 1,
+    WriteFile(root_ + "/info", Info("image", "uint8", 1,
                                     R"({"key": "s", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
       "resolution": [8, 8, 40], "voxel_offset": [-8, 0, 0], "encoding": "raw")" +
                                         more + "}"));

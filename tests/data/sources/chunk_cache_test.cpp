@@ -7,41 +7,45 @@
 namespace slabstream {
 namespace {
 
-Bytes Elements(std::size_t count, std::uint8_t value) { return Bytes(std::vector<std::byte>(count, std::byte{value})); }
+class ChunkCacheTest : public testing::Test {
+ protected:
+  // A chunk whose elements all have the value `value`.
+  void Keep(ChunkCache::Owner owner, std::uint64_t chunk, std::size_t bytes, std::uint8_t value) {
+    cache_.Keep(owner, chunk, Bytes(std::vector<std::byte>(bytes, std::byte{value})));
+  }
+  bool Has(ChunkCache::Owner owner, std::uint64_t chunk) { return cache_.Find(owner, chunk).has_value(); }
 
-TEST(ChunkCacheTest, DropsTheChunkThatWasUnusedForLongest) {
-  ChunkCache cache(100);
-  const ChunkCache::Owner owner = cache.NewOwner();
-  cache.Keep(owner, 1, Elements(40, 1));
-  cache.Keep(owner, 2, Elements(40, 2));
-  EXPECT_TRUE(cache.Find(owner, 1).has_value());
-  cache.Keep(owner, 3, Elements(40, 3));
-  EXPECT_FALSE(cache.Find(owner, 2).has_value());
-  EXPECT_EQ(cache.Find(owner, 1)->span()[0], std::byte{1});
-  EXPECT_EQ(cache.Find(owner, 3)->span()[0], std::byte{3});
-  EXPECT_EQ(cache.bytes(), 80U);
+  ChunkCache cache_{100};
+  const ChunkCache::Owner one_ = cache_.NewOwner(), other_ = cache_.NewOwner();
+};
+
+TEST_F(ChunkCacheTest, DropsTheChunkThatWasUnusedForLongest) {
+  Keep(one_, 1, 40, 1);
+  Keep(one_, 2, 40, 2);
+  EXPECT_TRUE(Has(one_, 1));
+  Keep(one_, 3, 40, 3);
+  EXPECT_FALSE(Has(one_, 2));
+  EXPECT_EQ(cache_.Find(one_, 1)->span()[0], std::byte{1});
+  EXPECT_EQ(cache_.Find(one_, 3)->span()[0], std::byte{3});
+  EXPECT_EQ(cache_.bytes(), 80U);
 }
 
-TEST(ChunkCacheTest, KeepsNothingLargerThanItsBudget) {
-  ChunkCache cache(100);
-  const ChunkCache::Owner owner = cache.NewOwner();
-  cache.Keep(owner, 1, Elements(100, 1));
-  cache.Keep(owner, 2, Elements(101, 2));
-  EXPECT_TRUE(cache.Find(owner, 1).has_value());
-  EXPECT_FALSE(cache.Find(owner, 2).has_value());
+TEST_F(ChunkCacheTest, KeepsNothingLargerThanItsBudget) {
+  Keep(one_, 1, 100, 1);
+  Keep(one_, 2, 101, 2);
+  EXPECT_TRUE(Has(one_, 1));
+  EXPECT_FALSE(Has(one_, 2));
 }
 
-TEST(ChunkCacheTest, ForgetsTheChunksOfOneOwner) {
-  ChunkCache cache(100);
-  const ChunkCache::Owner one = cache.NewOwner(), other = cache.NewOwner();
-  cache.Keep(one, 1, Elements(10, 1));
-  cache.Keep(one, 2, Elements(10, 2));
-  cache.Keep(other, 1, Elements(10, 3));
-  cache.Keep(other, 1, Elements(10, 4));  // is there already
-  cache.Forget(one);
-  EXPECT_FALSE(cache.Find(one, 1).has_value());
-  EXPECT_EQ(cache.Find(other, 1)->span()[0], std::byte{3});
-  EXPECT_EQ(cache.bytes(), 10U);
+TEST_F(ChunkCacheTest, ForgetsTheChunksOfOneOwner) {
+  Keep(one_, 1, 10, 1);
+  Keep(one_, 2, 10, 2);
+  Keep(other_, 1, 10, 3);
+  Keep(other_, 1, 10, 4);  // is there already
+  cache_.Forget(one_);
+  EXPECT_FALSE(Has(one_, 1));
+  EXPECT_EQ(cache_.Find(other_, 1)->span()[0], std::byte{3});
+  EXPECT_EQ(cache_.bytes(), 10U);
 }
 
 }  // namespace

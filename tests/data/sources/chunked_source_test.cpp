@@ -278,7 +278,8 @@ TEST(ChunkedSourceTest, KeepsChunksOfWhichNoReadTookAll) {
   EXPECT_EQ(array->asked().size(), 2U);
   EXPECT_EQ(part[5], *array->element(std::vector<std::uint64_t>{1, 1, 5}));
   source.reset();
-  EXPECT_EQ(context->cache().bytes(), 0U);
+  // The last read's task may still own the source for a moment.
+  while (context->cache().bytes() > 0) std::this_thread::yield();
 }
 
 TEST(ChunkedSourceTest, KeepsAllChunksOfASmallLevelBehindAnAddress) {

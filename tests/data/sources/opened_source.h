@@ -16,6 +16,10 @@
 
 namespace slabstream {
 
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
 inline SourceContext TestReadContext() { return std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}); }
 
 inline std::shared_ptr<VolumeSource> Opened(const Result<std::shared_ptr<VolumeSource>>& source) {
@@ -26,7 +30,7 @@ inline std::shared_ptr<VolumeSource> Opened(const Result<std::shared_ptr<VolumeS
 // Refused in one line that says why.
 inline void ExpectRefusal(const Result<std::shared_ptr<VolumeSource>>& source, const std::string& why) {
   ASSERT_FALSE(source.ok()) << why;
-  EXPECT_THAT(source.status().message(), testing::HasSubstr(why));
+  EXPECT_THAT(source.status().message(), HasSubstr(why));
   EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
 }
 

@@ -16,6 +16,7 @@
 #include "tests/data/stores/scripted_server.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/text_of.h"
 
 namespace slabstream {
 namespace {
@@ -27,7 +28,6 @@ Bytes BytesOf(const std::string& text) {
   const auto data = std::as_bytes(std::span(text));
   return Bytes(std::vector<std::byte>(data.begin(), data.end()));
 }
-std::string TextOf(const Bytes& bytes) { return {reinterpret_cast<const char*>(bytes.span().data()), bytes.size()}; }
 
 class ObjectCacheTest : public testing::Test {
  protected:
@@ -60,11 +60,11 @@ TEST_F(ObjectCacheTest, KeepsWhatItWasGivenForOtherProcessesAndLaterOnes) {
     ASSERT_TRUE(a && empty);
     EXPECT_EQ(a->version, "\"v1\"");
     EXPECT_EQ(a->size, 100U);
-    EXPECT_EQ(TextOf(a->bytes), "ten bytes.");
+    EXPECT_EQ(TextOf(a->bytes.span()), "ten bytes.");
     EXPECT_EQ(empty->bytes.size(), 0U);
   }
   second.Keep("a", {"\"v3\"", 7, BytesOf("changed")});
-  EXPECT_EQ(TextOf(first.Find("a")->bytes), "changed");
+  EXPECT_EQ(TextOf(first.Find("a")->bytes.span()), "changed");
   first.Keep("large", {"\"v\"", 1, BytesOf(std::string(kBudget / 16 + 1, 'x'))});
   EXPECT_FALSE(first.Find("large"));
 }
@@ -126,7 +126,7 @@ TEST_F(ObjectCacheTest, SmallObjectsStayWithinTheBudgetOfTheDisk) {
   EXPECT_LE(bytes, kBudget);
   EXPECT_LE(Files().size(), kBudget / kLeastBlock);
   EXPECT_GT(Files().size(), kBudget / kLeastBlock / 2);
-  EXPECT_EQ(TextOf(cache.Find("object 1999")->bytes), "1999");
+  EXPECT_EQ(TextOf(cache.Find("object 1999")->bytes.span()), "1999");
 }
 
 TEST_F(ObjectCacheTest, NobodyElseReadsWhatIsKept) {
@@ -156,7 +156,7 @@ std::string Read(const ScriptedServer& server, ObjectCache& cache, WebTraffic& c
   store->Read("object", range, 1000, [&](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); });
   const Bytes bytes = answer.get_future().get().value();
   counts = transfers.traffic().front();
-  return TextOf(bytes);
+  return TextOf(bytes.span());
 }
 
 TEST_F(ObjectCacheTest, OnlyWhatTheServerHasChangedIsSentAgain) {
@@ -206,13 +206,13 @@ TEST_F(ObjectCacheTest, WhatTheServerHasJustSaidIsNotAskedAgain) {
   ObjectCache cache = Open();
   HttpTransfers transfers({});
   const std::shared_ptr<Store> store = HttpStore(server.url(), transfers, &cache).value();
-  EXPECT_EQ(TextOf(ReadNow(*store, "object").value()), "served");
+  EXPECT_EQ(TextOf(ReadNow(*store, "object")->span()), "served");
   while (!cache.Find(server.url() + "/object")) std::this_thread::yield();
   const int before = asked;
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(TextOf(ReadNow(*store, "object").value()), "served");
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(TextOf(ReadNow(*store, "object")->span()), "served");
   EXPECT_EQ(asked, before);
   const std::shared_ptr<Store> later = HttpStore(server.url(), transfers, &cache).value();
-  EXPECT_EQ(TextOf(ReadNow(*later, "object").value()), "served");
+  EXPECT_EQ(TextOf(ReadNow(*later, "object")->span()), "served");
   EXPECT_EQ(asked, before + 1) << "another process does not know what the server said";
 }
 

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <utility>
 
 #include "common/base/check.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 
@@ -95,8 +95,7 @@ ScriptedServer::Script ServesFolder(const std::string& folder) {
   return [folder](const ServerRequest& request) -> std::string {
     const std::string path = folder + request.target;
     if (!std::filesystem::is_regular_file(path)) return AnswerText("404 Not Found", "nothing here");
-    std::ifstream file(path, std::ios::binary);
-    const std::string all(std::istreambuf_iterator<char>(file), {});
+    const std::string all = ReadFile(path);
     const std::string tag = fmt::format("ETag: \"{:x}\"\r\n", std::hash<std::string>()(all));
     if (request.method == "HEAD") return fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n{}\r\n", all.size(), tag);
     const std::string range = request.header("range");

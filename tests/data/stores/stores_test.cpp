@@ -8,7 +8,6 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <future>
 #include <set>
 #include <thread>
@@ -16,6 +15,7 @@
 #include "common/files/files.h"
 #include "tests/data/stores/zip_files.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -37,20 +37,15 @@ StatusCode CodeOf(Store& store, const std::string& key, const ByteRange& range =
   return ReadPart(store, key, range, most).status().code();
 }
 
-void Write(const std::string& path, const std::string& text) {
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  ASSERT_TRUE(WriteTextFile(path, text).ok()) << path;
-}
-
 constexpr char kTen[] = "0123456789";
 
 // A folder and archives with the objects a/ten, a/b/c and d.
 class EveryStore : public testing::TestWithParam<std::string> {
  protected:
   EveryStore() {
-    Write(folder_ / "folder/a/ten", kTen);
-    Write(folder_ / "folder/a/b/c", "c");
-    Write(folder_ / "folder/d", "");
+    WriteFile(folder_ / "folder/a/ten", kTen);
+    WriteFile(folder_ / "folder/a/b/c", "c");
+    WriteFile(folder_ / "folder/d", "");
     for (const bool deflated : {false, true}) {
       WriteZip(folder_ / (deflated ? "deflated.zip" : "stored.ozx"),
                {{"a/ten", kTen, deflated}, {"a/b/c", "c", deflated}, {"d", "", deflated}});
@@ -131,7 +126,7 @@ TEST_P(EveryStore, AnswersManyAtATimeWithFewThreads) {
 
 TEST(FileStoreTest, HasOneObject) {
   const TemporaryDirectory folder;
-  Write(folder / "file.bin", kTen);
+  WriteFile(folder / "file.bin", kTen);
   const Result<std::shared_ptr<Store>> store = OpenStore(folder / "file.bin");
   EXPECT_EQ(*ReadPart(**store, "file", {.begin = 2, .bytes = 2}), "23");
   EXPECT_EQ(CodeOf(**store, "other"), StatusCode::kInvalidArgument);
@@ -143,8 +138,8 @@ TEST(FileStoreTest, HasOneObject) {
 
 TEST(FolderStoreTest, FollowsLinksInsideOnly) {
   const TemporaryDirectory folder;
-  Write(folder / "store/a/inside", "in");
-  Write(folder / "secret/file", "out");
+  WriteFile(folder / "store/a/inside", "in");
+  WriteFile(folder / "secret/file", "out");
   std::filesystem::create_symlink("a/inside", folder / "store/link");
   std::filesystem::create_symlink("../secret/file", folder / "store/up");
   std::filesystem::create_symlink(folder / "secret/file", folder / "store/absolute");
@@ -183,14 +178,9 @@ TEST(FolderStoreTest, ReadsRegularFilesOnly) {
 
 TEST(ZipStoreTest, RefusesWhatIsNoArchive) {
   const TemporaryDirectory folder;
-  Write(folder / "text.zip", "not an archive at all");
+  WriteFile(folder / "text.zip", "not an archive at all");
   EXPECT_EQ(ZipStore(folder / "text.zip").status().code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(ZipStore(folder / "none.zip").status().code(), StatusCode::kNotFound);
-}
-
-std::string ReadWhole(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 TEST(ZipStoreTest, ABombTakesNoMoreThanItMay) {
@@ -210,14 +200,14 @@ TEST(ZipStoreTest, AMemberOfAnotherSizeIsDamaged) {
     for (const std::uint32_t lie : {kBytes - 1, kBytes + 1}) {
       const std::string path = folder / (std::to_string(lie) + (deflated ? "d.zip" : "s.zip"));
       WriteZip(path, {{"member", std::string(kBytes, 'x'), deflated}});
-      std::string archive = ReadWhole(path);
+      std::string archive = ReadFile(path);
       std::string number(4, '\0'), other(4, '\0');
       std::memcpy(number.data(), &kBytes, 4);
       std::memcpy(other.data(), &lie, 4);
       int changed = 0;
       for (std::size_t at = 0; (at = archive.find(number, at)) != std::string::npos; at += 4, ++changed) archive.replace(at, 4, other);
       ASSERT_GE(changed, 2);
-      Write(path, archive);
+      WriteFile(path, archive);
       const Result<std::shared_ptr<Store>> store = ZipStore(path);
       if (!store.ok()) continue;  // libzip has seen it
       const Status status = ReadPart(**store, "member", {}, 1 << 20).status();
@@ -230,21 +220,21 @@ TEST(ZipStoreTest, AMemberOfAnotherSizeIsDamaged) {
 TEST(ZipStoreTest, ComparesChecksums) {
   const TemporaryDirectory folder;
   WriteZip(folder / "a.zip", {{"member", "the bytes of a member"}});
-  std::string archive = ReadWhole(folder / "a.zip");
+  std::string archive = ReadFile(folder / "a.zip");
   archive[archive.find("bytes")] = 'B';
-  Write(folder / "a.zip", archive);
+  WriteFile(folder / "a.zip", archive);
   EXPECT_EQ(CodeOf(**ZipStore(folder / "a.zip"), "member"), StatusCode::kDataLoss);
 }
 
 TEST(ZipStoreTest, ADirectoryThatLiesAboutItsEntriesIsRefused) {
   const TemporaryDirectory folder;
   WriteZip(folder / "a.zip", {{"member", "bytes"}});
-  std::string archive = ReadWhole(folder / "a.zip");
+  std::string archive = ReadFile(folder / "a.zip");
   const std::size_t end = archive.rfind("PK\5\6");
   ASSERT_NE(end, std::string::npos);
   archive[end + 8] = archive[end + 10] = char(0xff);
   archive[end + 9] = archive[end + 11] = char(0xfe);
-  Write(folder / "a.zip", archive);
+  WriteFile(folder / "a.zip", archive);
   EXPECT_FALSE(ZipStore(folder / "a.zip").ok());
 }
 

@@ -40,47 +40,46 @@ FileBytes WriteTwoSlices(const TemporaryDirectory& directory, DicomSyntax syntax
 constexpr DicomSyntax kSyntaxes[] = {DicomSyntax::kImplicit, DicomSyntax::kExplicit, DicomSyntax::kBigEndian, DicomSyntax::kJpegLossless,
                                      DicomSyntax::kJpegLs,   DicomSyntax::kJpeg2000, DicomSyntax::kRle};
 
-TEST(DicomMalformed, FilesThatAreCutOffAnywhereFail) {
-  Random random(31);
+// Writes two slices of each transfer syntax and, `times` times, replaces the first one by damage(its bytes, random). Calls check(what is
+// read then, the folder).
+template <class Damaged, class Check>
+void ReadDamagedSlices(std::uint64_t seed, int times, Damaged&& damage, Check&& check) {
+  Random random(seed);
   SCOPED_TRACE(random.trace());
   for (const DicomSyntax syntax : kSyntaxes) {
     const TemporaryDirectory directory;
     const FileBytes good = WriteTwoSlices(directory, syntax);
     ASSERT_TRUE(ReadVolume(directory.path()).ok()) << ReadVolume(directory.path()).status().message();
-    for (int i = 0; i < 80; ++i) {
-      // Of the last bytes some may be missing without harm: padding, and what ends a sequence.
-      const std::size_t length = random.Integer<std::size_t>(132, good.size() - 20);
-      WriteFile(directory / "0", good.substr(0, length));
-      const Result<LoadedVolume> loaded = ReadVolume(directory.path());
-      if (loaded.ok()) {
-        ADD_FAILURE() << "cut to " << length << " of " << good.size() << ", syntax " << int(syntax);
-        continue;
-      }
-      ExpectRefusal(loaded.status(), directory.path());
+    for (int i = 0; i < times; ++i) {
+      const FileBytes bytes = damage(good, random);
+      SCOPED_TRACE(fmt::format("syntax {}, {} of {} bytes", int(syntax), bytes.size(), good.size()));
+      WriteFile(directory / "0", bytes);
+      check(ReadVolume(directory.path()), directory.path());
     }
   }
 }
 
+TEST(DicomMalformed, FilesThatAreCutOffAnywhereFail) {
+  // Of the last bytes some may be missing without harm: padding, and what ends a sequence.
+  const auto cut = [](const FileBytes& good, Random& random) { return good.substr(0, random.Integer<std::size_t>(132, good.size() - 20)); };
+  ReadDamagedSlices(31, 80, cut,
+                    [](const Result<LoadedVolume>& loaded, const std::string& folder) { ExpectRefusal(loaded.status(), folder); });
+}
+
 TEST(DicomMalformed, AlteredBytesNeverDoHarm) {
-  Random random(32);
-  SCOPED_TRACE(random.trace());
-  for (const DicomSyntax syntax : kSyntaxes) {
-    const TemporaryDirectory directory;
-    const FileBytes good = WriteTwoSlices(directory, syntax);
-    for (int i = 0; i < 120; ++i) {
-      FileBytes bytes = good;
-      for (int flips = random.Integer(1, 4); flips > 0; --flips) {
-        Damage(bytes[random.Integer<std::size_t>(132, bytes.size() - 1)], random);
-      }
-      WriteFile(directory / "0", bytes);
-      const Result<LoadedVolume> loaded = ReadVolume(directory.path());
-      if (loaded.ok()) {
-        EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.finest().voxel_bytes());
-      } else {
-        ExpectRefusal(loaded.status(), directory.path());
-      }
+  const auto alter = [](FileBytes bytes, Random& random) {
+    for (int flips = random.Integer(1, 4); flips > 0; --flips) {
+      Damage(bytes[random.Integer<std::size_t>(132, bytes.size() - 1)], random);
     }
-  }
+    return bytes;
+  };
+  ReadDamagedSlices(32, 120, alter, [](const Result<LoadedVolume>& loaded, const std::string& folder) {
+    if (loaded.ok()) {
+      EXPECT_EQ(std::int64_t(loaded->volume->block.bytes.size()), loaded->info.finest().voxel_bytes());
+    } else {
+      ExpectRefusal(loaded.status(), folder);
+    }
+  });
 }
 
 FileBytes Beginning(const std::string& transfer_syntax = "1.2.840.10008.1.2.1") {

@@ -16,6 +16,7 @@
 #include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
+#include "tests/support/text_of.h"
 
 namespace slabstream {
 namespace {
@@ -42,8 +43,6 @@ std::string RandomSamples(SampleType type, std::size_t count, Random& random) {
   }
   return bytes;
 }
-
-std::string TextOf(const AlignedVector<std::byte>& bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
 std::vector<std::string> WrittenFiles() {
   std::vector<std::string> files;

@@ -280,4 +280,21 @@ std::vector<SampleFile> OneOfEachFormat() {
   };
 }
 
+std::vector<SampleFile> CompressedStreams(const Index3& size, Random& random) {
+  std::vector<SampleFile> files;
+  for (const SampleType type : {SampleType::kInt8, SampleType::kUint8, SampleType::kInt16, SampleType::kUint16, SampleType::kFloat32}) {
+    for (const bool big : {false, true}) {
+      const FileSpec spec{.size = size, .type = type, .big_endian = big, .qform = 1};
+      std::vector<double> values(CountIn(size));
+      for (double& value : values) value = random.Integer(0, 127);
+      const FileBytes samples = EncodeSamples(type, values, big), zlib = Zlib(samples);
+      const FileBytes nrrd = NrrdHeader(spec, "gzip"), meta = MetaHeader(spec, "LOCAL", std::int64_t(zlib.size()));
+      files.push_back({"v.nii.gz", Gzip(NiftiHeader(spec) + samples), 0});
+      files.push_back({"v.nrrd", nrrd + Gzip(samples), nrrd.size()});
+      files.push_back({"v.mha", meta + zlib, meta.size()});
+    }
+  }
+  return files;
+}
+
 }  // namespace slabstream

@@ -74,4 +74,7 @@ struct SampleFile {
 };
 std::vector<SampleFile> OneOfEachFormat();
 
+// Compressed streams of three formats (v.nii.gz, v.nrrd, v.mha) for each of five types in both byte orders: integers in [0, 127] at random.
+std::vector<SampleFile> CompressedStreams(const Index3& size, Random& random);
+
 }  // namespace slabstream

@@ -2,16 +2,15 @@
 
 #include <tiffio.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 
 #include "common/base/check.h"
+#include "tests/data/codecs/packed_bytes.h"
 
 namespace slabstream {
 namespace {
@@ -31,41 +30,13 @@ void PutAt(FileBytes& bytes, std::size_t offset, T value, bool big_endian) {
   bytes.replace(offset, raw.size(), raw);
 }
 
-FileBytes Deflate(const FileBytes& bytes, int window_bits) {
-  z_stream stream{};
-  CHECK_EQ(deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  FileBytes out(deflateBound(&stream, bytes.size()), '\0');
-  FileBytes in = bytes;
-  stream.next_in = reinterpret_cast<Bytef*>(in.data());
-  stream.avail_in = uInt(in.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = uInt(out.size());
-  CHECK_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
-}
-
 std::string Numbers(const Index3& v) { return std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z); }
 std::string Numbers(const Vec3& v) { return std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z); }
 
 }  // namespace
 
-void WriteFile(const std::string& path, const FileBytes& bytes) {
-  std::filesystem::remove(path);  // some file systems write a file that is overwritten to the disk at once
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), std::streamsize(bytes.size()));
-  CHECK(file.good()) << path;
-}
-
-FileBytes ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  CHECK(file.good()) << path;
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-FileBytes Gzip(const FileBytes& bytes) { return Deflate(bytes, 15 + 16); }
-FileBytes Zlib(const FileBytes& bytes) { return Deflate(bytes, 15); }
+FileBytes Gzip(const FileBytes& bytes) { return PackBytes("gzip", bytes); }
+FileBytes Zlib(const FileBytes& bytes) { return PackBytes("zlib", bytes); }
 
 FileBytes EncodeSamples(SampleType type, const std::vector<double>& values, bool big_endian) {
   FileBytes bytes;

@@ -12,13 +12,12 @@
 #include "data/volume_io/sample_type.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 
 using FileBytes = std::string;
 
-void WriteFile(const std::string& path, const FileBytes& bytes);
-FileBytes ReadFile(const std::string& path);
 FileBytes Gzip(const FileBytes& bytes);  // one gzip member
 FileBytes Zlib(const FileBytes& bytes);
 

@@ -11,6 +11,7 @@
 #include "tests/data/zarr/read_zarr.h"
 #include "tests/data/zarr/zarr_files.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -98,9 +99,9 @@ TEST(ConsolidatedStoreTest, WithoutThemTheStoreStaysItself) {
   const TemporaryDirectory folder;
   const auto store = std::make_shared<SilentStore>(folder.path());
   EXPECT_EQ(zarr::WithConsolidatedMetadata(store), store);
-  WriteObject(folder / ".zmetadata", "{\"metadata\": [");
+  WriteFile(folder / ".zmetadata", "{\"metadata\": [");
   EXPECT_EQ(zarr::WithConsolidatedMetadata(store), store);
-  WriteObject(folder / ".zmetadata", "{\"metadata\": [1, 2]}");
+  WriteFile(folder / ".zmetadata", "{\"metadata\": [1, 2]}");
   EXPECT_EQ(zarr::WithConsolidatedMetadata(store), store);
 }
 

@@ -10,6 +10,7 @@
 #include "tests/data/zarr/read_zarr.h"
 #include "tests/data/zarr/zarr_files.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -60,7 +61,7 @@ TEST(ElementFiltersTest, ElementsComeBack) {
         MetadataOf({.shape = {each.values.size()}, .chunk = {each.values.size()}, .type = each.type, .big_endian = each.big_endian});
     metadata["filters"] = each.filters;
     WriteJson(folder / ".zarray", metadata);
-    WriteObject(folder / "0", EncodeSamples(each.stored, each.packed, each.big_endian));
+    WriteFile(folder / "0", EncodeSamples(each.stored, each.packed, each.big_endian));
     const Result<zarr::ZarrArray> array = OpenTestArray(folder.path());
     ASSERT_TRUE(array.ok()) << array.status().message();
     const Result<std::vector<double>> elements = ReadElements(*array);
@@ -78,7 +79,7 @@ TEST(ElementFiltersTest, ElementsComeBack) {
     codecs.push_back({{"name", "bytes"}, {"configuration", {{"endian", "little"}}}});
     third["codecs"] = codecs;
     WriteJson(folder / "v3/zarr.json", third);
-    WriteObject(folder / "v3/c.0", EncodeSamples(each.stored, each.packed, false));
+    WriteFile(folder / "v3/c.0", EncodeSamples(each.stored, each.packed, false));
     const Result<zarr::ZarrArray> opened = OpenTestArray(folder / "v3");
     ASSERT_TRUE(opened.ok()) << opened.status().message();
     EXPECT_EQ(*ReadElements(*opened), each.values);
@@ -115,9 +116,9 @@ TEST(ElementFiltersTest, ChecksumsStandInFrontOrBehind) {
       metadata["filters"] = Json::array({{{"id", name}}});
       if (!in_front) metadata["filters"][0]["location"] = "end";
       WriteJson(folder / ".zarray", metadata);
-      WriteObject(folder / "0", in_front ? stated + text : text + stated);
+      WriteFile(folder / "0", in_front ? stated + text : text + stated);
       EXPECT_TRUE(ReadElements(*OpenTestArray(folder.path())).ok()) << name << in_front;
-      WriteObject(folder / "0", in_front ? stated + "123456780" : "123456780" + stated);
+      WriteFile(folder / "0", in_front ? stated + "123456780" : "123456780" + stated);
       EXPECT_THAT(ReadElements(*OpenTestArray(folder.path())).status().message(), HasSubstr("damaged: its "));
     }
   }

@@ -9,13 +9,12 @@
 #include "tests/data/zarr/read_zarr.h"
 #include "tests/data/zarr/zarr_files.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
 
 using testing::Contains;
-using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::IsEmpty;
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
@@ -82,7 +81,7 @@ TEST(PlainArrayTest, CoordinatesOfAnotherSizeDoNotCount) {
   const TemporaryDirectory folder;
   WriteXarray(folder.path(), 2, {"z", "y", "x"});
   WriteCoordinates(folder.path(), 2, "x", {1, 3, 5});
-  WriteObject(folder / "y/.zarray", "{");
+  WriteFile(folder / "y/.zarray", "{");
   EXPECT_EQ(Opened(Open(folder / "temperature"))->info().levels[0].description.geometry.spacing, (Vec3{1, 1, 1}));
   EXPECT_EQ(Opened(Open(folder.path(), {.array = "temperature"}))->info().levels[0].description.geometry.spacing, (Vec3{1, 1, 1}));
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -11,6 +10,7 @@
 #include "common/base/check.h"
 #include "tests/data/codecs/packed_bytes.h"
 #include "tests/data/volume_io/volume_files.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -179,12 +179,7 @@ void ForEachIndex(const Counts& counts, const std::function<void(const Counts&)>
   }
 }
 
-void WriteObject(const std::string& path, const std::string& bytes) {
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  WriteFile(path, bytes);
-}
-
-void WriteJson(const std::string& path, const Json& json) { WriteObject(path, json.dump()); }
+void WriteJson(const std::string& path, const Json& json) { WriteFile(path, json.dump()); }
 
 void WriteZarrGroup(const std::string& folder, int version, const Json& attributes) {
   if (version == 3) {
@@ -208,7 +203,7 @@ void WriteZarrArray(const std::string& folder, const ZarrSpec& spec, const Eleme
     } else if (!missing || !missing(index)) {
       bytes = ChunkBytes(spec, index, order, element);
     }
-    if (!bytes.empty()) WriteObject(folder + "/" + KeyOf(spec, index), bytes);
+    if (!bytes.empty()) WriteFile(folder + "/" + KeyOf(spec, index), bytes);
   });
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/json/json.h"
 #include "data/volume_io/sample_type.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 
@@ -47,8 +48,6 @@ void ForEachIndex(const Counts& counts, const std::function<void(const Counts&)>
 // Every chunk of the array. Elements of chunks beyond the array are 77.
 void WriteZarrArray(const std::string& folder, const ZarrSpec& spec, const ElementAt& element, const IsMissing& missing = {});
 
-// A file, with the folders that it needs.
-void WriteObject(const std::string& path, const std::string& bytes);
 void WriteJson(const std::string& path, const Json& json);
 
 // A group; of version 2 `attributes` are .zattrs.

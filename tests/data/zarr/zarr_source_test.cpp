@@ -14,6 +14,7 @@
 #include "tests/data/zarr/zarr_files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -417,10 +418,10 @@ TEST(ZarrSourceTest, OneLineSaysWhatIsWrongWithAnImage) {
   EXPECT_THAT(message(), HasSubstr("names no object: a part of it is '..'"));
   WriteZarrGroup(path, 2, ImageAttributes("tzyx", 2, {{1, 1, 1, 1}}));
   EXPECT_THAT(message(), HasSubstr("a/0: has 3 axes, must have 4 as its image"));
-  WriteObject(path + "/.zattrs", "{\"multiscales\": [");
+  WriteFile(path + "/.zattrs", "{\"multiscales\": [");
   EXPECT_THAT(message(), HasSubstr("a/.zattrs: damaged: not JSON"));
-  WriteObject(path + "/.zattrs", "{}");
-  WriteObject(path + "/0/.zarray", std::string(17 << 20, ' '));
+  WriteFile(path + "/.zattrs", "{}");
+  WriteFile(path + "/0/.zarray", std::string(17 << 20, ' '));
   EXPECT_THAT(message(), HasSubstr("a group without arrays"));
   EXPECT_THAT(OpenText(path + "?array=0").status().message(), HasSubstr("0/.zarray: has 17825792 bytes, at most 16777216 are read"));
 }

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const StageModel kStage{Stage::kSplat, "c_sp", {WorkUnit::kBox, WorkUnit::kDrawn, WorkUnit::kSheetPixel}};
+const StageModel kStage{Stage::kSplat, {WorkUnit::kBox, WorkUnit::kDrawn, WorkUnit::kSheetPixel}};
 
 // Seconds of each unit.
 WorkUnits Truth() {
@@ -123,7 +123,7 @@ TEST(CostFit, FitsEveryStageOfTheModel) {
         for (const WorkUnit unit : stage.units) seconds += 1e-9 * sample.work[std::size_t(unit)];
         sample.stage_ns[std::size_t(stage.stage)] = std::llround(1e9 * seconds * random.Real(0.95, 1.05));
       }
-      EXPECT_LT(FitStage(stage, samples).value().prediction_error, 0.05) << stage.symbol;
+      EXPECT_LT(FitStage(stage, samples).value().prediction_error, 0.05) << ToString(stage.stage);
     }
   }
   EXPECT_TRUE(CostModelOf("another").empty());

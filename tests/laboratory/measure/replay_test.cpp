@@ -78,14 +78,13 @@ TEST(Replay, MoreWorkersShareTheBoxes) {
   EXPECT_THAT(too_many.status().message(), HasSubstr("at most 8"));
 }
 
-// Recorded times hold what the machine did to them: threads that made a picture together, and the wake-ups to and from the client.
+// Recorded times hold what the machine did to them, such as the wake-ups to and from the client.
 TEST(Replay, WhatWasRecordedIsNotChargedTwice) {
   RecordedFrame frame{.grid = {0, 0, 16, 16}, .display = 1, .combine = "fan-in", .end = 10, .latency = 11, .picture_seconds = 1};
   frame.groups = {{{.box = 0, .worker = 1, .render_seconds = 8, .bounds = frame.grid, .pixels = 256}}};
   MachineModel machine;
   machine.plan_seconds = machine.message_seconds = machine.link.latency_seconds = 0;
   machine.wake_ups = {.awake = 0.1, .asleep = 0.1};
-  machine.picture_threads = 4;
   const ReplayReport report = Replay(std::span(&frame, 1), {}, machine, machine).value();
   // Eight wake-ups between the coordinator's taking the request and its having the picture (two of them for the plan), and a second
   // outside.

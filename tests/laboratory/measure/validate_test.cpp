@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/plan_renderings.h"
 #include "tests/common/mesh/mesh_samples.h"

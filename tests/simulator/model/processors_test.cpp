@@ -21,16 +21,16 @@ std::map<std::uint64_t, double> RunAll(Processors& processors) {
 
 TEST(Processors, TasksWithACoreOfTheirOwnDoNotMind) {
   Processors processors(2, 0);
-  processors.Start(0, 1, 3, 1, 0);
-  processors.Start(0, 2, 1, 1, 1);
-  processors.Start(1, 3, 5, 2, 1);
+  processors.Start(0, 1, 3, 0);
+  processors.Start(0, 2, 1, 1);
+  processors.Start(1, 3, 5, 1);
   EXPECT_EQ(RunAll(processors), (std::map<std::uint64_t, double>{{1, 3}, {2, 2}, {3, 6}}));
 }
 
 TEST(Processors, TasksShareTheCoresThatThereAre) {
   Processors processors(1, 0);
-  processors.Start(0, 1, 2, 1, 0);
-  processors.Start(0, 2, 1, 1, 1);  // from now on each at half speed: both have 1 s left
+  processors.Start(0, 1, 2, 0);
+  processors.Start(0, 2, 1, 1);  // from now on each at half speed: both have 1 s left
   const auto ends = RunAll(processors);
   EXPECT_DOUBLE_EQ(ends.at(1), 3);
   EXPECT_DOUBLE_EQ(ends.at(2), 3);
@@ -38,8 +38,8 @@ TEST(Processors, TasksShareTheCoresThatThereAre) {
 
 TEST(Processors, BusyNeighboursSlowDown) {
   Processors processors(4, 0.25);
-  processors.Start(0, 1, 1, 1, 0);
-  processors.Start(0, 2, 4, 1, 0);
+  processors.Start(0, 1, 1, 0);
+  processors.Start(0, 2, 4, 0);
   const auto ends = RunAll(processors);
   EXPECT_DOUBLE_EQ(ends.at(1), 1.25);
   EXPECT_DOUBLE_EQ(ends.at(2), 1.25 + 3);
@@ -47,13 +47,13 @@ TEST(Processors, BusyNeighboursSlowDown) {
 
 TEST(Processors, ATaskThatIsEndedFreesItsCore) {
   Processors processors(1, 0);
-  processors.Start(0, 1, 4, 1, 0);
-  processors.Start(0, 2, 2, 1, 0);  // each at half speed
+  processors.Start(0, 1, 4, 0);
+  processors.Start(0, 2, 2, 0);  // each at half speed
   processors.EndNow(0, 1, 1);
   EXPECT_EQ(RunAll(processors), (std::map<std::uint64_t, double>{{1, 1}, {2, 2.5}}));
 }
 
-// Whatever is started when: with one thread a task, no core is idle while work waits, and none does more than a second's work a second.
+// Whatever is started when: no core is idle while work waits, and none does more than a second's work a second.
 TEST(Processors, WorkIsConserved) {
   Random random(9);
   SCOPED_TRACE(random.trace());
@@ -64,7 +64,7 @@ TEST(Processors, WorkIsConserved) {
     for (std::uint64_t task = 0; task < 20; ++task) {
       const double seconds = random.Real(0, 2);
       work += seconds;
-      processors.Start(0, task, seconds, 1, 0);
+      processors.Start(0, task, seconds, 0);
     }
     for (const auto& [task, time] : RunAll(processors)) end = std::max(end, time);
     EXPECT_GE(end, work / cores * (1 - 1e-12));

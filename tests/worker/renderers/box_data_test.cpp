@@ -12,6 +12,7 @@
 #include "common/parallel/parallel.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
+#include "tests/support/same_image.h"
 #include "tests/worker/renderers/render_support.h"
 #include "tests/worker/renderers/splat/reference_splatting.h"
 #include "worker/kernels/normal_code.h"
@@ -182,6 +183,12 @@ TEST(BoxData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
             fresh_box->CacheOf<SplatCache>().Occupied(*fresh_box, fresh, volume.block.box).records.size());
 }
 
+// The frame that the setup's renderer makes of the whole volume as one box.
+Result<LocalImage> RenderBox(const Volume& volume, const FrameSetup& setup, const RenderControl& control, RankReport& report) {
+  const auto data = BoxFor(*setup.renderer, volume, volume.block.box);
+  return MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, control, report);
+}
+
 // A volume without a drawn voxel. Every finite voxel of an intensity projection is drawn.
 TEST(Renderers, EmptyVolumesMakeEmptyImages) {
   const Volume empty = AsGrid(MakeVolume({{9, 8, 7}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3&) { return 0; }));
@@ -199,13 +206,9 @@ TEST(Renderers, EmptyVolumesMakeEmptyImages) {
 TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
   const Volume block = AsGrid(MakeBlock({{60, 60, 60}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
-    SetupOptions options;
-    options.renderer = kind;
-    options.view.zoom = 100;
-    const FrameSetup setup = MakeSetup(block, options);
-    const auto data = BoxFor(*kind, block, block.block.box);
+    const FrameSetup setup = MakeSetup(block, {.renderer = kind, .view = {.zoom = 100}});
     RankReport report;
-    const LocalImage image = MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, RenderControl(), report).value();
+    const LocalImage image = RenderBox(block, setup, RenderControl(), report).value();
     EXPECT_EQ(image.bounds, FrameBounds(setup));
     EXPECT_LT(report.drawn_voxels, block.block.box.voxel_count() / 20);
   }
@@ -214,13 +217,10 @@ TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
 TEST(Renderers, StopWhenCancelled) {
   const Volume block = AsGrid(MakeBlock({{20, 20, 20}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
-    SetupOptions options;
-    options.renderer = kind;
-    const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
     RenderControl cancelled;
     cancelled.Cancel();
-    const auto result = MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, cancelled, report);
+    const Result<LocalImage> result = RenderBox(block, MakeSetup(block, {.renderer = kind}), cancelled, report);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.status().code(), StatusCode::kCancelled);
   }
@@ -230,14 +230,10 @@ TEST(Renderers, PausesChangeNoBit) {
   const Volume block = AsGrid(MakeBlock({{40, 40, 40}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
     SCOPED_TRACE(kind->name());
-    SetupOptions options;
-    options.renderer = kind;
-    options.size = {200, 200};
-    const FrameSetup setup = MakeSetup(block, options);
+    const FrameSetup setup = MakeSetup(block, {.renderer = kind, .size = {200, 200}});
     const auto render = [&](const RenderControl& control) {
       RankReport report;
-      const auto data = BoxFor(*kind, block, block.block.box);
-      return MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, control, report).value();
+      return RenderBox(block, setup, control, report).value();
     };
     const LocalImage expected = render(RenderControl());
     RenderControl control;
@@ -251,9 +247,7 @@ TEST(Renderers, PausesChangeNoBit) {
       });
       paused = render(control);
     }
-    EXPECT_EQ(paused.bounds, expected.bounds);
-    EXPECT_TRUE(std::ranges::equal(paused.rgba, expected.rgba));
-    EXPECT_TRUE(std::ranges::equal(paused.depth, expected.depth));
+    ExpectSameBits(paused, expected);
   }
 }
 
@@ -295,9 +289,7 @@ TEST(Renderers, DrawPaddedVoxelsAsAnyOthers) {
     const auto cells = std::make_shared<const Mesh>(MeshCutter(blobs.cells).Cut(blobs.block.box));
     BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), BoxLayers{.cells = cells}));
     const LocalImage drawn = render(data), expected = render(*BoxFor(*kind, blobs, blobs.block.box));
-    EXPECT_EQ(drawn.bounds, expected.bounds);
-    EXPECT_TRUE(std::ranges::equal(drawn.rgba, expected.rgba));
-    EXPECT_TRUE(std::ranges::equal(drawn.depth, expected.depth));
+    ExpectSameBits(drawn, expected);
     if (kind->name() == "raycast") {
       EXPECT_LT(data.derived_bytes(), blobs.block.bytes.size() / 2) << "rays read them where they are";
     }
@@ -307,11 +299,8 @@ TEST(Renderers, DrawPaddedVoxelsAsAnyOthers) {
 TEST(Renderers, ReportTheirStages) {
   const Volume block = AsGrid(MakeBlock({{20, 20, 20}, {1, 1, 1}}));
   for (const RendererKind* kind : Renderers()) {
-    SetupOptions options;
-    options.renderer = kind;
-    const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    ASSERT_TRUE(MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, RenderControl(), report).ok());
+    ASSERT_TRUE(RenderBox(block, MakeSetup(block, {.renderer = kind}), RenderControl(), report).ok());
     ASSERT_EQ(report.spans.size(), 1U);
     EXPECT_EQ(report.spans[0].stage, Stage::kRender);
     std::int64_t stages = 0;

@@ -43,17 +43,25 @@ void ExpectSamePicture(const LocalImage& one, const LocalImage& many, const Fram
   EXPECT_TRUE(a.voxel == b.voxel);
 }
 
-class Partitions : public ::testing::TestWithParam<const RendererKind*> {};
+void ExpectRandomBoxesMake(const LocalImage& whole, const Volume& volume, const FrameSetup& setup, std::mt19937& random) {
+  ExpectSamePicture(whole, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+}
+
+class Partitions : public ::testing::TestWithParam<const RendererKind*> {
+ protected:
+  // Of three odd sides, as the renderer draws it.
+  static Volume Blobs(unsigned seed, ScalarType type = ScalarType::kUint8) {
+    return VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, type, seed));
+  }
+};
 
 TEST_P(Partitions, SlabsAlongEveryAxisMakeOnePicture) {
   const unsigned seed = 11;
   std::mt19937 random(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 3; ++view) {
-      const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed + unsigned(view)));
-      SetupOptions options;
-      options.renderer = GetParam();
-      options.view = RandomView(projection, random);
+      const Volume volume = Blobs(seed + unsigned(view));
+      SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
       options.size = {72, 60};
       const FrameSetup setup = MakeSetup(volume, options);
       const LocalImage one = RenderWhole(volume, setup);
@@ -74,15 +82,13 @@ TEST_P(Partitions, BoxesOfAnyKindMakeOnePicture) {
     for (ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
       for (double zoom : {0.3, 1.0, 6.0}) {
         const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{70, 40, 45}, {1, 1, 1}}, type, seed));
-        SetupOptions options;
-        options.renderer = GetParam();
-        options.view = RandomView(projection, random);
+        SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
         options.view.zoom = zoom;
         options.transfer = Ramp(0.6);
         options.termination = 1.0 / 1024;
         const FrameSetup setup = MakeSetup(volume, options);
         SCOPED_TRACE(::testing::Message() << "seed " << seed << " zoom " << zoom << " type " << int(type));
-        ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+        ExpectRandomBoxesMake(RenderWhole(volume, setup), volume, setup, random);
       }
     }
   }
@@ -92,13 +98,11 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
   const unsigned seed = 14;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     int seen = 0;
     for (int view = 0; seen < 6; ++view) {
-      SetupOptions options;
-      options.renderer = GetParam();
-      options.view = RandomView(projection, random);
+      SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
       options.view.look_at = {20 + 15 * uniform(random), 15 + 12 * uniform(random), 21 + 15 * uniform(random)};
       if (view % 2 == 1) {
         options.view.eye = {20 + 90 * uniform(random), 15 + 90 * uniform(random), 21 + 90 * uniform(random)};
@@ -109,7 +113,7 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
       ++seen;
       const FrameSetup setup = MakeSetup(volume, options);
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
-      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(RenderWhole(volume, setup), volume, setup, random);
     }
   }
 }
@@ -117,18 +121,16 @@ TEST_P(Partitions, LookingBesideTheCentreMakesOnePicture) {
 TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
   const unsigned seed = 15;
   std::mt19937 random(seed);
-  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 8; ++view) {
-      SetupOptions options;
-      options.renderer = GetParam();
-      options.view = RandomView(projection, random);
+      SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
       options.clipping = RandomClipping(volume.description.geometry, random);
       options.clipping.mode = view % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
       options.transfer = Ramp(0.6);
       const FrameSetup setup = MakeSetup(volume, options);
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
-      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(RenderWhole(volume, setup), volume, setup, random);
     }
   }
 }
@@ -138,12 +140,10 @@ TEST_P(Partitions, IsosurfacesMakeOnePicture) {
   if (!GetParam()->Can(Ability::kIsosurfaces)) return;  // draws none
   const unsigned seed = 16;
   std::mt19937 random(seed);
-  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 12; ++view) {
-      SetupOptions options;
-      options.renderer = GetParam();
-      options.view = RandomView(projection, random);
+      SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
       if (view % 4 == 3) options.view = {.projection = projection, .azimuth_degrees = 45.0 * view};
       options.transfer = Ramp(view % 3 == 0 ? 0 : 0.6);
       options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}, {120, {0.2F, 0.5F, 0.9F}, view % 2 == 0 ? 1 : 0.5}};
@@ -155,7 +155,7 @@ TEST_P(Partitions, IsosurfacesMakeOnePicture) {
       if (!setup.parameters.empty()) setup.parameters.front() = view % 4 == 0 ? 0.1 : view % 4 == 1 ? 3 : 1;
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
       const LocalImage one = RenderWhole(volume, setup);
-      ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(one, volume, setup, random);
       ExpectSamePicture(one, RenderByBoxes(volume, setup, CutIntoSlabs(volume, 13, kAxes[std::size_t(view) % 3])), setup);
     }
   }
@@ -165,17 +165,15 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
   if (!GetParam()->Can(Ability::kGradientOpacity)) return;  // has none
   const unsigned seed = 17;
   std::mt19937 random(seed);
-  const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 4; ++view) {
-      SetupOptions options;
-      options.renderer = GetParam();
-      options.view = RandomView(projection, random);
+      SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
       options.transfer = Ramp(0.6);
       options.transfer.gradient_opacities = {{3, 0}, {20, 1}, {60, 0.3}};
       const FrameSetup setup = MakeSetup(volume, options);
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
-      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(RenderWhole(volume, setup), volume, setup, random);
     }
   }
 }
@@ -184,7 +182,7 @@ TEST_P(Partitions, JitteredRaysMakeOnePicture) {
   if (GetParam()->name() != "raycast") return;  // it alone has --jitter
   const unsigned seed = 29;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     for (int view = 0; view < 4; ++view) {
       SetupOptions options;
@@ -193,7 +191,7 @@ TEST_P(Partitions, JitteredRaysMakeOnePicture) {
       const FrameSetup setup = RaycastSetup(volume, options, 0.7, view % 2 == 0 ? 1 : 0.4);
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
       const LocalImage one = RenderWhole(volume, setup);
-      ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(one, volume, setup, random);
       const LocalImage without = RenderWhole(volume, RaycastSetup(volume, options, 0.7));
       EXPECT_TRUE(view >= 2 || LargestDifference(one, without) > 0) << "clipping may leave nothing, otherwise jitter shows";
     }
@@ -204,14 +202,14 @@ TEST_P(Partitions, WideFootprintsMakeOnePicture) {
   if (GetParam()->name() != "splat") return;  // it alone has --footprint
   const unsigned seed = 31;
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  const Volume volume = Blobs(seed);
   for (Projection projection : GetParam()->projections()) {
     for (const double footprint : {1.5, kMaxFootprint}) {
       SetupOptions options;
       options.view = RandomView(projection, random);
       const FrameSetup setup = SplatSetup(volume, options, footprint);
       SCOPED_TRACE(::testing::Message() << "seed " << seed << " footprint " << footprint);
-      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      ExpectRandomBoxesMake(RenderWhole(volume, setup), volume, setup, random);
     }
   }
 }
@@ -221,12 +219,10 @@ TEST_P(Partitions, RegionsMakeOnePicture) {
   const unsigned seed = 23;
   std::mt19937 random(seed);
   for (const ScalarType type : {ScalarType::kUint8, ScalarType::kFloat32}) {
-    const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, type, seed));
+    const Volume volume = Blobs(seed, type);
     for (Projection projection : GetParam()->projections()) {
       for (int view = 0; view < 4; ++view) {
-        SetupOptions options;
-        options.renderer = GetParam();
-        options.view = RandomView(projection, random);
+        SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
         options.transfer =
             WithCurvesOfRegions({.colors = {},
                                  .opacities = {},
@@ -236,7 +232,7 @@ TEST_P(Partitions, RegionsMakeOnePicture) {
         SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
         const LocalImage one = RenderWhole(volume, setup);
         EXPECT_GT(std::ranges::max(one.rgba), 0);
-        ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+        ExpectRandomBoxesMake(one, volume, setup, random);
       }
     }
   }
@@ -265,9 +261,7 @@ TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
   std::mt19937 random(seed);
   const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{45, 45, 45}, {1, 1, 1}}, ScalarType::kUint8, seed));
   for (Projection projection : GetParam()->projections()) {
-    SetupOptions options;
-    options.renderer = GetParam();
-    options.view = RandomView(projection, random);
+    SetupOptions options{.renderer = GetParam(), .view = RandomView(projection, random)};
     if (projection == GetParam()->projections().back()) {
       options.clipping = RandomClipping(volume.description.geometry, random);
       if (GetParam()->Can(Ability::kIsosurfaces)) options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}};

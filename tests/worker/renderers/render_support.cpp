@@ -18,19 +18,6 @@
 
 namespace slabstream::testing {
 
-Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value) {
-  Volume volume{{geometry, type, {}}, MakeVoxelBlock(geometry.bounds(), type)};
-  VisitScalarType(type, [&](auto* tag) {
-    auto* samples = volume.block.samples<std::remove_cvref_t<decltype(*tag)>>();
-    for (Index3 v; v.z < geometry.size.z; ++v.z) {
-      for (v.y = 0; v.y < geometry.size.y; ++v.y) {
-        for (v.x = 0; v.x < geometry.size.x; ++v.x) samples[volume.block.Offset(v)] = std::remove_cvref_t<decltype(*tag)>(value(v));
-      }
-    }
-  });
-  return volume;
-}
-
 Volume MakeBlobs(const VolumeGeometry& geometry, ScalarType type, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -126,6 +113,34 @@ ViewParameters RandomView(Projection projection, std::mt19937& random) {
   view.zoom = 0.5 + uniform(random);
   view.fov_degrees = 10 + 50 * uniform(random);
   return view;
+}
+
+std::vector<ViewParameters> RandomViews(Projection projection, int count, std::mt19937& random) {
+  std::vector<ViewParameters> views;
+  for (int i = 0; i < count; ++i) views.push_back(RandomView(projection, random));
+  return views;
+}
+
+void ExpectOpacityOfLength(const Volume& volume, const std::vector<ViewParameters>& views, const OpacityOfLength& of) {
+  constexpr double kOpacity = 0.06;
+  const double voxel_length = Least(volume.description.geometry.spacing);
+  int pixels = 0;
+  for (std::size_t view = 0; view < views.size(); ++view) {
+    SetupOptions options{.view = views[view], .transfer = Uniform(kOpacity, {1, 1, 1})};
+    options.view.zoom = 1.5;
+    const FrameSetup setup = of.setup(options, int(view));
+    const LocalImage image = RenderPicture(volume, setup);
+    for (int y = 0; y < setup.camera.height; ++y) {
+      for (int x = 0; x < setup.camera.width; ++x) {
+        const double length = of.length(setup, x, y) / voxel_length;
+        if (length == 0 || length < of.least_length) continue;
+        ++pixels;
+        const double expected = 1 - std::pow(1 - kOpacity, length);
+        ASSERT_NEAR(PixelOf(image, x, y)[3], expected, 0.01 * expected) << "view " << view << " pixel " << x << ' ' << y;
+      }
+    }
+  }
+  EXPECT_GT(pixels, 1000);
 }
 
 Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {

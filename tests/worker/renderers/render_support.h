@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "common/decomposition/partition.h"
+#include "tests/support/random_volume.h"
 #include "tests/support/renderers.h"
 #include "worker/renderers/renderer.h"
 
 namespace slabstream::testing {
 
 inline constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-
-// A volume of `type` whose voxel (x, y, z) stores value(x, y, z).
-Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value);
 
 // Blobs, holes and slopes with values 0 ... 200, different for each seed; about half of the voxels are 0.
 Volume MakeBlobs(const VolumeGeometry& geometry, ScalarType type, unsigned seed);
@@ -50,6 +48,16 @@ FrameSetup SplatSetup(const Volume& volume, const SetupOptions& options, double 
 double LengthInside(const FrameSetup& setup, int x, int y);
 
 ViewParameters RandomView(Projection projection, std::mt19937& random);
+
+std::vector<ViewParameters> RandomViews(Projection projection, int count, std::mt19937& random);
+
+struct OpacityOfLength {
+  std::function<FrameSetup(const SetupOptions& options, int view)> setup;
+  std::function<double(const FrameSetup& setup, int x, int y)> length = LengthInside;  // 0: the pixel is not looked at
+  double least_length = 0;                                                             // voxel lengths: nor are shorter rays
+};
+// A homogeneous volume looks the same from every side: the opacity of a pixel follows from the length of its ray in it, to a hundredth.
+void ExpectOpacityOfLength(const Volume& volume, const std::vector<ViewParameters>& views, const OpacityOfLength& of);
 // Planes through the volume, and a box in one in two; the mode is left to the caller.
 Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random);
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "common/mesh/lattice.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/planning/frame_plan.h"
 #include "common/view/world_limits.h"
 #include "tests/support/renderers.h"

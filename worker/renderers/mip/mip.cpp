@@ -63,9 +63,7 @@ class MipRenderer : public Renderer {
                                     .nearest = TakesNearestVoxel(setup)};
           ProjectTile(work, tile, pixels, floats_a_row);
         });
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 };
 

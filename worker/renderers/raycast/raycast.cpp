@@ -218,9 +218,7 @@ class RaycastRenderer : public Renderer {
           shaded += MarchTile(work, tile, bricks.Mine(), rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 };
 

@@ -125,9 +125,7 @@ class ShearRenderer : public Renderer {
     const std::uint64_t shaded = RenderTiles(work, image, control, report);
 
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, geometry)));
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 };
 

@@ -50,10 +50,7 @@ class SliceRenderer : public Renderer {
     const RayLook look = MakeRayLook(table, setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
     const std::span<const std::uint32_t> shown = data.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
     clock.Charge(Stage::kPrepare);
-    if (shown.empty()) {
-      clock.Finish(Stage::kRender, control);
-      return MakeLocalImage(setup.format, {});
-    }
+    if (shown.empty()) return clock.Finish(MakeLocalImage(setup.format, {}), control);
 
     const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
     SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
@@ -71,9 +68,7 @@ class SliceRenderer : public Renderer {
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
     const std::uint64_t drawn = RenderTiles(work, *bins, image, control, report);
     report.drawn_voxels += std::uint64_t(std::ceil(double(drawn) * VoxelsASample(space.rays(), setup.camera, geometry)));
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 
  private:

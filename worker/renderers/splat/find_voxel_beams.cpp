@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 
+#include "common/volume/indices.h"
 #include "worker/kernels/brick_normals.h"
 #include "worker/renderers/splat/occupied_voxels.h"
 
@@ -21,16 +22,11 @@ class BeamFinder {
  public:
   BeamFinder(const VoxelBricks& voxels, const BrickRanges& ranges, const BinLookup<T>& lookup, const Vec3& spacing)
       : voxels_(voxels), grid_(voxels.grid()), lookup_(lookup), spacing_(spacing), intervals_(lookup.Intervals()), shows_(grid_.size()) {
-    const Index3 begin = grid_.first, end = {begin.x + grid_.counts.x, begin.y + grid_.counts.y, begin.z + grid_.counts.z};
-    for (Index3 brick = begin; brick.z < end.z; ++brick.z) {
-      for (brick.y = begin.y; brick.y < end.y; ++brick.y) {
-        for (brick.x = begin.x; brick.x < end.x; ++brick.x) {
-          const BrickRanges::Range& range = ranges.Of(brick);
-          if (!lookup.AnyBetween(range.min, range.max)) continue;
-          shows_[grid_.Number(brick)] = 1;
-          beams_.box = Hull(beams_.box, grid_.BoxOf(brick));
-        }
-      }
+    for (const Index3& brick : IndicesIn(Box{grid_.first, grid_.first + grid_.counts})) {
+      const BrickRanges::Range& range = ranges.Of(brick);
+      if (!lookup.AnyBetween(range.min, range.max)) continue;
+      shows_[grid_.Number(brick)] = 1;
+      beams_.box = Hull(beams_.box, grid_.BoxOf(brick));
     }
   }
 

@@ -50,9 +50,7 @@ class SplattingRenderer : public Renderer {
                    [&](std::int32_t i) { RenderBand(pass, pass.bounds.y_begin + i * kBandRows, control, image, parts[std::size_t(i)]); });
       for (const RankReport& part : parts) AddTo(report, part);
     }
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 };
 

@@ -24,9 +24,7 @@ class XrayRenderer : public Renderer {
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
             std::size_t floats_a_row) { ProjectTile({.rays = &rays, .box = &ray_box, .values = values}, tile, pixels, floats_a_row); });
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 };
 

@@ -231,9 +231,7 @@ class ZBufferRenderer : public Renderer {
     report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
     report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
     report.drawn_voxels += drawn;
-    clock.Finish(Stage::kRender, control);
-    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
-    return image;
+    return clock.Finish(std::move(image), control);
   }
 
  private:

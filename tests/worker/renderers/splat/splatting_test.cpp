@@ -6,6 +6,7 @@
 
 #include "common/parallel/task_arena.h"
 #include "tests/support/renderers.h"
+#include "tests/support/same_image.h"
 #include "tests/worker/renderers/render_support.h"
 #include "tests/worker/renderers/splat/reference_splatting.h"
 
@@ -45,34 +46,32 @@ TEST(Splatting, IsItsDefinition) {
   }
 }
 
-// Footprints as wide as the grid's pixels at one end, at the finest grid at the other.
-TEST(Splatting, IsItsDefinitionAtEveryZoom) {
-  const unsigned seed = 20;
+// From both projections and for each of the values; setup_at(volume, options, value).
+template <class SetupAt>
+void ExpectIsItsDefinitionAtEach(unsigned seed, const Index3& size, std::initializer_list<double> values, SetupAt&& setup_at) {
   std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{19, 26, 23}, {1, 1, 1.5}}, ScalarType::kUint8, seed);
+  const Volume volume = MakeBlobs({size, {1, 1, 1.5}}, ScalarType::kUint8, seed);
   for (Projection projection : kProjections) {
-    for (double zoom : {0.1, 0.25, 0.6, 2.0, 8.0, 40.0}) {
-      SCOPED_TRACE(::testing::Message() << "seed " << seed << " zoom " << zoom);
+    for (const double value : values) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " at " << value);
       SetupOptions options;
       options.view = RandomView(projection, random);
-      options.view.zoom = zoom;
-      ExpectIsItsDefinition(volume, MakeSetup(volume, options));
+      ExpectIsItsDefinition(volume, setup_at(volume, options, value));
     }
   }
 }
 
+// Footprints as wide as the grid's pixels at one end, at the finest grid at the other.
+TEST(Splatting, IsItsDefinitionAtEveryZoom) {
+  const auto setup = [](const Volume& volume, SetupOptions options, double zoom) {
+    options.view.zoom = zoom;
+    return MakeSetup(volume, options);
+  };
+  ExpectIsItsDefinitionAtEach(20, {19, 26, 23}, {0.1, 0.25, 0.6, 2.0, 8.0, 40.0}, setup);
+}
+
 TEST(Splatting, IsItsDefinitionAtEveryWidthOfFootprints) {
-  const unsigned seed = 40;
-  std::mt19937 random(seed);
-  const Volume volume = MakeBlobs({{26, 19, 23}, {1, 1, 1.5}}, ScalarType::kUint8, seed);
-  for (Projection projection : kProjections) {
-    for (double footprint : {1.0, 1.3, 2.0, kMaxFootprint}) {
-      SCOPED_TRACE(::testing::Message() << "seed " << seed << " footprint " << footprint);
-      SetupOptions options;
-      options.view = RandomView(projection, random);
-      ExpectIsItsDefinition(volume, SplatSetup(volume, options, footprint));
-    }
-  }
+  ExpectIsItsDefinitionAtEach(40, {26, 19, 23}, {1.0, 1.3, 2.0, kMaxFootprint}, SplatSetup);
 }
 
 // A bright voxel in a clear volume: footprints twice as wide spread the same opacity over a larger area.
@@ -124,31 +123,13 @@ double LengthInside(const FrameSetup& setup, int x, int y, double margin) {
 TEST(Splatting, HomogeneousBlockLooksTheSameFromEverySide) {
   const unsigned seed = 7;
   std::mt19937 random(seed);
-  constexpr double kOpacity = 0.06;
+  const auto length = [](const FrameSetup& setup, int x, int y) { return LengthInside(setup, x, y, 4); };
   for (Projection projection : kProjections) {
     for (Vec3 spacing : {Vec3{1, 1, 1}, Vec3{1, 1.5, 0.7}}) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed);
       const Volume block = MakeBlock({{26, 20, 24}, spacing});
-      int pixels = 0;
-      for (int i = 0; i < 12; ++i) {
-        SetupOptions options;
-        options.view = RandomView(projection, random);
-        options.view.zoom = 1.5;
-        options.transfer = Uniform(kOpacity, {1, 1, 1});
-        const FrameSetup setup = MakeSetup(block, options);
-        const LocalImage image = RenderPicture(block, setup);
-        const double voxel_length = std::min({spacing.x, spacing.y, spacing.z});
-        for (int y = 0; y < setup.camera.height; ++y) {
-          for (int x = 0; x < setup.camera.width; ++x) {
-            const double length = LengthInside(setup, x, y, 4);
-            if (length == 0) continue;
-            ++pixels;
-            const double expected = 1 - std::pow(1 - kOpacity, length / voxel_length);
-            ASSERT_NEAR(PixelOf(image, x, y)[3], expected, 0.01 * expected)
-                << "seed " << seed << " view " << i << " pixel " << x << ' ' << y;
-          }
-        }
-      }
-      EXPECT_GT(pixels, 1000);
+      const auto setup = [&](const SetupOptions& options, int) { return MakeSetup(block, options); };
+      ExpectOpacityOfLength(block, RandomViews(projection, 12, random), {.setup = setup, .length = length});
     }
   }
 }
@@ -251,9 +232,9 @@ TEST(Splatting, IsTheSameBitsForAnyNumberOfThreads) {
         frame = other_frame, picture = other_picture;
         continue;
       }
-      EXPECT_EQ(other_frame.bounds, frame.bounds);
-      EXPECT_TRUE(std::ranges::equal(other_frame.rgba, frame.rgba)) << "seed " << seed << " threads " << threads;
-      EXPECT_TRUE(std::ranges::equal(other_picture.rgba, picture.rgba)) << "seed " << seed << " threads " << threads;
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " threads " << threads);
+      ExpectSameBits(other_frame, frame);
+      ExpectSameBits(other_picture, picture);
     }
   }
 }

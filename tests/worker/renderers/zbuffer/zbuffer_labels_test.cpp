@@ -5,6 +5,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "common/kernels/combine.h"
+#include "tests/support/same_image.h"
 #include "tests/worker/renderers/render_support.h"
 
 namespace slabstream {
@@ -68,13 +69,6 @@ Labelled BlockWhere(Keep&& keep) {
   return data;
 }
 
-void ExpectSame(const LocalImage& a, const LocalImage& b) {
-  ASSERT_EQ(a.bounds, b.bounds);
-  EXPECT_EQ(a.rgba, b.rgba);
-  EXPECT_EQ(a.depth, b.depth);
-  EXPECT_EQ(a.voxel, b.voxel);
-}
-
 // Calls check(colour) for all pixels that are not clear; returns how many there are.
 template <class Check>
 int ForEachColor(const LocalImage& image, Check&& check) {
@@ -106,8 +100,8 @@ TEST(ZBufferLabels, WithoutTintChangeNothing) {
                          MakeVolume(kGrid, ScalarType::kUint16, [](const Index3& v) { return v.x % 3; })};
   SetupOptions options;
   options.transfer = Ramp(1);
-  ExpectSame(Rendered(data, LabelledSetup(data, options, Look(LabelMode::kTint, {{kRed}, {kGreen}}, 0))),
-             Rendered(data, LabelledSetup(data, options, std::nullopt)));
+  ExpectSameBits(Rendered(data, LabelledSetup(data, options, Look(LabelMode::kTint, {{kRed}, {kGreen}}, 0))),
+                 Rendered(data, LabelledSetup(data, options, std::nullopt)));
 }
 
 TEST(ZBufferLabels, OneThatIsNotShownLeavesTheVolumeAsItIs) {
@@ -118,8 +112,8 @@ TEST(ZBufferLabels, OneThatIsNotShownLeavesTheVolumeAsItIs) {
   SetupOptions options;
   options.transfer = Ramp(1);
   for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface}) {
-    ExpectSame(Rendered(data, LabelledSetup(data, options, Look(mode, {{kRed, 1, false}, {kGreen, 0, false}}))),
-               Rendered(data, LabelledSetup(data, options, std::nullopt)));
+    ExpectSameBits(Rendered(data, LabelledSetup(data, options, Look(mode, {{kRed, 1, false}, {kGreen, 0, false}}))),
+                   Rendered(data, LabelledSetup(data, options, std::nullopt)));
     const LocalImage image = Rendered(data, LabelledSetup(data, options, Look(mode, {{kRed}, {kGreen, 1, false}})));
     EXPECT_EQ(image.depth, Rendered(one, LabelledSetup(one, options, Look(mode, {{kRed}, {kGreen}}))).depth);
     EXPECT_EQ(image.rgba, Rendered(one, LabelledSetup(one, options, Look(mode, {{kRed}, {kGreen}}))).rgba);
@@ -133,7 +127,7 @@ TEST(ZBufferLabels, TintTakesAwayWhatIsClear) {
     const LocalImage image = Rendered(data, LabelledSetup(data, Unlit(), Look(LabelMode::kTint, {gone, {kGreen}})));
     EXPECT_GT(CountColor(image, kGreen), 100);
     EXPECT_EQ(CountColor(image, kRed), 0);
-    ExpectSame(image, Rendered(rest, LabelledSetup(rest, Unlit(), Look(LabelMode::kTint, {{kRed}, {kGreen}}))));
+    ExpectSameBits(image, Rendered(rest, LabelledSetup(rest, Unlit(), Look(LabelMode::kTint, {{kRed}, {kGreen}}))));
   }
   const LabelLook half = Look(LabelMode::kTint, {{kRed, 0.5F}, {kGreen}});
   EXPECT_GT(CountColor(Rendered(data, LabelledSetup(data, Unlit(), half)), kRed), 100);
@@ -200,7 +194,7 @@ TEST(ZBufferLabels, ABoxFollowsTheLook) {
            Look(LabelMode::kSurface, {{kRed}, {kGreen}}), Look(LabelMode::kTint, {{kGreen}, {kRed}}, 0.5)}) {
     const FrameSetup setup = LabelledSetup(data, Unlit(), look);
     RankReport report;
-    ExpectSame(renderer->Render(*slab, data.volume.block.box, setup, {}, RenderControl(), report).value(), Rendered(data, setup));
+    ExpectSameBits(renderer->Render(*slab, data.volume.block.box, setup, {}, RenderControl(), report).value(), Rendered(data, setup));
   }
 }
 
