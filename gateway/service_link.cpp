@@ -94,12 +94,9 @@ void ServiceLink::Turn() {
 void ServiceLink::FailAll(const Status& why) {
   LogError(why.message());
   while (!open_.empty()) {
-    OpenTask task = std::move(open_.begin()->second);
-    for (const RequestId id : task.requests) {
-      if (requests_.erase(id) > 0) client_->Cancel(id);
-    }
-    open_.erase(open_.begin());
-    (void)Guarded("the link to the service", [&] { task.handlers.done(why); });  // it may lack memory, too
+    const auto done = std::move(open_.begin()->second.handlers.done);
+    Forget(open_.begin());
+    (void)Guarded("the link to the service", [&] { done(why); });  // it may lack memory, too
   }
 }
 

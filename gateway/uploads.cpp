@@ -124,11 +124,11 @@ void Uploads::Continue(Place upload, std::uint64_t begin, std::string body, Repl
     return reply(
         Failure(400, fmt::format("bytes {} to {} of a file of {} bytes, of which {} are here", begin, end, to.bytes, to.received)));
   }
-  if (begin == to.received && !body.empty() && to.sent < to.received) {
-    return reply(Failure(
-        429, fmt::format("bytes {} to {} are still on their way: send the next part when they are answered", to.sent, to.received)));
-  }
   if (begin == to.received && !body.empty()) {
+    if (to.sent < to.received) {
+      return reply(Failure(
+          429, fmt::format("bytes {} to {} are still on their way: send the next part when they are answered", to.sent, to.received)));
+    }
     to.received = end;
     const auto owner = std::make_shared<const std::string>(std::move(body));
     to.sender->Add(Bytes(owner, std::as_bytes(std::span(*owner))));
