@@ -64,11 +64,11 @@ class Collector:
         class Handler(http.server.BaseHTTPRequestHandler):
             def do_POST(self):
                 received = self.rfile.read(int(self.headers["Content-Length"]))
+                collector.requests.put((self.path, self.headers, received))  # before the answer, after which the next one may come
                 self.send_response(status)
                 self.send_header("Content-Length", str(len(body)))
                 self.end_headers()
                 self.wfile.write(body)
-                collector.requests.put((self.path, self.headers, received))
 
             def log_message(self, *_):
                 pass
