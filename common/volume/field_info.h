@@ -1,0 +1,36 @@
+// FieldInfo: what a dataset says of one of its fields. A dataset has one field or several: the channels of its volume, which lie on one
+// grid, and perhaps an overlay with a grid and a place of its own. Fields are numbered from 0, channels first.
+//
+// TimeAxis: the times of a dataset. All of its fields have the same ones, or one for all times.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxFields = 64;       // of a dataset; further channels of a file are not shown
+inline constexpr std::size_t kMaxShownFields = 16;  // of a picture
+
+struct FieldInfo {
+  std::string name = {};  // "": it has none, and is called by its number
+  bool channel = true;    // of the volume, on its grid; else it has a grid of its own
+  // What its author shows, as far as the file says it.
+  std::optional<std::array<float, 3>> color = {};  // straight red, green, blue, [0, 1]
+  std::optional<ValueRange> window = {};           // data values that are dark and bright, min < max
+  bool shown = true;
+  friend bool operator==(const FieldInfo&, const FieldInfo&) = default;
+};
+
+struct TimeAxis {
+  int count = 1;                    // at least 1
+  std::optional<double> step = {};  // from a time to the next one, above 0; none: the file does not say, or times are not evenly spaced
+  std::string unit = {};            // of `step`, as UCUM spells it: "s", "ms", "min", "h"; "": not known
+  friend bool operator==(const TimeAxis&, const TimeAxis&) = default;
+};
+
+}  // namespace slabstream
