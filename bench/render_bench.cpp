@@ -3,6 +3,7 @@
 //   Boxes       both spheres, N = 200, as one box and as two boxes one after the other (p = 1, 2), on one thread
 //   Turn        the hollow sphere, N = 200 and 256, in both projections from 12 azimuths one after the other, by 1 and 2 threads
 //   EmptySpace  the hollow sphere of 128^3 voxels alone, and in the middle of 256^3 and 512^3 voxels, at a zoom that shows it in one size
+//   Channels    of 256^3 and 512^3 voxels of 16 bits, one or several in a picture, cast on one thread
 //
 // Time is of a frame. Counters of stages are milliseconds a frame, summed over threads and boxes; `finish` is making the picture from the
 // frame.
@@ -10,6 +11,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <memory>
 
@@ -138,6 +140,66 @@ BENCHMARK(EmptySpace)
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
+
+// A channel of cells: most of the volume is empty, and channels overlap here and there. 16 bits.
+Volume MakeChannel(std::int32_t side, int channel) {
+  Volume volume;
+  volume.description = {.geometry = {.size = Uniform(side)}, .type = ScalarType::kUint16, .mapping = {}};
+  volume.block = MakeVoxelBlock(volume.description.geometry.bounds(), ScalarType::kUint16);
+  std::vector<float> waves[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const double periods = 3 + (channel + axis) % 4;
+    for (std::int32_t i = 0; i < side; ++i) waves[axis].push_back(float(std::sin(2 * 3.14159265 * (periods * i / side + 0.21 * channel))));
+  }
+  auto* sample = volume.block.samples<std::uint16_t>();
+  for (std::int32_t z = 0; z < side; ++z) {
+    for (std::int32_t y = 0; y < side; ++y) {
+      for (std::int32_t x = 0; x < side; ++x) {
+        const float density = waves[0][std::size_t(x)] * waves[1][std::size_t(y)] * waves[2][std::size_t(z)];
+        *sample++ = density > 0 ? std::uint16_t(60000 * density) : 0;
+      }
+    }
+  }
+  return volume;
+}
+
+void Channels(benchmark::State& state) {
+  const auto side = std::int32_t(state.range(0));
+  constexpr Rgb kColors[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {0, 1, 1}, {1, 0, 1}};
+  std::vector<std::unique_ptr<BoxData>> channels;
+  FrameSetup setup;
+  for (int i = 0; i < int(state.range(1)); ++i) {
+    const Volume volume = MakeChannel(side, i);
+    const TransferFunction transfer = {.colors = {{0, kColors[i % 6]}}, .opacities = {{20000, 0, 0.5, 0}, {60000, 0.2, 0.5, 0}}};
+    if (i == 0) {
+      setup.description = volume.description;
+      setup.range = {0, 60000};
+      SetRenderer(*FindRenderer("raycast"), setup);
+      setup.camera = MakeCamera({.azimuth_degrees = 30, .elevation_degrees = 20}, {512, 512}, volume.description.geometry);
+      setup.transfer = transfer;
+    } else {
+      setup.fields.push_back(
+          {.levels = {{DatasetId(i), volume.description, {}}}, .of_volume = {0}, .look = {.transfer = transfer, .range = {0, 60000}}});
+    }
+    channels.push_back(
+        std::make_unique<BoxData>(std::make_shared<BoxVoxels>(Pad(VoxelBricks(volume.block), volume.block.box), BoxLayers())));
+  }
+  std::vector<BoxData*> fields;
+  for (std::size_t i = 1; i < channels.size(); ++i) fields.push_back(channels[i].get());
+  channels[0]->SetFields(fields);
+  const std::unique_ptr<Renderer> renderer = MakeRenderer(*setup.renderer);
+  TaskArena arena(1);
+  RankReport report;
+  const auto render = [&] {
+    arena.Run([&] {
+      benchmark::DoNotOptimize(
+          renderer->Render(*channels[0], setup.description.geometry.bounds(), setup, {}, RenderControl(), report).value().rgba.data());
+    });
+  };
+  render();
+  for (auto _ : state) render();
+}
+BENCHMARK(Channels)->ArgNames({"side", "channels"})->ArgsProduct({{256, 512}, {1, 2, 4}})->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace slabstream

@@ -131,13 +131,13 @@ Result<Reply> Client::Impl::Await(RequestId id) {
 
 Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) { return impl_->Await<Picture>(Submit(request, deadline)); }
 
-Result<SummaryReply> Client::Summarize(const std::string& dataset, const TransferChoice& transfer, Duration deadline) {
-  return impl_->Await<SummaryReply>(impl_->Ask(SummaryQuery{.dataset = dataset, .transfer = transfer}, deadline));
+Result<SummaryReply> Client::Summarize(SummaryQuery query, Duration deadline) {
+  return impl_->Await<SummaryReply>(impl_->Ask(std::move(query), deadline));
 }
 
-Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline) {
-  const std::size_t count = points.size();
-  Result<SampleReply> reply = impl_->Await<SampleReply>(impl_->Ask(SampleQuery{.dataset = dataset, .points = std::move(points)}, deadline));
+Result<std::vector<VolumeSample>> Client::SampleAt(SampleQuery query, Duration deadline) {
+  const std::size_t count = query.points.size();
+  Result<SampleReply> reply = impl_->Await<SampleReply>(impl_->Ask(std::move(query), deadline));
   if (!reply.ok()) return reply.status();
   if (reply->samples.size() != count) {
     return Status::DataLoss("the service answered " + std::to_string(reply->samples.size()) + " of " + std::to_string(count) + " points");
@@ -145,8 +145,8 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
   return std::move(reply->samples);
 }
 
-Result<StatisticsReply> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, bool labels, Duration deadline) {
-  return impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box, .labels = labels}, deadline));
+Result<StatisticsReply> Client::StatisticsIn(StatisticsQuery query, Duration deadline) {
+  return impl_->Await<StatisticsReply>(impl_->Ask(std::move(query), deadline));
 }
 
 Result<ViewReply> Client::ChooseView(ViewQuery query, Duration deadline) {

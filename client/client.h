@@ -86,11 +86,10 @@ class Client {
   Result<Picture> Render(const FrameRequest& request, Duration deadline = std::chrono::minutes(10));
 
   // The answers to questions; these submit and wait. InvalidArgument, NotFound, ...: as of frames.
-  Result<SummaryReply> Summarize(const std::string& dataset, const TransferChoice& transfer = {}, Duration deadline = kAnswerTime);
-  Result<std::vector<VolumeSample>> SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline = kAnswerTime);
+  Result<SummaryReply> Summarize(SummaryQuery query, Duration deadline = kAnswerTime);
+  Result<std::vector<VolumeSample>> SampleAt(SampleQuery query, Duration deadline = kAnswerTime);
   Result<ViewReply> ChooseView(ViewQuery query, Duration deadline = kAnswerTime);
-  Result<StatisticsReply> StatisticsIn(const std::string& dataset, const ClipBox& box, bool labels = false,
-                                       Duration deadline = kAnswerTime);
+  Result<StatisticsReply> StatisticsIn(StatisticsQuery query, Duration deadline = kAnswerTime);
 
   // A notified wakeup() ends this one early: Unavailable.
   Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));

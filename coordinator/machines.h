@@ -89,6 +89,7 @@ struct DatasetReady {
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
   std::optional<CoarserVolume> light = {};  // with several levels: the light volume, if the request needs it (ResolvedRequest)
+  ShownFields fields = {};
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

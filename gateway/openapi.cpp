@@ -140,6 +140,9 @@ Json OpenApi() {
   const auto optional = [](const char* name, const char* help, const char* type) {
     return Json{{"name", name}, {"group", "Options"}, {"type", type}, {"help", help}};
   };
+  const Json of_field =
+      With(dataset, {optional("field", "Which channel, by its number or name (default: the first one that is shown)", "CHANNEL"),
+                     optional("time", "Which time, as of a picture (default: that of the file, mostly the first)", "N|3.5s|last")});
   const Json path = {{"name", "path"}, {"group", "Options"}, {"type", "JSON"}, {"help", kPathHelp}};
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
@@ -160,24 +163,24 @@ Json OpenApi() {
                      field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second)), path}),
        true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
-      {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
-      {"/api/v1/joint-histogram", "How often values occur together with slopes", "application/json", false, dataset},
+      {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, of_field},
+      {"/api/v1/joint-histogram", "How often values occur together with slopes", "application/json", false, of_field},
       {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
       {"/api/v1/value", "The voxel, value and label of a dataset at a point", "application/json", false,
-       With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
+       With(of_field, {field("at", kPointHelp, "X,Y,Z")})},
       {"/api/v1/profile", "The values of a dataset along a line, interpolated between its voxels", "application/json", false,
-       With(dataset,
+       With(of_field,
             {field("from", kLineHelp, "X,Y,Z"), field("to", kLineHelp, "X,Y,Z"),
              field("samples", "Number of points along the line, both ends included: 2 to 4096", "N", fmt::format("{}", kProfileSamples))})},
       {"/api/v1/statistics", "Mean, deviation and range of the values in a box, or of those of each label", "application/json", false,
-       With(dataset,
+       With(of_field,
             {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1", kWholeBox),
              {{"name", "labels"}, {"group", "Options"}, {"help", "The values of each label there, and its volume"}, {"default", "false"}},
              field("format", "Of labels: json, or csv for a table", "json|csv", "json")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
-       Named(render, {"dataset", "transfer", "scalar-range"})},
+       With(of_field, {Named(render, {"transfer"})[0], Named(render, {"scalar-range"})[0]})},
       {"/api/v1/upload", "Sends a file that becomes a dataset, in parts (docs/http.md)", "application/json", false,
        Json::array({optional("file", "To begin: the name of the file, whose ending says its format", "NAME"),
                     optional("bytes", "To begin: the size of the file", "N"), optional("upload", "Then: what the first answer says", "ID"),

@@ -22,6 +22,26 @@ namespace {
 constexpr int kMaxQuestions = 32;  // under way: fewer than a client may have
 static_assert(kMaxQuestions < int(kMaxOpenQuestions));
 
+// Which channel of the dataset, and which time.
+template <class Query>
+Query About(FieldReader& read, Query query) {
+  query.field = read.Get("field", "");
+  query.time = read.Get("time", "");
+  for (const std::string& text : {query.field, query.time}) {
+    if (text.size() > kMaxNameBytes)
+      read.Refuse(fmt::format("field or time has {} bytes, at most {} are possible", text.size(), kMaxNameBytes));
+  }
+  return query;
+}
+
+// The same of a question that has no fields but these and the dataset.
+template <class Query>
+Query AboutAlone(FieldReader& read, Query query) {
+  query = About(read, std::move(query));
+  query.dataset = read.Dataset();
+  return query;
+}
+
 }  // namespace
 
 QuestionRequests::QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link)
@@ -48,10 +68,10 @@ template <class Query, class Reply>
 void QuestionRequests::AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), PictureFields fields,
                                     ReplyFunction reply, const Gone& gone) {
   FieldReader read(std::move(fields));
-  const std::string dataset = read.Dataset();
-  const auto make = [json, dataset](const QuestionReply& answer) { return JsonReply(json(dataset, std::get<Reply>(answer))); };
-  Query query;
-  query.dataset = dataset;
+  Query query = AboutAlone(read, Query());
+  const auto make = [json, dataset = query.dataset](const QuestionReply& answer) {
+    return JsonReply(json(dataset, std::get<Reply>(answer)));
+  };
   Ask(name, read, std::move(query), make, std::move(reply), gone);
 }
 
@@ -71,7 +91,7 @@ void QuestionRequests::Value(PictureFields fields, ReplyFunction reply, const Go
   FieldReader read(std::move(fields));
   const Vec3 point = read.Value(ParsePoint("at", read.Need("at", kPointHelp)));
   const auto make = [](const QuestionReply& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
-  Ask("value", read, SampleQuery{.dataset = read.Dataset(), .points = {point}}, make, std::move(reply), gone);
+  Ask("value", read, AboutAlone(read, SampleQuery{.points = {point}}), make, std::move(reply), gone);
 }
 
 void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const Gone& gone) {
@@ -81,7 +101,7 @@ void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const 
   const std::string samples_text = read.Get("samples", std::to_string(kProfileSamples));
   const int samples = std::max(read.Value(ParseInteger("samples", samples_text, 2, int(kMaxSamplePoints))), 2);
   const auto make = [](const QuestionReply& answer) { return JsonReply(ProfileJson(std::get<SampleReply>(answer).samples)); };
-  Ask("profile", read, SampleQuery{.dataset = read.Dataset(), .points = PointsAlong(from, to, samples)}, make, std::move(reply), gone);
+  Ask("profile", read, AboutAlone(read, SampleQuery{.points = PointsAlong(from, to, samples)}), make, std::move(reply), gone);
 }
 
 void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone) {
@@ -99,7 +119,7 @@ void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, con
     if (csv) return HttpReply{.type = "text/csv; charset=utf-8", .body = LabelStatisticsCsv(found), .headers = {}};
     return JsonReply(by_label ? LabelStatisticsJson(found) : BoxStatisticsJson(found.statistics));
   };
-  Ask("statistics", read, StatisticsQuery{.dataset = read.Dataset(), .box = box, .labels = by_label}, make, std::move(reply), gone);
+  Ask("statistics", read, AboutAlone(read, StatisticsQuery{.box = box, .labels = by_label}), make, std::move(reply), gone);
 }
 
 void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gone& gone) {
@@ -114,18 +134,21 @@ void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gon
 
 void QuestionRequests::Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
   FieldReader read(fields);
-  for (const PictureField& field : fields) {
+  SummaryQuery query = About(read, SummaryQuery());
+  for (const PictureField& field : read.rest()) {
     if (field.name != "dataset" && field.name != "transfer" && field.name != "scalar-range") {
-      read.Refuse(
-          fmt::format("there is no option '{}': dataset, transfer and scalar-range are taken", Printable(field.name).substr(0, 128)));
+      read.Refuse(fmt::format("there is no option '{}': dataset, transfer, scalar-range, field and time are taken",
+                              Printable(field.name).substr(0, 128)));
     }
   }
-  const FrameRequest frame = read.Value(ParseRenderFields(fields)).frame;
+  const FrameRequest frame = read.Value(ParseRenderFields(read.rest())).frame;
+  query.dataset = frame.dataset;
+  query.transfer = frame.transfer;
   const auto* preset = std::get_if<std::string>(&frame.transfer.choice);
   const auto make = [name = preset != nullptr ? *preset : "function"](const QuestionReply& answer) {
     return HttpReply{.body = FormatParaViewColorMap(std::get<SummaryReply>(answer).transfer, name)};
   };
-  Ask("transfer", read, SummaryQuery{.dataset = frame.dataset, .transfer = frame.transfer}, make, std::move(reply), gone);
+  Ask("transfer", read, std::move(query), make, std::move(reply), gone);
 }
 
 }  // namespace slabstream

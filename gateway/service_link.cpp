@@ -48,7 +48,7 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
 ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline,
                                         Handlers handlers) {
   std::optional<Inquiry> question;
-  if (annotations.needs_key()) question = SummaryQuery{.dataset = frames.front().dataset, .transfer = frames.front().transfer};
+  if (annotations.needs_key()) question = SummaryOf(frames.front());
   return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = std::move(question)});
 }
 

@@ -42,7 +42,7 @@ Status TurntableMovie::RenderAndEncode() {
   ServiceLink link(context_, service_);  // a client of its own, so that others get their share
   const FrameRequest& first = request_.render.frame;
   const AskView ask = [&](ViewQuery query) { return Ask(link, std::move(query)); };
-  const Result<std::vector<ViewParameters>> views = ViewsOfMovie(first, request_.move, request_.frames, {&first.dataset, 1}, ask);
+  const Result<std::vector<ViewParameters>> views = ViewsOfMovie(request_.move, request_.frames, {&first, 1}, ask);
   if (!views.ok()) return views.status();
   const auto request = [&](int index) {
     FrameRequest frame = first;

@@ -162,7 +162,7 @@ struct __attribute__((visibility("hidden"))) Service::Impl {
   // What colour bar and legend say.
   PictureKey KeyFor(const RenderRequest& request) {
     if (!request.format.annotations.needs_key()) return {};
-    return KeyOf(request.frame, ValueOf(client->Summarize(request.frame.dataset, request.frame.transfer)));
+    return KeyOf(request.frame, ValueOf(client->Summarize(SummaryOf(request.frame))));
   }
 
   std::mutex mutex;  // for the client

@@ -16,7 +16,7 @@ namespace slabstream {
 // What annotations of pictures like that of `request` need. Empty if they need nothing.
 inline Result<PictureKey> KeyFor(Client& client, const Annotations& annotations, const FrameRequest& request) {
   if (!annotations.needs_key()) return PictureKey();
-  const Result<SummaryReply> summary = client.Summarize(request.dataset, request.transfer);
+  const Result<SummaryReply> summary = client.Summarize(SummaryOf(request));
   if (!summary.ok()) return summary.status();
   return KeyOf(request, *summary);
 }
@@ -26,7 +26,7 @@ inline Result<PictureKey> KeyFor(Client& client, const Annotations& annotations,
 inline void WarnOf(Client& client, const FrameRequest& frame, bool empty, const std::optional<ValueWindow>& window = {}) {
   const std::optional<ScalarRange>& range = frame.transfer.scalar_range;
   if (!empty && !window && !range) return;
-  const Result<SummaryReply> summary = client.Summarize(frame.dataset, frame.transfer);
+  const Result<SummaryReply> summary = client.Summarize(SummaryOf(frame));
   if (!summary.ok()) return;
   std::optional<std::string> warning;
   if (window) {

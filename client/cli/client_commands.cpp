@@ -44,7 +44,7 @@ void DeclareRender(const CommandLine& line) {
       .Required()
       .TypeName("FILE")
       .Group(kOutputGroup);
-  AddFrameOptions(sub, options.frame, {}, &options.sources);
+  AddFrameOptions(sub, options.frame, &options.sources);
   AddRequestOption(sub, *FindRequestOption("previews"), options.frame.request);
 }
 
@@ -66,9 +66,17 @@ void DeclareTurntable(const CommandLine& line) {
       .Default("one for each time of --time, or the seconds of --path");
   const Option turns = AddInteger(sub, "--turns", options.turns, 0, kMaxTurns, kTurnsHelp);
   const Option path = AddParsed(sub, "--path", options.path, ParsePathFile, kPathHelp).TypeName("FILE").Excludes(turns);
-  AddParsed(sub, "--time", options.times, ParseTimeRange,
-            "Which volumes of a file with several, such as a time series; counted from 0, FIRST and LAST included")
-      .TypeName("T|FIRST:LAST");
+  const auto set_times = [&options](const std::string& option, const std::vector<std::string>& texts) {
+    const Result<TimeSteps> times = ParseTimeSteps(option, texts.back());
+    if (times.ok()) options.times = *times;
+    const bool number = times.ok() || texts.back().find(':') != std::string::npos;
+    if (!number) options.frame.request.time = texts.back();
+    return number ? times.status() : Status::Ok();
+  };
+  sub.AddOption(
+         "--time", set_times,
+         "Which times are shown: those from FIRST to LAST, or each STEP-th of them, counted from 0; or one, as for `slabstream render`")
+      .TypeName("T|FIRST:LAST[:STEP]");
   AddParsed(
       sub, "--fps", options.frames_per_second,
       [](const std::string& option, const std::string& text) {
@@ -78,7 +86,7 @@ void DeclareTurntable(const CommandLine& line) {
       .TypeName("NUMBER")
       .Default(fmt::format("{:g}", MovieShape().frames_per_second));
   AddInteger(sub, "--in-flight", options.in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
-  AddFrameOptions(sub, options.frame, {"time"});
+  AddFrameOptions(sub, options.frame);
   ExcludeViewOptions(sub, path);
   path.Excludes(sub.FindOption("--camera"));
 }
@@ -107,7 +115,7 @@ void DeclareInfo(const CommandLine& line) {
 void DeclareValue(const CommandLine& line) {
   const Command sub = line.app.AddCommand("value", "Print voxel, value and label at points of a dataset or a volume file");
   ValueOptions& options = OptionsOf(line, sub, RunValue);
-  AddSource(sub, options.source, options.connection);
+  AddSource(sub, options.volume);
   AddRepeated(sub, "--at", options.points, "A point of the world").Required().TypeName("X,Y,Z");
   AddLayerFiles(sub, options.layers);
   sub.AddFlag("--json", options.json, "Print JSON");
@@ -116,7 +124,7 @@ void DeclareValue(const CommandLine& line) {
 void DeclareMeasure(const CommandLine& line) {
   const Command sub = line.app.AddCommand("measure", "Measure distances, angles, profiles, boxes and labels in a dataset or a volume file");
   MeasureOptions& options = OptionsOf(line, sub, RunMeasure);
-  AddSource(sub, options.source, options.connection);
+  AddSource(sub, options.volume);
   sub.GroupOptions("Measures, in the unit of the world (mm of a patient); each may be repeated");
   AddRepeated(sub, "--distance", options.distances, "Distance of two points of the world").TypeName("X,Y,Z:X,Y,Z");
   AddRepeated(sub, "--angle", options.angles, "Angle at the second of three points").TypeName("X,Y,Z:X,Y,Z:X,Y,Z");

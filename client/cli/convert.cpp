@@ -62,6 +62,7 @@ Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& sourc
   const Result<SourceToConvert> opened = OpenToConvert(options, source, {});
   if (!opened.ok()) return opened.status();
   Result<LoadedVolume> loaded = ReadVolume(*opened->source, source.path, source.options, true);
+  if (loaded.ok()) WarnOfPart(source.path, source.options, loaded->info);
   if (!loaded.ok()) return AsInput(loaded.status());
   return loaded;
 }

@@ -25,7 +25,7 @@ Vec3 SpacingOf(const DicomStack& stack) { return {Length(stack.steps[0]), Length
 std::string SlicesText(const DicomSeries& series) {
   const DicomStack& stack = series.stack;
   if (!series.trouble.ok()) return fmt::format("{}", series.frame_count());
-  return stack.volumes > 1 ? fmt::format("{} x {} times", stack.size.z, stack.volumes) : fmt::format("{}", stack.size.z);
+  return stack.times.count > 1 ? fmt::format("{} x {} times", stack.size.z, stack.times.count) : fmt::format("{}", stack.size.z);
 }
 
 // Why it is not read, or is read only if --series asks for it.
@@ -78,7 +78,7 @@ Json SeriesJson(const std::vector<DicomSeries>& all) {
                  {"size", {first.columns, first.rows, series.frame_count()}}};
     if (series.trouble.ok()) {
       each["size"][2] = series.stack.size.z;
-      if (series.stack.volumes > 1) each["times"] = series.stack.volumes;
+      if (series.stack.times.count > 1) each["times"] = series.stack.times.count;
       const Vec3 spacing = SpacingOf(series.stack);
       each["spacing"] = {spacing.x, spacing.y, spacing.z};
     }

@@ -32,6 +32,7 @@
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
 #include "data/catalogue/catalogue.h"
+#include "data/open/read_volume.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/index_file.h"
@@ -225,20 +226,42 @@ std::string PartsText(const SourceInfo& info) {
     text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
                         spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
   }
-  if (info.window)
-    text += fmt::format("window       {} ... {}, which the file asks for\n", ValueText(info.window->min), ValueText(info.window->max));
   return text;
 }
 
+Json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
+
 std::string ChannelsText(const SourceInfo& info) {
   if (info.channels.empty()) return "";
-  std::string text = fmt::format("channels     {}:", info.channels.size());
-  for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
-  return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
+  const std::string shown = fmt::format("; this is number {}\n", info.channel);
+  if (info.components > 1) return fmt::format("components   {} of a voxel", info.components) + shown;
+  std::string text = fmt::format("channels     {}: name, colour, window", info.channels.size()) + (info.channels.size() > 1 ? shown : "\n");
+  for (std::size_t i = 0; i < std::min(info.channels.size(), kMaxFields); ++i) {
+    const FieldInfo& channel = info.channels[i];
+    const std::string window =
+        channel.window ? fmt::format("{} ... {}", ValueText(channel.window->min), ValueText(channel.window->max)) : "no window";
+    text += fmt::format("  {:>2}  \"{}\"  {}  {}{}\n", i, Printable(channel.name), channel.color ? ColorText(*channel.color) : "no colour",
+                        window, channel.shown ? "" : "  (hidden)");
+  }
+  return text + (info.channels.size() > kMaxFields ? "  ...\n" : "");
+}
+
+Json ChannelsJson(const SourceInfo& info) {
+  Json channels = Json::array();
+  for (const FieldInfo& channel : info.channels) {
+    channels.push_back({{"name", channel.name},
+                        {"color", channel.color ? Json(ColorText(*channel.color)) : Json(nullptr)},
+                        {"window", channel.window ? RangeJson(*channel.window) : Json(nullptr)},
+                        {"shown", channel.shown}});
+  }
+  return channels;
 }
 
 std::string TimesText(const SourceInfo& info) {
-  return info.times > 1 ? fmt::format("times        {}; this is number {}\n", info.times, info.time) : "";
+  const auto& [count, step, unit] = info.times;
+  if (count == 1) return "";
+  const std::string apart = step ? fmt::format(", {:.6g}{}{} apart", *step, unit.empty() ? "" : " ", unit) : "";
+  return fmt::format("times        {}{}; this is number {}\n", count, apart, info.time);
 }
 
 std::string NotesText(const SourceInfo& info) {
@@ -280,7 +303,8 @@ std::vector<std::uint64_t> CountLabels(const Layers& layers) {
   return counts;
 }
 
-std::string LayersText(const Layers& layers) {
+// `overlay`: none: there is none.
+std::string LayersText(const Layers& layers, const std::optional<VolumeSummary>& overlay) {
   std::string text;
   if (layers.labels != nullptr) {
     const std::vector<std::uint64_t> counts = CountLabels(layers);
@@ -290,19 +314,13 @@ std::string LayersText(const Layers& layers) {
       text += fmt::format("  {:>8} {} {:>10} {}\n", label.value, ColorText(label.color), counts[i + 1], label.name);
     }
   }
-  if (layers.overlay != nullptr) {
-    const VolumeSummary summary = Summarize(*layers.overlay);
-    text += fmt::format("overlay      values {} ... {}; {} voxels of this volume have none\n", ValueText(summary.range.min),
-                        ValueText(summary.range.max), summary.non_finite);
-  }
+  if (overlay) text += fmt::format("overlay      values {} ... {}\n", ValueText(overlay->range.min), ValueText(overlay->range.max));
   return text;
 }
 
-Json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
-
 Json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
 
-Json LayersJson(const Layers& layers) {
+Json LayersJson(const Layers& layers, const std::optional<VolumeSummary>& overlay) {
   Json json = Json::object();
   if (layers.labels != nullptr) {
     const std::vector<std::uint64_t> counts = CountLabels(layers);
@@ -313,10 +331,7 @@ Json LayersJson(const Layers& layers) {
       json["labels"].push_back(std::move(label));
     }
   }
-  if (layers.overlay != nullptr) {
-    const VolumeSummary summary = Summarize(*layers.overlay);
-    json["overlay"] = {{"range", RangeJson(summary.range)}, {"no_value", summary.non_finite}};
-  }
+  if (overlay) json["overlay"] = {{"range", RangeJson(overlay->range)}, {"no_value", overlay->non_finite}};
   return json;
 }
 
@@ -331,12 +346,11 @@ void AddPartsJson(const VolumeFacts& facts, Json& json) {
                               {"voxel_bytes", level.description.voxel_bytes()},
                               {"block", SizeJson(level.block)}});
   }
-  if (info.window) json["window"] = RangeJson(*info.window);
   json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
 }
 
 std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy,
-                     const std::vector<DicomSeries>& series, const Layers& layers) {
+                     const std::vector<DicomSeries>& series, const Layers& layers, const std::optional<VolumeSummary>& overlay) {
   const SourceInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.finest();
@@ -354,9 +368,11 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
                {"type", NameOf(d.type)},
                {"file_type", info.file_type},
                {"labels", info.labels},
-               {"channels", info.channels},
+               {"channels", ChannelsJson(info)},
                {"channel", info.channel},
-               {"times", info.times},
+               {"times", info.times.count},
+               {"time_step", info.times.step ? Json(*info.times.step) : Json(nullptr)},
+               {"time_unit", info.times.unit},
                {"time", info.time},
                {"notes", info.notes},
                {"voxel_bytes", d.voxel_bytes()},
@@ -374,7 +390,7 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
     json["index"] = IndexJson(index);
   }
   if (!series.empty()) json["series"] = SeriesJson(series);
-  if (layers.types().any()) json["layers"] = LayersJson(layers);
+  if (layers.types().any() || overlay) json["layers"] = LayersJson(layers, overlay);
   return JsonText(json);
 }
 
@@ -402,12 +418,20 @@ Status RunInfo(const InfoOptions& options) {
 
   const Result<Layers> layers = ReadLayers(options.layers, facts->file.finest().geometry);
   if (!layers.ok()) return AsInput(layers.status());
+  std::optional<VolumeSummary> overlay;
+  if (!options.layers.overlay.empty()) {
+    const Result<SourceText> text = ParseSourceText(options.layers.overlay);
+    if (!text.ok()) return text.status();
+    const Result<LoadedVolume> read = ReadVolume(text->path, text->options);
+    if (!read.ok()) return AsInput(read.status());
+    overlay = Summarize(*read->volume);
+  }
 
   const std::string name = TransferName(options.request.transfer);
   std::optional<IndexFacts> index;
   if (facts->parts) index = IndexFactsOf(options.path, *facts->parts, *transfer);
-  std::cout << (options.json ? InfoJson(*facts, index, name, occupancy, *series, *layers)
-                             : InfoText(*facts, index, name, occupancy) + LayersText(*layers));
+  std::cout << (options.json ? InfoJson(*facts, index, name, occupancy, *series, *layers, overlay)
+                             : InfoText(*facts, index, name, occupancy) + LayersText(*layers, overlay));
   return Status::Ok();
 }
 

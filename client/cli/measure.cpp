@@ -107,7 +107,7 @@ Result<Measures> Parse(const MeasureOptions& options) {
   if (options.csv && !(labels_alone && options.labels)) {
     return Status::InvalidArgument("--csv is the table of --labels, without any other measure; --json writes all of them");
   }
-  if (options.labels && options.connection.local_workers > 0 && !options.layers.any()) {
+  if (options.labels && options.volume.connection.local_workers > 0 && !options.layers.any()) {
     return Status::InvalidArgument("--labels needs a FILE of labels with --local: only datasets of a service have labels of their own");
   }
   return measures;
@@ -116,6 +116,7 @@ Result<Measures> Parse(const MeasureOptions& options) {
 // What is measured in one dataset, as a list in JSON; not its labels.
 Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeometry& geometry, const MeasureOptions& options,
                      const Measures& measures) {
+  const std::string &field = options.volume.field, &time = options.volume.time;
   const Vec3 spacing = geometry.spacing;
   const std::string_view unit = PluralOf(UnitOf(geometry));
   Json found = Json::array();
@@ -131,14 +132,16 @@ Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeo
   for (const Points& p : measures.profiles) {
     const double voxels = Length(p[1] - p[0]) / std::min({spacing.x, spacing.y, spacing.z});
     const int samples = options.samples > 0 ? options.samples : int(std::clamp(std::ceil(voxels) + 1, 2.0, double(kMaxSamplePoints)));
-    const Result<std::vector<VolumeSample>> along = client.SampleAt(dataset, PointsAlong(p[0], p[1], samples));
+    const Result<std::vector<VolumeSample>> along =
+        client.SampleAt({.dataset = dataset, .points = PointsAlong(p[0], p[1], samples), .field = field, .time = time});
     if (!along.ok()) return along.status();
     Json profile = {{"measure", "profile"}, {"unit", unit}};
     profile.update(ProfileJson(*along));
     found.push_back(std::move(profile));
   }
   for (std::size_t i = 0; i < measures.boxes.size(); ++i) {
-    const Result<StatisticsReply> inside = client.StatisticsIn(dataset, measures.boxes[i]);
+    const Result<StatisticsReply> inside =
+        client.StatisticsIn({.dataset = dataset, .box = measures.boxes[i], .field = field, .time = time});
     if (!inside.ok()) return inside.status();
     const BoxStatistics& all = inside->statistics;
     Json statistics = {{"measure", "box"}, {"box", options.boxes[i]}};
@@ -155,15 +158,20 @@ Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeo
 Status RunMeasure(const MeasureOptions& options) {
   const Result<Measures> measures = Parse(options);
   if (!measures.ok()) return measures.status();
-  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.volume.connection, options.volume.source, options.layers);
   if (!connection.ok()) return connection.status();
-  const Result<SummaryReply> summary = connection->client().Summarize(connection->dataset());
+  const Result<SummaryReply> summary =
+      connection->client().Summarize({.dataset = connection->dataset(), .field = options.volume.field, .time = options.volume.time});
   if (!summary.ok()) return summary.status();
   Result<Json> found = Measure(connection->client(), connection->dataset(), summary->description.geometry, options, *measures);
   if (!found.ok()) return found.status();
   StatisticsReply labels;
   if (options.labels) {
-    Result<StatisticsReply> reply = connection->client().StatisticsIn(connection->dataset(), *ParseClipBox("--box", ":,:,:"), true);
+    Result<StatisticsReply> reply = connection->client().StatisticsIn({.dataset = connection->dataset(),
+                                                                       .box = *ParseClipBox("--box", ":,:,:"),
+                                                                       .labels = true,
+                                                                       .field = options.volume.field,
+                                                                       .time = options.volume.time});
     if (!reply.ok()) return reply.status();
     labels = *std::move(reply);
     Json json = {{"measure", "labels"}};

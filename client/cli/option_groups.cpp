@@ -10,6 +10,7 @@
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
+#include "common/base/find_named.h"
 #include "common/cli/add_option.h"
 #include "common/otlp/trace_sender.h"
 #include "common/volume/memory_budget.h"
@@ -21,6 +22,9 @@ namespace slabstream {
 namespace {
 
 constexpr char kSuitable[] = "suitable";  // what --local alone stands for
+
+// Of a picture, these are options of the request: a file is a dataset with all of its channels and times.
+const std::initializer_list<std::string_view> kOfRequests = {"channel", "time"};
 
 void AddConnectionOptions(const Command& app, ConnectionOptions& connection) {
   app.GroupOptions("Service");
@@ -152,37 +156,49 @@ void ResolveSource(const Command& app, Option source, std::string& volume, Trans
   });
 }
 
-void AddSource(const Command& app, std::string& source, ConnectionOptions& connection) {
+void AddSource(const Command& app, AskedVolume& volume) {
   app.GroupOptions("Options");
-  app.AddText("SOURCE", source, kSourceHelp).Required();
-  AddReadOptions(app);
-  AddConnectionOptions(app, connection);
+  app.AddText("SOURCE", volume.source, kSourceHelp).Required();
+  AddReadOptions(app, kOfRequests);
+  app.AddText("--channel", volume.field, "Which channel, by its number or name; of a file also luminance, of red, green and blue")
+      .TypeName("CHANNEL")
+      .Default("the first one that is shown");
+  app.AddText("--time", volume.time, "Which time: its number, a number with a unit of time, or last, the newest one")
+      .TypeName("N|3.5s|last")
+      .Default("that of the file, mostly the first");
+  AddConnectionOptions(app, volume.connection);
   app.GroupOptions("Options");
-  app.AfterParse([app, &source, &connection] {
-    Result<std::string> with_options = WithReadOptionsOfFile(app, source, RendersHere(source, connection));
-    if (with_options.ok()) source = *with_options;
-    return with_options.status();
+  app.AfterParse([app, &volume] {
+    const bool is_file = RendersHere(volume.source, volume.connection);
+    Result<std::string> with_options = WithReadOptionsOfFile(app, volume.source, is_file);
+    if (!with_options.ok()) return with_options.status();
+    volume.source = *std::move(with_options);
+    for (const auto& [name, text] : {std::pair<const char*, std::string&>("channel", volume.field), {"time", volume.time}}) {
+      ReadOptions scratch;
+      if (!is_file || text.empty() || !FindNamed(ReadOptionList(), name)->set(scratch, name, text).ok()) continue;
+      volume.source = WithReadOption(volume.source, name, std::exchange(text, ""));
+    }
+    return Status::Ok();
   });
 }
 
 void AddSliceOptions(const Command& app, SliceOptions& options) {
   app.GroupOptions("Options");
   Option source = app.AddText("SOURCE", options.source, kSourceHelp).Required();
-  AddReadOptions(app);
+  AddReadOptions(app, kOfRequests);
   AddConnectionOptions(app, options.connection);
   AddSlicePictureOptions(app, options.slice, &options.layers);
   ResolveSource(app, source, options.source, options.slice.frame.transfer,
                 [&options] { return RendersHere(options.source, options.connection); });
 }
 
-void AddFrameOptions(const Command& app, FrameOptions& options, std::initializer_list<std::string_view> except,
-                     std::vector<SourceChoice>* sources) {
+void AddFrameOptions(const Command& app, FrameOptions& options, std::vector<SourceChoice>* sources) {
   app.GroupOptions("Options");
   const std::string help = fmt::format("{}; append :TRANSFER to choose its transfer function", kSourceHelp);
   auto texts = std::make_shared<std::vector<std::string>>();  // of several sources
   const Option source = sources == nullptr ? app.AddText("SOURCE", options.source, help).Required()
                                            : app.AddTexts("SOURCE", *texts, help + "; several make a picture each").Required();
-  AddReadOptions(app, except);
+  AddReadOptions(app, kOfRequests);
   AddConnectionOptions(app, options.connection);
   AddRenderPictureOptions(app, options.request, options.format, &options.layers);
   if (sources == nullptr) {

@@ -28,16 +28,16 @@ void TakeReadOptions(const Command& app, std::string& source);
 // which must be about a file. Calls `is_file` only then.
 void ResolveSource(const Command& app, Option source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file);
 
-// SOURCE, a dataset or with --local a file, with the options for reading it, and where it is.
-void AddSource(const Command& app, std::string& source, ConnectionOptions& connection);
+// SOURCE, a dataset or with --local a file, with the options for reading it, and where it is; and which of its channels and times. What
+// only a file has, such as a component of its voxels, is an option for reading it.
+void AddSource(const Command& app, AskedVolume& volume);
 
 // All options of `slice` but its output.
 void AddSliceOptions(const Command& app, SliceOptions& options);
 
 // All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
-// `except`: options for reading that the command has in a form of its own. `sources`: gets one or more SOURCEs; null: there is one, in
+// Options of the request that `app` has already, in a form of its own, stay. `sources`: gets one or more SOURCEs; null: there is one, in
 // `options`.
-void AddFrameOptions(const Command& app, FrameOptions& options, std::initializer_list<std::string_view> except = {},
-                     std::vector<SourceChoice>* sources = nullptr);
+void AddFrameOptions(const Command& app, FrameOptions& options, std::vector<SourceChoice>* sources = nullptr);
 
 }  // namespace slabstream

@@ -68,7 +68,7 @@ struct TurntableOptions {
   FrameOptions frame;
   TurntableOutput output;
   std::optional<double> frames_per_second;  // for a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
-  std::optional<TimeRange> times;           // the times of the volumes in SOURCE; none: it is one volume
+  std::optional<TimeSteps> times;           // of SOURCE; none: one, which the request says
   // [1, kMaxTurntableFrames], spread evenly over turns, path and times; none: one for each time, or as many as the path's seconds need.
   std::optional<int> frames;
   int turns = 1;                      // [0, kMaxTurns], which begin at the request's azimuth
@@ -91,9 +91,15 @@ struct InfoOptions {
   bool json = false;
 };
 
-struct ValueOptions {
+// A volume that is asked about.
+struct AskedVolume {
   ConnectionOptions connection;
-  std::string source;               // a name of the catalogue; a path with local_workers > 0
+  std::string source;       // a name of the catalogue; a path with local_workers > 0
+  std::string field, time;  // as in SampleQuery
+};
+
+struct ValueOptions {
+  AskedVolume volume;
   LayerFiles layers;                // with local_workers > 0
   std::vector<std::string> points;  // as ParsePoint takes them; 1 ... kMaxSamplePoints
   bool json = false;
@@ -101,8 +107,7 @@ struct ValueOptions {
 
 // Texts as measure.cpp parses them; points are X,Y,Z of the world, separated by ':'.
 struct MeasureOptions {
-  ConnectionOptions connection;
-  std::string source;                  // a name of the catalogue; a path with local_workers > 0
+  AskedVolume volume;
   std::vector<std::string> distances;  // two points
   std::vector<std::string> angles;     // three points; the angle is at the second one
   std::vector<std::string> profiles;   // two points

@@ -32,11 +32,15 @@ void AddLines(const std::string& name, const Json& value, std::string& text) {
   std::string shown = value.is_string() ? value.get<std::string>() : value.dump();
   if (value.is_array()) {
     shown.clear();
-    const bool numbers = std::ranges::all_of(value, [](const Json& item) { return item.is_number(); });
-    if (!numbers) shown = fmt::format("{} points", value.size());
-    for (std::size_t i = 0; numbers && i < value.size(); ++i) {
+    if (name == "fields") {
+      for (std::size_t i = 0; i < value.size(); ++i) AddLines(fmt::format("{}[{}]", name, i), value[i], text);
+      return;
+    }
+    const bool points = std::ranges::any_of(value, [](const Json& item) { return item.is_object(); });
+    if (points) shown = fmt::format("{} points", value.size());
+    for (std::size_t i = 0; !points && i < value.size(); ++i) {
       if (i > 0) shown += ' ';
-      shown += value[i].dump();
+      shown += value[i].is_string() ? value[i].get<std::string>() : value[i].dump();
     }
   }
   if (!shown.empty()) text += fmt::format("  {:<28} {}\n", name, shown);

@@ -1,6 +1,7 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -27,7 +28,6 @@
 #include "client/request/camera_file.h"
 #include "common/cli/program.h"
 #include "common/files/files.h"
-#include "common/frame/dataset_name.h"
 #include "common/otlp/trace_sender.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
@@ -47,6 +47,22 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
   return status;
 }
 
+// The catalogue may have a dataset for each time of a file.
+Status UseDatasetsOfTimes(Client& client, std::vector<FrameJob>& jobs) {
+  const Result<StatusReply> service = client.QueryStatus();
+  if (!service.ok()) return service.status();
+  const auto has = [&](const std::string& name) {
+    return std::ranges::find(service->datasets, name, &DatasetStatus::name) != service->datasets.end();
+  };
+  const auto name_of = [](const FrameJob& job) { return fmt::format("{}@{}", job.request.dataset, job.request.time); };
+  if (has(jobs.front().request.dataset) || !has(name_of(jobs.front()))) return Status::Ok();
+  for (FrameJob& job : jobs) {
+    job.source = job.request.dataset = name_of(job);
+    job.request.time.clear();
+  }
+  return Status::Ok();
+}
+
 // Connects to the service for the volumes of all jobs, and fills in their datasets.
 Result<ServiceConnection> Connect(const FrameOptions& options, std::vector<FrameJob>& jobs) {
   std::vector<std::string> sources;
@@ -57,15 +73,19 @@ Result<ServiceConnection> Connect(const FrameOptions& options, std::vector<Frame
   Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, sources, options.layers);
   if (!connection.ok()) return connection;
   for (FrameJob& job : jobs) job.request.dataset = connection->dataset(numbers[job.source]);
+  if (options.connection.local_workers > 0 || jobs.front().request.time.empty()) return connection;
+  if (Status status = UseDatasetsOfTimes(connection->client(), jobs); !status.ok()) return status;
   return connection;
 }
 
-// A preset and shares of values depend on the volume. Over time they are those of the first one, so that a colour means the same value in
-// all frames.
+bool IsSameVolume(const FrameRequest& a, const FrameRequest& b) { return a.dataset == b.dataset && a.time == b.time; }
+
+// A preset and shares of values depend on the volume. All times of a dataset look alike. Of datasets that are a time each, they are those
+// of the first one, so that a colour means the same value in all frames.
 Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
-  if (jobs.front().source == jobs.back().source) return Status::Ok();  // one volume
-  const FrameRequest& first = jobs.front().request;
-  Result<SummaryReply> summary = client.Summarize(first.dataset, first.transfer);
+  const FrameRequest first = jobs.front().request;
+  if (first.dataset == jobs.back().request.dataset) return Status::Ok();
+  Result<SummaryReply> summary = client.Summarize(SummaryOf(first));
   if (!summary.ok()) return summary.status();
   for (FrameJob& job : jobs) {
     job.request.transfer.choice = summary->transfer;
@@ -76,12 +96,12 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
 
 // The views of the jobs, whose datasets are known.
 Status PlaceCameras(Client& client, const CameraMove& move, std::vector<FrameJob>& jobs) {
-  std::vector<std::string> datasets;
+  std::vector<FrameRequest> volumes;
   for (const FrameJob& job : jobs) {
-    if (datasets.empty() || datasets.back() != job.request.dataset) datasets.push_back(job.request.dataset);  // times rise
+    if (volumes.empty() || !IsSameVolume(volumes.back(), job.request)) volumes.push_back(job.request);  // times rise
   }
   const AskView ask = [&client](ViewQuery query) { return client.ChooseView(std::move(query)); };
-  Result<std::vector<ViewParameters>> views = ViewsOfMovie(jobs.front().request, move, int(jobs.size()), datasets, ask);
+  Result<std::vector<ViewParameters>> views = ViewsOfMovie(move, int(jobs.size()), volumes, ask);
   if (!views.ok()) return views.status();
   for (std::size_t i = 0; i < jobs.size(); ++i) jobs[i].request.view = (*views)[i];
   return Status::Ok();
@@ -165,13 +185,6 @@ Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& option
   return std::unique_ptr<PictureSink>(*std::move(movie));
 }
 
-// SOURCE at this time: in a file, or at a service, whose catalogue names the times of a file.
-std::string SourceAt(const TurntableOptions& options, int time) {
-  if (!options.times) return options.frame.source;
-  if (options.frame.connection.local_workers == 0) return NameAtTime(options.frame.source, time);
-  return AtTime(options.frame.source, time);
-}
-
 // The times that SOURCE?time=FIRST:LAST names are those of --time.
 Result<TurntableOptions> WithTimesOfSource(TurntableOptions options) {
   if (options.frame.connection.local_workers == 0) return options;
@@ -179,7 +192,10 @@ Result<TurntableOptions> WithTimesOfSource(TurntableOptions options) {
   if (!source.ok()) return source.status();
   const std::optional<TimeRange> named = source->options.time;
   if (named && options.times) return Status::InvalidArgument(fmt::format("'{}': time is given twice", options.frame.source));
-  if (named && named->count() > 1) options.times = named;
+  if (named && named->count() > 1) {
+    options.times = TimeSteps{named->first, named->last};
+    options.frame.source = AtTime(options.frame.source, {});
+  }
   return options;
 }
 
@@ -215,21 +231,22 @@ std::int64_t FrameCount(const TurntableOptions& options) {
 
 // Frame i shows the time that belongs to the i-th part of the whole.
 Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
-  const TimeRange times = options.times.value_or(TimeRange{});
+  const TimeSteps times = options.times.value_or(TimeSteps{});
   if (FrameCount(options) > kMaxTurntableFrames) {
     const std::string what =
-        options.times ? fmt::format("--time {}:{} has {} times", times.first, times.last, times.count())
+        options.times ? fmt::format("--time {}:{} shows {} times", times.first, times.last, times.count())
                       : fmt::format("--path takes {:g} seconds, which are {} frames", options.path->seconds(), FrameCount(options));
     return Status::InvalidArgument(fmt::format("{}, but at most {} --frames are possible", what, kMaxTurntableFrames));
   }
   const int frames = int(FrameCount(options));
   if (times.count() > 1 && options.frame.connection.local_workers > 0) {
-    if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
+    if (Status status = CheckInputHeaders(AtTime(options.frame.source, times.last)); !status.ok()) return status;
   }
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {
-    const int time = times.first + int(std::int64_t{i} * times.count() / frames);
-    jobs.push_back({options.frame.request, FileOf(options, i), SourceAt(options, time)});
+    const int time = times.first + times.step * int(std::int64_t{i} * times.count() / frames);
+    FrameJob& job = jobs.emplace_back(FrameJob{options.frame.request, FileOf(options, i), options.frame.source});
+    if (options.times) job.request.time = std::to_string(time);
   }
   return jobs;
 }

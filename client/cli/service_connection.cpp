@@ -23,15 +23,6 @@ namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<LoadedData> LoadInput(const std::string& path, const LayerFiles& files, const TellRead& tell) {
-  Result<LoadedVolume> loaded = ReadInputVolume(path, tell);
-  if (!loaded.ok()) return loaded.status();
-  if (!loaded->rounding.empty()) LogWarning(path + ": " + loaded->rounding);
-  Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
-  if (!layers.ok()) return AsInput(layers.status());
-  return LoadedData{{std::move(loaded->volume), *std::move(layers)}, std::move(loaded->exact)};
-}
-
 // Of a process that does everything. What it takes before it does anything counts once.
 Result<MemoryShares> SharesOf(const ConnectionOptions& connection) {
   const auto workers = std::uint64_t(connection.local_workers);
@@ -40,14 +31,6 @@ Result<MemoryShares> SharesOf(const ConnectionOptions& connection) {
   const std::uint64_t idle = IdleMemoryBytes(shares->worker);
   shares->worker = idle + (shares->worker * workers - idle) / workers;
   return shares;
-}
-
-// Bytes of a volume that the coordinator holds, if it could also be read in parts.
-Result<std::uint64_t> MostHeld(const ConnectionOptions& connection) {
-  if (connection.local_memory == 0) return std::uint64_t(kExactBytes);
-  const Result<MemoryShares> shares = SharesOf(connection);
-  if (!shares.ok()) return shares.status();
-  return std::min(std::uint64_t(kExactBytes), DatasetShare(shares->coordinator));
 }
 
 // Before anything is read.
@@ -108,18 +91,10 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     return opened;
   }
   if (Status limited = LimitLocal(connection); !limited.ok()) return limited;
-  const Result<std::uint64_t> most_held = MostHeld(connection);
-  if (!most_held.ok()) return most_held.status();
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
-    if (Status status = CheckInputVolume(source); !status.ok()) return status;
-    const Result<bool> in_parts = layers.any() ? false : CanBeReadInParts(source, *most_held);
-    if (!in_parts.ok()) return in_parts.status();
-    if (*in_parts) {
-      files.emplace_back(source, "");
-    } else {
-      files.emplace_back(DataLoader([source, layers](const TellRead& tell) { return LoadInput(source, layers, tell); }));
-    }
+    if (Status status = CheckInputHeaders(source); !status.ok()) return status;
+    files.emplace_back(source, "", layers);
   }
   if (layers.any()) {
     if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());

@@ -22,9 +22,10 @@ Status RunValue(const ValueOptions& options) {
     if (!point.ok()) return point.status();
     points.push_back(*point);
   }
-  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.volume.connection, options.volume.source, options.layers);
   if (!connection.ok()) return connection.status();
-  const Result<std::vector<VolumeSample>> samples = connection->client().SampleAt(connection->dataset(), std::move(points));
+  const Result<std::vector<VolumeSample>> samples = connection->client().SampleAt(
+      {.dataset = connection->dataset(), .points = std::move(points), .field = options.volume.field, .time = options.volume.time});
   if (!samples.ok()) return samples.status();
   Json json = Json::array();
   for (const VolumeSample& sample : *samples) {

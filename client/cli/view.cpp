@@ -27,8 +27,6 @@
 #include "data/catalogue/catalogue.h"
 #include "data/layers/layer_reader.h"
 #include "data/open/cache_option.h"
-#include "data/open/open_source.h"
-#include "data/open/read_volume.h"
 #include "data/open/source_name.h"
 #include "data/volume_io/read_options.h"
 
@@ -143,16 +141,6 @@ Status CheckEntry(const std::string& source, const std::string& entry) {
   return found.errors.empty() ? Status::Ok() : AsInput(found.errors.front());
 }
 
-// Says which of several times or channels is shown. Other commands' logs do; the service's is in a file.
-void TellOfPart(const std::string& source) {
-  Result<SourceText> parsed = ParseSourceText(source);
-  if (!parsed.ok()) return;
-  parsed->options.describe = parsed->options.headers_only = true;
-  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(parsed->path, parsed->options, ProcessReadContext());
-  if (!opened.ok()) return;  // the page says what is wrong
-  for (const std::string& text : PartTexts(parsed->path, parsed->options, (*opened)->info())) PrintNote(text);
-}
-
 // The token in the file, which is made if it does not exist.
 Result<std::string> KeptToken(const std::string& path) {
   std::error_code error;
@@ -233,7 +221,6 @@ Status RunView(const ViewOptions& options) {
   const std::string url = fmt::format("{}&dataset={}{}{}", with_token, dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
                                       options.layers.overlay.empty() ? "" : "&overlay=1");
   std::cout << fmt::format("{} is at {}\n", dataset, url);
-  if (file) TellOfPart(options.source);
   if (options.browser) {
     const Status opened = OpenBrowser(url);
     if (!opened.ok()) std::cout << fmt::format("No browser was opened, because {}: open this address in one.\n", opened.message());

@@ -14,32 +14,34 @@ bool IsOfDataset(const Status& status) {
          status.code() != StatusCode::kCancelled;
 }
 
-// The request's view, complete.
-Result<ViewParameters> WholeView(FrameRequest request, std::span<const std::string> datasets, const AskView& ask) {
+// The view, complete.
+Result<ViewParameters> WholeView(const ViewParameters& view, std::span<const FrameRequest> volumes, const AskView& ask) {
   std::optional<Ball> framed;
-  for (const std::string& dataset : datasets) {
-    request.dataset = dataset;
-    const Result<ViewReply> reply = ask({.frame = request});
+  const auto seen = [&view](FrameRequest volume) {
+    volume.view = view;
+    return volume;
+  };
+  for (const FrameRequest& volume : volumes) {
+    const Result<ViewReply> reply = ask({.frame = seen(volume)});
     if (!reply.ok()) {
-      if (&dataset == &datasets.front() || !IsOfDataset(reply.status())) return reply.status();
+      if (&volume == &volumes.front() || !IsOfDataset(reply.status())) return reply.status();
       continue;
     }
-    if (datasets.size() == 1) return reply->view;
+    if (volumes.size() == 1) return reply->view;
     if (reply->framed) framed = framed ? BallAround(*framed, *reply->framed) : *reply->framed;
   }
-  request.dataset = datasets.front();
-  const Result<ViewReply> reply = ask({.frame = request, .framed = framed});
+  const Result<ViewReply> reply = ask({.frame = seen(volumes.front()), .framed = framed});
   if (!reply.ok()) return reply.status();
   return reply->view;
 }
 
 }  // namespace
 
-Result<std::vector<ViewParameters>> ViewsOfMovie(const FrameRequest& request, const CameraMove& move, int frames,
-                                                 std::span<const std::string> datasets, const AskView& ask) {
+Result<std::vector<ViewParameters>> ViewsOfMovie(const CameraMove& move, int frames, std::span<const FrameRequest> volumes,
+                                                 const AskView& ask) {
   std::vector<ViewParameters> views;
   if (move.cameras.empty()) {
-    const Result<ViewParameters> first = WholeView(request, datasets, ask);
+    const Result<ViewParameters> first = WholeView(volumes.front().view, volumes, ask);
     if (!first.ok()) return first.status();
     for (int i = 0; i < frames; ++i) {
       ViewParameters& view = views.emplace_back(*first);
@@ -49,9 +51,7 @@ Result<std::vector<ViewParameters>> ViewsOfMovie(const FrameRequest& request, co
   }
   std::vector<PathCamera> cameras = move.cameras;
   for (PathCamera& camera : cameras) {
-    FrameRequest there = request;
-    there.view = camera.view;
-    Result<ViewParameters> view = WholeView(std::move(there), datasets, ask);
+    Result<ViewParameters> view = WholeView(camera.view, volumes, ask);
     if (!view.ok()) return view.status();
     camera.view = *std::move(view);
   }

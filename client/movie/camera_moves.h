@@ -21,9 +21,9 @@ struct CameraMove {
 
 using AskView = std::function<Result<ViewReply>(ViewQuery)>;  // to the service
 
-// `frames` > 0 of them, complete. The path begins with the first frame and ends with the last one. `datasets`: all that the movie shows, at
-// least one. Errors are the service's and those of CameraPath.
-Result<std::vector<ViewParameters>> ViewsOfMovie(const FrameRequest& request, const CameraMove& move, int frames,
-                                                 std::span<const std::string> datasets, const AskView& ask);
+// `frames` > 0 of them, complete. The path begins with the first frame and ends with the last one. `volumes`: a request for each dataset
+// and time that the movie shows, at least one; they have the same view. Errors are the service's and those of CameraPath.
+Result<std::vector<ViewParameters>> ViewsOfMovie(const CameraMove& move, int frames, std::span<const FrameRequest> volumes,
+                                                 const AskView& ask);
 
 }  // namespace slabstream

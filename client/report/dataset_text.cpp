@@ -1,10 +1,12 @@
 #include "client/report/dataset_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 
+#include "client/report/volume_text.h"
 #include "common/base/printable.h"
 #include "common/json/json.h"
 #include "common/volume/memory_budget.h"
@@ -28,6 +30,42 @@ Json LevelJson(const VolumeDescription& level) {
   return {{"size", {size.x, size.y, size.z}}, {"spacing", {spacing.x, spacing.y, spacing.z}}, {"voxel_bytes", level.voxel_bytes()}};
 }
 
+// "name", and what its author shows as far as the file says it.
+Json FieldJson(const FieldInfo& field) {
+  Json json = {{"name", field.name}, {"channel", field.channel}, {"shown", field.shown}};
+  if (field.color) json["color"] = ColorText(*field.color);
+  if (field.window) json["window"] = {field.window->min, field.window->max};
+  return json;
+}
+
+Json TimesJson(const TimeAxis& times) {
+  Json json = {{"count", times.count}};
+  if (times.step) json["step"] = *times.step;
+  if (!times.unit.empty()) json["unit"] = times.unit;
+  return json;
+}
+
+// "    channels 0 (DAPI, #0000ff, 0 to 200), 1 (Actin, not shown); 3 times, 2.5 s apart". Nothing of a dataset with one channel and time.
+std::string FieldsText(const DatasetFields& dataset) {
+  std::string text;
+  for (std::size_t i = 0; i < dataset.fields.size() && dataset.several(); ++i) {
+    const FieldInfo& field = dataset.fields[i];
+    std::vector<std::string> said;
+    if (!field.name.empty()) said.push_back(Printable(field.name));
+    if (!field.channel) said.emplace_back("with a grid of its own");
+    if (field.color) said.push_back(ColorText(*field.color));
+    if (field.window) said.push_back(fmt::format("{:g} to {:g}", field.window->min, field.window->max));
+    if (!field.shown) said.emplace_back("not shown");
+    text += fmt::format("{}{}{}", i == 0 ? "channels " : ", ", i, said.empty() ? "" : fmt::format(" ({})", fmt::join(said, ", ")));
+  }
+  const TimeAxis& times = dataset.times;
+  if (times.count > 1) {
+    text += fmt::format("{}{} times", text.empty() ? "" : "; ", times.count);
+    if (times.step) text += fmt::format(", {:g} {} apart", *times.step, Printable(times.unit));
+  }
+  return text;
+}
+
 Json DatasetJson(const DatasetStatus& dataset) {
   Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
   if (dataset.state == DatasetState::kReady) {
@@ -38,6 +76,12 @@ Json DatasetJson(const DatasetStatus& dataset) {
     entry["memory_bytes"] = dataset.memory_bytes;
     entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
     entry["cells"] = dataset.cells;
+    const DatasetFields fields = dataset.fields.value_or(DatasetFields());
+    entry["fields"] = Json::array();
+    for (const FieldInfo& field : fields.fields) entry["fields"].push_back(FieldJson(field));
+    entry["times"] = TimesJson(fields.times);
+    entry["field"] = fields.field;
+    entry["time"] = fields.time;
     entry["levels"] = Json::array();
     for (const VolumeDescription& level : LevelsOf(dataset)) entry["levels"].push_back(LevelJson(level));
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
@@ -97,7 +141,10 @@ std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
   for (std::size_t r = 0; r < rows.size(); ++r) {
     for (std::size_t i = 0; i + 1 < kColumns; ++i) text += fmt::format("{:<{}}  ", rows[r][i], widths[i]);
     text += rows[r].back() + '\n';
-    if (r > 0 && datasets[r - 1].state == DatasetState::kFailed) text += "    " + Printable(datasets[r - 1].error) + '\n';
+    if (r == 0) continue;
+    const std::string fields = datasets[r - 1].fields ? FieldsText(*datasets[r - 1].fields) : "";
+    if (!fields.empty()) text += "    " + fields + '\n';
+    if (datasets[r - 1].state == DatasetState::kFailed) text += "    " + Printable(datasets[r - 1].error) + '\n';
   }
   return text;
 }

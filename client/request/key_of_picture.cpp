@@ -17,7 +17,11 @@ bool IsShown(const Label& label, const LabelChoice& choice) {
 
 PictureKey KeyOf(const FrameRequest& request, const SummaryReply& summary) {
   PictureKey key;
-  const TransferFunction& transfer = summary.transfer;
+  TransferFunction transfer = summary.transfer;
+  if (transfer.colors.size() == 1 && transfer.opacities.size() > 1 &&
+      transfer.opacities.front().opacity == 0) {  // a channel: one colour, from clear to opaque
+    transfer.colors = {{transfer.opacities.front().value, {0, 0, 0}}, {transfer.opacities.back().value, transfer.colors.front().color}};
+  }
   const double low = transfer.colors.front().value, high = transfer.colors.back().value;
   const bool visible = std::ranges::any_of(transfer.opacities, [](const OpacityPoint& point) { return point.opacity > 0; });
   if (visible && low < high) {

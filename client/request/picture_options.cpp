@@ -7,6 +7,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "client/request/camera_file.h"
@@ -24,15 +25,16 @@ namespace {
 
 using Wanted = std::function<bool(const RequestOption&)>;
 
-// Options for those of the table that are wanted, and what they exclude and need.
+// Options for those of the table that are wanted, and what they exclude and need. The command may have some in a form of its own.
 void AddRequestOptions(const Command& app, FrameRequest& request, ColorMaps maps, const Wanted& wanted) {
+  std::vector<std::pair<Option, const RequestOption*>> added;
   for (const RequestOption& option : RequestOptions()) {
-    if (wanted(option)) AddRequestOption(app, option, request, maps);
+    if (!wanted(option) || app.FindOption("--" + option.name)) continue;
+    added.emplace_back(AddRequestOption(app, option, request, maps), &option);
   }
-  for (const RequestOption& option : RequestOptions()) {
-    if (!wanted(option)) continue;
-    for (const std::string& other : option.excludes) app.FindOption("--" + option.name).Excludes(app.FindOption("--" + other));
-    for (const std::string& other : option.needs) app.FindOption("--" + option.name).Needs(app.FindOption("--" + other));
+  for (const auto& [option, field] : added) {
+    for (const std::string& other : field->excludes) option.Excludes(app.FindOption("--" + other));
+    for (const std::string& other : field->needs) option.Needs(app.FindOption("--" + other));
   }
 }
 
@@ -64,7 +66,8 @@ void AddPictureFormat(const Command& app, PictureFormat& format) {
   app.GroupOptions(app.FindOption("--transfer").group());
   AddParsed(
       app, "--background", format.background, [](const std::string& option, const std::string& text) { return ParseColor(option, text); },
-      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, which "
+      "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rgb, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, "
+      "which "
       "is black in a movie)")
       .TypeName("COLOUR");
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG or TIFF: 8 or 16").Default("8");
@@ -188,6 +191,7 @@ void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles*
   const auto& parameters = RequireRenderer(slice.frame.renderer).value()->parameters();
   const auto wanted = [&](const RequestOption& option) {
     if (option.path.starts_with("labels.")) return option.name != "label-opacity";
+    if (option.path == "channels" || option.path.starts_with("fields.") || option.path == "blend" || option.path == "time") return true;
     return option.name == "size" || option.name == "transfer" || option.name == "scalar-range" || option.name == "opacity-distance" ||
            option.path.starts_with("overlay.") || std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();
   };

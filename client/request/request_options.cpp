@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <type_traits>
 #include <variant>
 
@@ -23,11 +24,13 @@ namespace slabstream {
 namespace {
 
 constexpr std::string_view kParameters = "parameters";
+constexpr std::string_view kOfFields = "fields.";  // options of single channels, as in "0=green,Actin=#f0f"
 
 // Members of requests whose own members are fields with names.
 template <class T>
-concept Part = std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> ||
-    std::is_same_v<T, Shading> || std::is_same_v<T, LabelChoice> || std::is_same_v<T, OverlayChoice> || std::is_same_v<T, Policy>;
+concept Part =
+    std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> || std::is_same_v<T, Shading> ||
+    std::is_same_v<T, LabelChoice> || std::is_same_v<T, OverlayChoice> || std::is_same_v<T, FieldChoice> || std::is_same_v<T, Policy>;
 
 // ---- the table
 
@@ -97,8 +100,14 @@ RequestOption Describe(const FieldAbout& field, const T&, std::string path, cons
     option.range = NumberRange{field.least, field.most, field.above_least};
     option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
   }
-  option.repeatable = std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>;
+  option.repeatable =
+      std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> || std::is_same_v<T, std::vector<std::string>>;
   option.value = named("NAME");
+  if (option.path.starts_with(kOfFields)) {  // each channel has its own
+    option.range.reset();
+    option.standard.clear();
+    option.repeatable = true;
+  }
   return option;
 }
 
@@ -149,7 +158,7 @@ void Collect(const std::string& place, const std::string& outer_group, const Str
     } else if constexpr (Part<T>) {
       Collect(path + ".", group, member, table);
     } else if constexpr (requires { requires Part<typename T::value_type>; }) {
-      if constexpr (requires { member.has_value(); }) Collect(path + ".", group, typename T::value_type(), table);
+      Collect(path + ".", group, typename T::value_type(), table);
     }
   });
 }
@@ -240,6 +249,7 @@ struct OptionReader {
   void Read(const std::string& text, ImageSize& value) { Take(value, ParseImageSize(shown, text)); }
   void Read(const std::string& text, std::optional<Vec3>& value) { Take(value, ParsePoint(shown, text)); }
   void Read(const std::string& text, std::optional<ClipBox>& value) { Take(value, ParseClipBox(shown, text)); }
+  void Read(const std::string& text, std::optional<Rgb>& value) { Take(value, ParseOpaqueColor(shown, text)); }
   void Read(const std::string& text, std::optional<ScalarRange>& value) { Take(value, ParseScalarRange(shown, text)); }
   void Read(const std::string& text, std::vector<Isosurface>& value) { Take(value, ParseIsosurfaces(shown, text)); }
   void Read(const std::string& text, std::vector<GradientOpacityPoint>& value) { Take(value, ParseGradientOpacities(shown, text)); }
@@ -257,6 +267,16 @@ struct OptionReader {
       }
       if (status.ok() && value.size() > most) {
         status = Status::InvalidArgument(fmt::format("{} is given {} times, at most {} are possible", shown, value.size(), most));
+      }
+    } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+      value.clear();
+      for (const std::string& text : texts) {
+        const Result<std::vector<std::string>> names = ParseNames(shown, text);
+        if (!names.ok()) return void(status = names.status());
+        value.insert(value.end(), names->begin(), names->end());
+      }
+      if (value.size() > most) {
+        status = Status::InvalidArgument(fmt::format("{} has {} names, at most {} are possible", shown, value.size(), most));
       }
     } else if constexpr (requires { Read(texts.back(), value); }) {
       Read(texts.back(), value);
@@ -286,7 +306,7 @@ std::vector<std::string> Texts(const RequestOption& option, const FieldAbout& fi
     return {field.words.at(std::size_t(value.number()) - 1)};
   } else if constexpr (requires { value.index(); }) {
     if (const auto* preset = std::get_if<std::string>(&value)) return {*preset};
-    return {option.path.starts_with("overlay") ? kOverlayMapFile : kColorMapFile};
+    return {option.path.starts_with("overlay") ? kOverlayMapFile : option.path.starts_with(kOfFields) ? kChannelMapFile : kColorMapFile};
   } else if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
     std::vector<std::string> texts;
     for (const auto& item : value) texts.push_back(TextOf(item));
@@ -305,7 +325,57 @@ std::vector<std::string> Texts(const RequestOption& option, const FieldAbout& fi
   }
 }
 
+// ---- one field of the looks of single channels
+
+FieldChoice& LookOf(const std::string& field, FrameRequest& request) {
+  const auto found = std::ranges::find(request.fields, field, &FieldChoice::field);
+  return found != request.fields.end() ? *found : request.fields.emplace_back(FieldChoice{.field = field});
+}
+
+Status SetOfFields(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
+                   FrameRequest& request) {
+  const std::string_view path = std::string_view(option.path).substr(kOfFields.size());
+  Status status;
+  std::set<std::string> named;
+  for (const std::string& text : texts) {
+    const Result<std::vector<NamedText>> items = ParseNamedTexts(shown, text);
+    if (!items.ok()) return items.status();
+    for (const auto& [name, value] : *items) {
+      if (!named.insert(name).second) return Status::InvalidArgument(fmt::format("{} names '{}' twice", shown, name));
+      if (value.empty()) return Status::InvalidArgument(fmt::format("{} '{}' has no value for '{}'", shown, text, name));
+      At(path, LookOf(name, request), [&](const FieldAbout& field, auto& member, std::size_t most) {
+        const RequestOption of_one{.path = option.path, .value = "VALUE", .range = NumberRange{field.least, field.most}};
+        OptionReader reader{.option = of_one, .shown = fmt::format("{} {}:", shown, name), .maps = maps, .most = most};
+        reader.ReadAll(std::span(&value, 1), member);
+        status = reader.status;
+      });
+      if (!status.ok()) return status;
+    }
+  }
+  return Status::Ok();
+}
+
+// A look that says nothing still names its channel. One that is not shown has no opacity.
+std::vector<std::string> TextsOfFields(const RequestOption& option, const FrameRequest& request) {
+  const std::string_view path = std::string_view(option.path).substr(kOfFields.size());
+  std::string joined;
+  for (FieldChoice look : request.fields) {
+    const bool bare = look == FieldChoice{.field = look.field};
+    if (!look.shown.value_or(true)) look.weight = 0;
+    const auto texts_of = [&](const FieldChoice& choice) {
+      std::vector<std::string> texts;
+      At(path, choice, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
+      return texts;
+    };
+    const std::vector<std::string> texts = texts_of(look);
+    if (texts == texts_of({}) && !(bare && path == "weight")) continue;
+    joined += fmt::format("{}{}={}", joined.empty() ? "" : ",", TextOfName(look.field), texts.front());
+  }
+  return joined.empty() ? std::vector<std::string>{} : std::vector{joined};
+}
+
 std::vector<std::string> AllTextsOf(const RequestOption& option, const FrameRequest& request) {
+  if (option.path.starts_with(kOfFields)) return TextsOfFields(option, request);
   std::vector<std::string> texts;
   At(option.path, request, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
   return texts;
@@ -342,6 +412,7 @@ Status SetOption(const RequestOption& option, const std::string& shown, std::spa
     request.parameters[option.name] = texts.back();
     return Status::Ok();
   }
+  if (option.path.starts_with(kOfFields)) return SetOfFields(option, shown, texts, maps, request);
   Status status;
   At(option.path, request, [&](const FieldAbout&, auto& member, std::size_t most) {
     OptionReader reader{.option = option, .shown = shown, .maps = maps, .most = most};

@@ -44,8 +44,8 @@ const RequestOption* FindRequestOption(std::string_view name);
 // Colour maps may be files that texts name, or only texts themselves.
 enum class ColorMaps : bool { kTexts, kFilesToo };
 
-// Sets the field. `texts`: one, or of a repeatable option one for each time. A flag: "true" or "false". InvalidArgument in one line that
-// begins with `shown` ("--clip-box").
+// Sets the field. `texts`: one, or of a repeatable option one for each time. A flag: "true" or "false". An option of single channels sets
+// it in the looks of those that it names. InvalidArgument in one line that begins with `shown` ("--clip-box").
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
                  FrameRequest& request);
 
@@ -54,7 +54,7 @@ Status SetOption(const RequestOption& option, const std::string& shown, std::spa
 std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest& request);
 
 // The files that a command line names for transfer functions that are not presets.
-inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json";
+inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json", kChannelMapFile[] = "channel-map.json";
 
 // The texts of an option's value in JSON: of a text, number, boolean or colour map; lists of numbers are joined by commas; lists of a
 // repeatable option are one text for each item. Nothing: the value is of another kind.

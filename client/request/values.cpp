@@ -19,13 +19,14 @@ namespace slabstream {
 namespace {
 
 std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
-  if (digits.size() != 6 && digits.size() != 8) return std::nullopt;
+  const std::size_t length = digits.size() == 3 ? 1 : 2;  // of a number
+  if (digits.size() != 3 && digits.size() != 6 && digits.size() != 8) return std::nullopt;
   float channels[4] = {0, 0, 0, 1};
-  for (std::size_t i = 0; i < digits.size(); i += 2) {
+  for (std::size_t i = 0; i < digits.size(); i += length) {
     unsigned value = 0;
-    const auto [end, error] = std::from_chars(digits.data() + i, digits.data() + i + 2, value, 16);
-    if (error != std::errc() || end != digits.data() + i + 2) return std::nullopt;
-    channels[i / 2] = float(value) / 255;
+    const auto [end, error] = std::from_chars(digits.data() + i, digits.data() + i + length, value, 16);
+    if (error != std::errc() || end != digits.data() + i + length) return std::nullopt;
+    channels[i / length] = float(value) / (length == 1 ? 15 : 255);
   }
   return StraightColor{channels[0], channels[1], channels[2], channels[3]};
 }
@@ -137,7 +138,7 @@ Result<StraightColor> ParseColor(std::string_view option, std::string_view text)
   const std::string code = named != nullptr ? fmt::format("#{:06x}", named->code) : std::string(text);
   if (code.starts_with('#')) {
     if (const std::optional<StraightColor> color = FromHexadecimal(std::string_view(code).substr(1))) return *color;
-    return Status::InvalidArgument(fmt::format("{} '{}' is neither #rrggbb nor #rrggbbaa", option, text));
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither #rgb nor #rrggbb nor #rrggbbaa", option, text));
   }
   const std::vector<std::string_view> parts = Split(text, ',');
   if (parts.size() != 3 && parts.size() != 4) {
@@ -256,6 +257,85 @@ Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::s
 
 namespace {
 
+// Up to the first of `ends` that no backslash stands before, which is left in `text`.
+std::string TakeName(std::string_view& text, std::string_view ends) {
+  std::string name;
+  std::size_t i = 0;
+  for (; i < text.size() && ends.find(text[i]) == std::string_view::npos; ++i) {
+    if (text[i] == '\\' && i + 1 < text.size()) ++i;
+    name += text[i];
+  }
+  text.remove_prefix(i);
+  return name;
+}
+
+Status CheckName(std::string_view option, std::string_view text, const std::string& name) {
+  if (name.empty()) return Status::InvalidArgument(fmt::format("{} '{}' has an empty name", option, text));
+  if (name.size() <= kMaxNameBytes) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} has a name of {} bytes, at most {} are possible", option, name.size(), kMaxNameBytes));
+}
+
+// The length of the JSON that `text` begins with; of what is none, that up to a comma.
+std::size_t ValueLength(std::string_view text) {
+  if (text.empty() || (text[0] != '{' && text[0] != '[')) return std::min(text.find(','), text.size());
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') quoted = !quoted;
+    if (quoted) {
+      if (text[i] == '\\') ++i;
+      continue;
+    }
+    if (text[i] == '{' || text[i] == '[') ++depth;
+    if ((text[i] == '}' || text[i] == ']') && --depth == 0) return i + 1;
+  }
+  return text.size();
+}
+
+}  // namespace
+
+Result<Rgb> ParseOpaqueColor(std::string_view option, std::string_view text) {
+  const Result<StraightColor> color = ParseColor(option, text);
+  if (!color.ok()) return color.status();
+  if (color->a == 1) return Rgb{color->r, color->g, color->b};
+  return Status::InvalidArgument(fmt::format("{} '{}' has an opacity of {:g}, but must be opaque", option, text, color->a));
+}
+
+Result<std::vector<std::string>> ParseNames(std::string_view option, std::string_view text) {
+  std::vector<std::string> names;
+  for (std::string_view rest = text;; rest.remove_prefix(1)) {
+    names.push_back(TakeName(rest, ","));
+    if (Status status = CheckName(option, text, names.back()); !status.ok()) return status;
+    if (rest.empty()) return names;
+  }
+}
+
+Result<std::vector<NamedText>> ParseNamedTexts(std::string_view option, std::string_view text) {
+  std::vector<NamedText> found;
+  for (std::string_view rest = text;; rest.remove_prefix(1)) {
+    std::string_view after = rest;
+    std::string name = TakeName(after, ",=");
+    const bool named = after.starts_with('=');
+    if (!named && found.empty()) return Status::InvalidArgument(fmt::format("{} '{}' is not NAME=VALUE,...", option, text));
+    if (named) {
+      if (Status status = CheckName(option, text, name); !status.ok()) return status;
+      if (std::ranges::find(found, name, &NamedText::name) != found.end())
+        return Status::InvalidArgument(fmt::format("{} names '{}' twice", option, name));
+      found.push_back({std::move(name), ""});
+      rest = after.substr(1);
+    } else {
+      found.back().text += ',';
+    }
+    const std::size_t length = ValueLength(rest);
+    found.back().text += rest.substr(0, length);
+    rest.remove_prefix(length);
+    if (rest.empty()) return found;
+    if (rest[0] != ',') return Status::InvalidArgument(fmt::format("{} '{}' has '{}' behind a value", option, text, rest.substr(0, 16)));
+  }
+}
+
+namespace {
+
 // fmt writes the fewest digits that read back the same.
 template <class Items>
 std::string Joined(const Items& items, const auto& text_of) {
@@ -272,6 +352,13 @@ std::string TextOf(const ScalarRange& range) {
   const std::string_view unit = range.percentiles ? "%" : "";
   return fmt::format("{}{}:{}{}", range.min, unit, range.max, unit);
 }
+std::string TextOf(const Rgb& color) { return fmt::format("{},{},{}", color.r, color.g, color.b); }
+std::string TextOfName(const std::string& name) {
+  std::string text;
+  for (const char c : name) text += std::string_view(",=\\").find(c) == std::string_view::npos ? std::string(1, c) : std::string("\\") + c;
+  return text;
+}
+std::string TextOf(const std::vector<std::string>& names) { return Joined(names, TextOfName); }
 std::string TextOf(const ClipBox& box) {
   const auto bound = [](double value, double none) { return value == none ? "" : fmt::format("{}", value); };
   const auto bounds = [&](Axis axis) { return bound(box.low[axis], -kMaxCoordinate) + ":" + bound(box.high[axis], kMaxCoordinate); };

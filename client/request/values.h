@@ -31,14 +31,17 @@ Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
 // "NX,NY,NZ,D".
 Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text);
 
-// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS, such as "white" or "steelblue"
-// (named_colors.h). Codes and names become codes of an 8-bit PNG as they are, without a transfer curve.
+// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rgb", "#rrggbb" or "#rrggbbaa"; or one of the names of CSS, such as "white" or
+// "steelblue" (named_colors.h). Codes and names become codes of an 8-bit PNG as they are, without a transfer curve.
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
 
 // "V[:COLOUR[:OPACITY]],...", such as "120:red:0.3,300": 1 to kMaxIsosurfaces different values in any order, here returned in ascending
 // order. COLOUR is as for ParseColor, but R,G,B has three numbers; OPACITY in [0, 1] is that of the colour if it is left out. Surfaces
 // without a colour have one of their own.
 Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::string_view text);
+
+// The same, and opaque.
+Result<Rgb> ParseOpaqueColor(std::string_view option, std::string_view text);
 
 // "G:O,G:O,...", with slopes G that ascend in [0, kMaxScalar] and opacities O in [0, 1].
 Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text);
@@ -48,10 +51,22 @@ Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, s
 // "1,5-9,Precentral_L,Temporal_*": what is neither a number nor a range is a name.
 Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text);
 
+// Names that are separated by commas. In names a backslash stands before a comma, a '=' or another backslash.
+Result<std::vector<std::string>> ParseNames(std::string_view option, std::string_view text);
+// "NAME=VALUE,NAME=VALUE,...", none named twice. What has no '=' belongs to the value before it, as in "0=1,0.5,0,Actin=red"; a value in
+// JSON ends where its brackets close.
+struct NamedText {
+  std::string name, text;
+};
+Result<std::vector<NamedText>> ParseNamedTexts(std::string_view option, std::string_view text);
+
 // The other way round: the text that is parsed as the value.
 std::string TextOf(const ImageSize& size);
 std::string TextOf(const Vec3& point);
 std::string TextOf(const ScalarRange& range);
+std::string TextOf(const Rgb& color);
+std::string TextOfName(const std::string& name);
+std::string TextOf(const std::vector<std::string>& names);
 std::string TextOf(const ClipBox& box);
 std::string TextOf(const ClipPlane& plane);
 std::string TextOf(const std::vector<Isosurface>& surfaces);

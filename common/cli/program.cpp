@@ -132,6 +132,7 @@ int Finish(const std::string& who, const Status& status) {
   std::cerr << who << ": " << message << std::endl;
   switch (status.code()) {
     case StatusCode::kInvalidArgument:
+    case StatusCode::kDataLoss:  // of a damaged file
     case StatusCode::kNotFound: return 2;
     case StatusCode::kCancelled: return 130;  // 128 + SIGINT, as shells count
     default: return 1;

@@ -16,7 +16,7 @@ namespace slabstream {
 int RunMain(const std::string& name, const std::function<int()>& program);
 
 // Unless the status is ok, writes "who: message" as one line to stderr. Returns the exit status. 0: ok. 1: the service or the frame failed.
-// 2: bad arguments or input. 130: stopped by Ctrl-C.
+// 2: bad arguments or input, such as a damaged file. 130: stopped by Ctrl-C.
 int Finish(const std::string& who, const Status& status);
 
 // Flushes standard output, of std::cout and of printf. Unavailable if this fails or has failed before. A program calls this when it has

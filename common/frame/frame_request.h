@@ -14,6 +14,7 @@
 
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
+#include "common/frame/field_look.h"
 #include "common/frame/layer_look.h"
 #include "common/text/parse_number.h"
 #include "common/view/camera.h"
@@ -28,6 +29,7 @@ inline constexpr double kMaxPixelError = 0.1;
 inline constexpr int kMaxLevels = 64;  // levels of a dataset
 inline constexpr std::size_t kMaxNameBytes = 256;
 inline constexpr std::string_view kAutomatic = "auto";  // in place of a name: the service chooses
+inline constexpr std::string_view kLastTime = "last";   // in place of a time: the newest one
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
@@ -93,6 +95,13 @@ struct FrameRequest {
   TransferChoice transfer;
   std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
   std::optional<OverlayChoice> overlay = {};  // none: the dataset's overlay, if it has one, is not shown
+  // Which channels of the dataset show, by name or number; empty: those that the dataset says. At most kMaxShownFields.
+  std::vector<std::string> channels = {};
+  std::vector<FieldChoice> fields = {};  // looks of fields, none named twice; at most kMaxFields
+  Blend blend = Blend::kAuto;            // of all fields; kAuto: each has its own
+  // A time of the dataset: its number, a number with a unit of time such as "3.5s", or kLastTime; empty: the one that the dataset's file
+  // says, mostly the first.
+  std::string time = {};
   Shading shading;
   double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never

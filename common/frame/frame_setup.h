@@ -9,6 +9,7 @@
 
 #include "common/classification/transfer_function.h"
 #include "common/frame/dataset_id.h"
+#include "common/frame/field_look.h"
 #include "common/frame/frame_request.h"
 #include "common/frame/layer_look.h"
 #include "common/frame/opaque_front.h"
@@ -16,6 +17,7 @@
 #include "common/image/pixel_format.h"
 #include "common/view/picture_geometry.h"
 #include "common/view/sheet_grid.h"
+#include "common/volume/affine_map.h"
 #include "common/volume/grid_map.h"
 #include "common/volume/layers.h"
 #include "common/volume/stored_at.h"
@@ -39,6 +41,14 @@ struct CoarserLevel {
   friend bool operator==(const CoarserLevel&, const CoarserLevel&) = default;
 };
 
+// A field of the dataset that the picture shows beside its volume.
+struct FieldSetup {
+  std::vector<CoarserLevel> levels;      // those that are drawn, finest first; not empty. Of one grid, type and mapping
+  std::vector<std::uint32_t> of_volume;  // which of them belongs to each level of the volume (LevelBox::level)
+  FieldLook look;
+  friend bool operator==(const FieldSetup&, const FieldSetup&) = default;
+};
+
 // Lengths are counted in `unit`: those of all geometries, of camera and clip region, and those in slopes of the transfer function.
 struct FrameSetup {
   DatasetId dataset = 0;
@@ -57,7 +67,11 @@ struct FrameSetup {
   SheetGrid sheets;  // the frame grid of renderers that work along slices; empty: the camera's grid
   ClipRegion clip;   // empty: all is drawn
   TransferFunction transfer;
-  LayerLooks looks;  // the looks of those layers that the dataset has and the picture shows
+  LayerLooks looks;   // the looks of those layers that the dataset has and the picture shows
+  double weight = 1;  // [0, 1]: a factor of the volume's density
+  // The other fields that the picture shows, in the order in which they are blended; at most kMaxShownFields - 1.
+  std::vector<FieldSetup> fields = {};
+  bool flat = false;  // the picture is a slice: colours of fields that add are added, not averaged (docs/rendering.md)
   Shading shading;
   double termination = kDefaultTermination;
   std::int32_t halo = kHalo;  // voxels that a worker keeps round a box
@@ -136,6 +150,17 @@ inline Box VoxelsOf(const LevelBox& at, const FrameSetup& setup) {
 // Voxels of its level that a worker must hold to render `at`: with their halo, cut to the volume.
 inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup) {
   return Grown(VoxelsOf(at, setup), setup.halo, GeometryOf(setup, at.level).bounds());
+}
+
+// The level of a field that belongs to a level of the volume.
+inline const CoarserLevel& LevelOf(const FieldSetup& field, std::uint8_t level) { return field.levels[field.of_volume[level]]; }
+// From the frame's voxels to those of the field there.
+inline AffineMap MapTo(const FrameSetup& setup, const FieldSetup& field, std::uint8_t level) {
+  return AffineMapBetween(setup.description.geometry, LevelOf(field, level).description.geometry);
+}
+// Voxels of the field that a worker must hold to render `at`; empty: the field does not reach there.
+inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup, const FieldSetup& field) {
+  return CoveringVoxels(at.box, MapTo(setup, field, at.level), LevelOf(field, at.level).description.geometry.size, setup.halo);
 }
 
 }  // namespace slabstream

@@ -68,19 +68,11 @@ struct LabelLook {
   }
 };
 
-struct OverlayLook {
-  TransferFunction transfer;
-  ValueRange range;   // data values that the classification table is made for
-  double weight = 1;  // [0, 1]
-  friend bool operator==(const OverlayLook&, const OverlayLook&) = default;
-};
-
 // Nothing: the frame does not show that layer.
 struct LayerLooks {
   std::optional<LabelLook> labels = {};
-  std::optional<OverlayLook> overlay = {};
 
-  bool any() const { return labels || overlay; }
+  bool any() const { return labels.has_value(); }
   friend bool operator==(const LayerLooks&, const LayerLooks&) = default;
 };
 

@@ -36,9 +36,9 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
 
 std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
   const Box all = summary_.description.geometry.bounds();
-  if (bricks_.empty()) return any_value_visible_ && clip.MayKeep(all) ? std::vector<Box>{all} : std::vector<Box>{};
+  if (bricks_.empty() && layers_.empty()) return any_value_visible_ && clip.MayKeep(all) ? std::vector<Box>{all} : std::vector<Box>{};
   std::vector<Box> visible;
-  for (std::size_t i = 0; i < bricks_.size(); ++i) {
+  for (std::size_t i = 0; i < CountIn(summary_.brick_counts); ++i) {
     if (!AnyVisible(i)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
     const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, all);

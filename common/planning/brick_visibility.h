@@ -1,7 +1,7 @@
 // BrickVisibility: whether a renderer may draw any voxel of a box. The value ranges of the summary's bricks tell; no voxels are needed.
 //
 // Rounding is conservative: a box that is called empty holds no voxel whose bin has an opacity above zero in the renderer's DrawnTable, and
-// none that layers show.
+// none that other fields or labels show.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace slabstream {
 
 class BrickVisibility {
  public:
-  // `summary` must outlive this. `layers`: LayerBricks (layer_bricks.h).
+  // `summary` must outlive this. `layers`: OtherBricks (other_bricks.h).
   BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {})
       : BrickVisibility(summary, summary.bricks, std::move(drawn), std::move(layers)) {}
   // By other ranges of the bricks than summary.bricks. They must outlive this, too.

@@ -5,25 +5,37 @@
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "common/frame/frame_setup.h"
 
 namespace slabstream {
 
+// Another field that shows: its finest level, and its look.
+struct ClassifiedField {
+  DatasetId dataset = 0;
+  std::shared_ptr<const VolumeSummary> summary;  // never null
+  FieldLook look;
+  friend bool operator==(const ClassifiedField& a, const ClassifiedField& b) { return a.dataset == b.dataset && a.look == b.look; }
+};
+
 class ClassifiedVolume {
  public:
-  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {}, LayerLooks looks = {})
+  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {}, LayerLooks looks = {},
+                   std::vector<ClassifiedField> fields = {})
       : dataset_(dataset),
         transfer_(std::make_shared<const TransferFunction>(std::move(transfer))),
         renderer_(renderer),
         clip_(std::move(clip)),
-        looks_(std::make_shared<const LayerLooks>(std::move(looks))) {}
+        looks_(std::make_shared<const LayerLooks>(std::move(looks))),
+        fields_(std::make_shared<const std::vector<ClassifiedField>>(std::move(fields))) {}
 
   DatasetId dataset() const { return dataset_; }
   const TransferFunction& transfer() const { return *transfer_; }
   const RendererKind* renderer() const { return renderer_; }
   const ClipRegion& clip() const { return clip_; }
   const LayerLooks& looks() const { return *looks_; }
+  const std::vector<ClassifiedField>& fields() const { return *fields_; }  // the other fields that show
 
   ClassifiedVolume Whole() const {
     ClassifiedVolume whole = *this;
@@ -33,7 +45,8 @@ class ClassifiedVolume {
 
   friend bool operator==(const ClassifiedVolume& a, const ClassifiedVolume& b) {
     return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && a.clip_ == b.clip_ &&
-           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_) && (a.looks_ == b.looks_ || *a.looks_ == *b.looks_);
+           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_) && (a.looks_ == b.looks_ || *a.looks_ == *b.looks_) &&
+           (a.fields_ == b.fields_ || *a.fields_ == *b.fields_);
   }
 
  private:
@@ -42,6 +55,7 @@ class ClassifiedVolume {
   const RendererKind* renderer_;
   ClipRegion clip_;
   std::shared_ptr<const LayerLooks> looks_;
+  std::shared_ptr<const std::vector<ClassifiedField>> fields_;
 };
 
 }  // namespace slabstream

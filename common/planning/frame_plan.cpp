@@ -67,6 +67,17 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   const ClipRegion& clip = resolved.volume.clip();
   setup.clip = InUnit(clip, setup.unit);
   setup.looks = resolved.volume.looks();
+  setup.weight = resolved.weight;
+  setup.flat = request.clipping.slab.has_value();
+  for (std::size_t i = 0; i < resolved.fields.others.size(); ++i) {
+    const FieldVolume& other = resolved.fields.others[i];
+    FieldSetup field{.levels = {}, .of_volume = other.of_volume, .look = resolved.volume.fields()[i].look};
+    for (const CoarserVolume& level : other.levels) {
+      field.levels.push_back({level.dataset, in_unit(level.summary->description), level.summary->stored});
+    }
+    field.look.transfer = InUnit(field.look.transfer, setup.unit);
+    setup.fields.push_back(std::move(field));
+  }
   if (Status status = CheckView(request.view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(InUnit(request.view, setup.unit), request.size, setup); !status.ok()) return status;
   if (Status status = CheckDrawable(setup.camera); !status.ok()) return status;

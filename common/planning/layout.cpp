@@ -9,9 +9,9 @@
 #include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/clipped_cells.h"
-#include "common/planning/layer_bricks.h"
 #include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
+#include "common/planning/other_bricks.h"
 #include "common/planning/unread_parts.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
@@ -43,7 +43,7 @@ class WorkFields {
   explicit WorkFields(const LayoutRequest& request)
       : request_(request),
         visibility_(*request.summary, request.volume->renderer()->DrawnTable(request.volume->transfer(), *request.summary),
-                    LayerBricks(*request.summary, *request.volume->renderer(), request.volume->looks())),
+                    OtherBricks(*request.summary, *request.volume)),
         clip_(request.volume->clip()),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
@@ -318,7 +318,7 @@ struct LayoutMaker::State {
     if (request.summary->indexed == nullptr) return std::nullopt;
     const RendererKind& renderer = *request.volume->renderer();
     return UnreadParts(*request.summary, renderer.DrawnTable(request.volume->transfer(), *request.summary), renderer.reach(),
-                       LayerBricks(*request.summary, renderer, request.volume->looks()));
+                       LabelBricks(*request.summary, request.volume->looks()));
   }
 
   // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work

@@ -182,7 +182,7 @@ int LightLevelOf(const VolumeLevels& levels) {
   return last;
 }
 
-Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels) {
+Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels, const ShownFields& fields) {
   const int count = int(levels.levels.size());
   const VolumeGeometry& finest = levels.levels.front().geometry;
   // Coarser levels have other indices.
@@ -193,7 +193,7 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
   const VolumeGeometry& overview = levels.overview->description.geometry;
-  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview);
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview, fields);
   if (!resolved.ok()) return resolved.status();
   resolved->frame.shading = {};  // light changes no level, and here there is no level to make a light volume from
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
@@ -213,15 +213,43 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
 }
 
+Result<double> DetailOf(const FrameRequest& request, const VolumeGeometry& finest, const std::shared_ptr<const VolumeSummary>& overview,
+                        const ShownFields& fields) {
+  const VolumeGeometry& geometry = overview->description.geometry;
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, geometry), 1, overview, fields);
+  if (!resolved.ok()) return resolved.status();
+  resolved->frame.shading = {};
+  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  if (!setup.ok()) return setup.status();
+  if (LevelNumber(request.level)) return 0;  // that level of all fields, as far as they have it
+  const double least = LeastWidth(finest, *setup);
+  const double width = least > 0 ? least : setup->unit * WidthAt(ExtentOf(geometry.bounds(), {}, setup->camera), setup->camera);
+  return width * (request.detail == 0 ? 1 : request.detail);
+}
+
+FieldLevels LevelsOfField(const VolumeLevels& levels, const VolumeGeometry& finest, std::span<const VolumeGeometry> volume, double pixel) {
+  constexpr double kSame = 1.001;
+  FieldLevels found;
+  for (const VolumeGeometry& drawn : volume) {
+    const bool first = &drawn == &volume.front();
+    const double width = std::max(first ? pixel : 0, kSame * CoarseSpacing(finest, drawn));
+    const int level = CoarsestFor(width, levels, int(levels.levels.size()));
+    if (found.levels.empty() || found.levels.back() < level) found.levels.push_back(level);
+    found.of_volume.push_back(std::uint32_t(found.levels.size() - 1));
+  }
+  return found;
+}
+
 Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry& finest,
-                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed) {
+                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed,
+                              const ShownFields& fields) {
   ChosenView chosen = {.view = WithDefaults(request.view, finest.orientation.world), .framed = framed};
   if (!std::exchange(chosen.view.fit, false).value()) return ChosenView{chosen.view, std::nullopt};
   if (!framed) {
     // Coarser levels have other indices.
     const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
     if (!clip.ok()) return clip.status();
-    const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview);
+    const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview, fields);
     if (!resolved.ok()) return resolved.status();
     chosen.framed = resolved->framed;
   }

@@ -8,11 +8,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/planning/level_map.h"
+#include "common/planning/shown_fields.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -35,10 +37,24 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels);
 // where a surface meets their border.
 //
 // Errors of ResolveRequest and MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
-Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels);
+Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels, const ShownFields& fields = {});
 
 // `map`, if its levels have at most so many bytes of voxels; else the finest level that has, or the coarsest one.
 LevelMap NoneLarger(LevelMap map, std::int64_t bytes, const VolumeLevels& levels);
+
+// Of another field with `levels`: those that belong to the levels of the picture's volume that are drawn, `volume`, finest first. Beside
+// the volume's finest level of all, `finest`, stands the coarsest one whose voxels are at most `pixel` wide (DetailOf); beside another one
+// it may also have voxels as wide as those of the volume there. So channels of one grid are drawn from the same level.
+struct FieldLevels {
+  std::vector<int> levels;               // finest first
+  std::vector<std::uint32_t> of_volume;  // for each of `volume` its place in `levels`
+};
+FieldLevels LevelsOfField(const VolumeLevels& levels, const VolumeGeometry& finest, std::span<const VolumeGeometry> volume, double pixel);
+
+// The width of the least pixel in which the picture shows the volume, in the unit of the world, times the detail of the request (0: as 1).
+// 0: it names a level. Errors of ResolveRequest and MakeFrameSetup.
+Result<double> DetailOf(const FrameRequest& request, const VolumeGeometry& finest, const std::shared_ptr<const VolumeSummary>& overview,
+                        const ShownFields& fields);
 
 // The level that the light volume of a dataset is, or is made from: the finest one of at most kMaxLightSide voxels a side, else the
 // coarsest.
@@ -54,7 +70,8 @@ struct ChosenView {
 // the overview, so that pictures from all levels frame the same. `finest`: the overview's geometry, if there is one level. Errors of
 // ResolveRequest.
 Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry& finest,
-                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed = {});
+                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed = {},
+                              const ShownFields& fields = {});
 
 // The request that shows of `level` what `request` shows of `finest`. `level` describes the same part of the world.
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level);

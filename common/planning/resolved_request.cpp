@@ -10,7 +10,7 @@
 #include "common/base/find_named.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/framing.h"
-#include "common/planning/layer_bricks.h"
+#include "common/planning/other_bricks.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_choice.h"
 #include "common/view/default_view.h"
@@ -71,7 +71,6 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
   return look;
 }
 
-// An overlay without weight is not shown.
 Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummary& summary) {
   LayerLooks looks;
   if (request.labels) {
@@ -79,17 +78,6 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
     Result<LabelLook> labels = ResolveLabels(*request.labels, *summary.label_table, request.clipping.slab.has_value());
     if (!labels.ok()) return labels.status();
     looks.labels = *std::move(labels);
-  }
-  if (request.overlay) {
-    if (summary.overlay == nullptr) return Missing(request, "overlay", "--overlay-transfer, --overlay-range or --overlay-weight");
-    Result<TransferFunction> transfer =
-        ResolveTransfer({.choice = request.overlay->choice, .scalar_range = request.overlay->scalar_range}, *summary.overlay);
-    if (!transfer.ok()) return transfer.status();
-    if (!transfer->regions.empty())
-      return Status::InvalidArgument("overlay-transfer is a two-dimensional transfer function, which overlays do not have");
-    if (request.overlay->weight > 0) {
-      looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
-    }
   }
   return looks;
 }
@@ -104,26 +92,87 @@ Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& data
 
 namespace {
 
+// Whether the strongest value of a channel is opaque: what shows is a value or a plane, not matter that lets light through.
+bool HasFullRange(const FrameRequest& request, const RendererKind& renderer) {
+  return request.clipping.slab.has_value() || renderer.format() == PixelFormat::kMaximum;
+}
+
 void Brighten(double factor, TransferFunction& transfer) {
   for (ColorPoint& point : transfer.colors) point.color = Brightened(point.color, factor);
   for (Isosurface& surface : transfer.isosurfaces) surface.color = Brightened(surface.color, factor);
   for (TransferRegion& region : transfer.regions) region.color = Brightened(region.color, factor);
 }
 
+// The other fields that show.
+Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, const VolumeSummary& volume, const ShownFields& fields,
+                                                   const RendererKind& renderer, double opacity_distance) {
+  const bool projects = renderer.format() == PixelFormat::kMaximum;
+  if (request.blend != Blend::kAuto && (request.blend == Blend::kMax) != projects) {
+    return Status::InvalidArgument(fmt::format("blend is {}: renderer '{}' takes {}", projects ? "add or over" : "max", renderer.name(),
+                                               projects ? "max" : "add or over"));
+  }
+  constexpr std::size_t kMostProjected = 4;  // a pixel holds as many values
+  if (projects && fields.others.size() >= kMostProjected) {
+    return Status::InvalidArgument(
+        fmt::format("{} fields of dataset \"{}\" would show, but renderer '{}' shows at most {}: name some with channel",
+                    fields.others.size() + 1, request.dataset, renderer.name(), kMostProjected));
+  }
+  const auto parameters = ParseParameters(renderer, request.parameters);
+  if (projects && !fields.others.empty() && parameters.ok() && renderer.FormatOf(*parameters) != PixelFormat::kMaximum) {
+    return Status::InvalidArgument(fmt::format("projection-mode is 'mean', which shows one field, but {} of dataset \"{}\" show",
+                                               fields.others.size() + 1, request.dataset));
+  }
+  std::vector<ClassifiedField> resolved;
+  for (const FieldVolume& other : fields.others) {
+    const CoarserVolume& level = other.levels.front();
+    const VolumeGeometry& geometry = level.summary->description.geometry;
+    if (geometry.orientation.world != volume.description.geometry.orientation.world) {
+      return Status::InvalidArgument(fmt::format("field {} of dataset \"{}\" lies in a {} world, the volume in a {} one", other.number,
+                                                 request.dataset, NameOf(geometry.orientation.world),
+                                                 NameOf(volume.description.geometry.orientation.world)));
+    }
+    const VolumeSummary& statistics = other.statistics != nullptr ? *other.statistics : *level.summary;
+    Result<FieldLook> look = LookOf(request, *fields.dataset, other.number, statistics, HasFullRange(request, renderer));
+    if (!look.ok()) return look.status();
+    look->range = level.summary->range;
+    look->transfer.opacity_distance = opacity_distance;
+    Brighten(request.brightness, look->transfer);
+    resolved.push_back({level.dataset, level.summary, *std::move(look)});
+  }
+  return resolved;
+}
+
 }  // namespace
 
-Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
+Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
+                                       ShownFields fields) {
   const VolumeGeometry& geometry = summary->description.geometry;
-  const Result<std::vector<const RendererKind*>> able = RenderersFor(request);
+  const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
+  const Result<std::vector<const RendererKind*>> able =
+      RenderersFor(request, {fields.others.size() + 1, std::ranges::any_of(request.fields, weighted)});
   if (!able.ok()) return able.status();
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
   if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
-  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
+  const Result<bool> as_channel = ShowsAsChannel(request, fields);
+  if (!as_channel.ok()) return as_channel.status();
+  const VolumeSummary& statistics = fields.statistics != nullptr ? *fields.statistics : *summary;
+  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, statistics);
   if (!transfer.ok()) return transfer.status();
+  double weight = 1;
+  if (*as_channel || !fields.volume_shows) {
+    Result<FieldLook> look = LookOf(request, *fields.dataset, fields.volume, statistics, HasFullRange(request, renderer));
+    if (!look.ok()) return look.status();
+    const double distance = transfer->opacity_distance;
+    transfer = std::move(look->transfer);
+    transfer->opacity_distance = distance;
+    weight = look->weight;
+    if (!fields.volume_shows) transfer->opacities = {{double(summary->range.min), 0}};
+    if (!fields.volume_shows) weight = 1;
+  }
   const auto* const name = std::get_if<std::string>(&request.transfer.choice);
-  if (request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
+  if (!*as_channel && request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
     transfer->opacities = {{double(summary->range.min), 1}};
   }
   Brighten(request.brightness, *transfer);
@@ -131,21 +180,26 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (!clip.ok()) return clip.status();
   Result<LayerLooks> layers = ResolveLayers(request, *summary);
   if (!layers.ok()) return layers.status();
+  Result<std::vector<ClassifiedField>> others = ResolveFields(request, *summary, fields, renderer, transfer->opacity_distance);
+  if (!others.ok()) return others.status();
+  const ClassifiedVolume volume{dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers), *std::move(others)};
   request.view = WithDefaults(request.view, geometry.orientation.world);
   std::optional<Ball> framed;
   if (*request.view.fit) {
-    const BrickVisibility visibility(*summary, renderer.DrawnTable(*transfer, *summary), LayerBricks(*summary, renderer, *layers));
-    framed = FramedBall(request, visibility.VisibleBricks(*clip), *clip, geometry);
+    const BrickVisibility visibility(*summary, renderer.DrawnTable(volume.transfer(), *summary), OtherBricks(*summary, volume));
+    framed = FramedBall(request, visibility.VisibleBricks(volume.clip()), volume.clip(), geometry);
     if (framed) request.view = FitView(request.view, geometry, *framed);
     request.view.fit = false;
   }
   request.policy = SettledPolicy(request, geometry);
   ResolvedPolicy policy = ResolvePolicy(request.policy, geometry);
   return ResolvedRequest{.frame = std::move(request),
-                         .volume = {dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers)},
+                         .volume = volume,
                          .summary = std::move(summary),
                          .policy = std::move(policy),
-                         .framed = framed};
+                         .framed = framed,
+                         .fields = std::move(fields),
+                         .weight = weight};
 }
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {

@@ -13,15 +13,10 @@
 #include "common/planning/classified_volume.h"
 #include "common/planning/level_map.h"
 #include "common/planning/resolved_policy.h"
+#include "common/planning/shown_fields.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
-
-// A level of the dataset that parts of the picture are drawn from.
-struct CoarserVolume {
-  DatasetId dataset = 0;
-  std::shared_ptr<const VolumeSummary> summary;  // never null
-};
 
 struct ResolvedRequest {
   FrameRequest frame;                            // with its renderer's name, its whole view and a settled policy (SettledPolicy)
@@ -35,12 +30,15 @@ struct ResolvedRequest {
   // ambient occlusion.
   std::optional<CoarserVolume> light = {};
   std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
+  ShownFields fields = {};
+  double weight = 1;  // of the volume: FieldLook::weight
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as RenderersFor and
-// CheckHasWhatIsDrawn; the volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such
-// preset.
-Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
+// CheckHasWhatIsDrawn and ShownFields; the volume has no slice with the slab's index, or no such layer, or there is no such label;
+// NotFound: no such preset.
+Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
+                                       ShownFields fields = {});
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);

@@ -44,15 +44,36 @@ std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) {
   return kBytesACell * cells;
 }
 
+// Those of other fields, and what is derived from them.
+std::uint64_t FieldBytes(const Placement& placement, const FrameSetup& setup) {
+  double bytes = 0;
+  for (const FieldSetup& field : setup.fields) {
+    const std::size_t sample = BytesPerSample(LevelOf(field, placement.level).description.type);
+    bytes += double(PaddedBox(placement.at(), setup, field).voxel_count()) * double(sample);
+  }
+  return std::uint64_t((1 + DerivedShare(setup)) * bytes);
+}
+
+// Bytes of all fields for a byte of the volume.
+double BytesWithFields(const FrameSetup& setup) {
+  const auto bytes_in = [](const VolumeDescription& of) {
+    const Vec3& spacing = of.geometry.spacing;
+    return double(BytesPerSample(of.type)) / (spacing.x * spacing.y * spacing.z);
+  };
+  double bytes = bytes_in(setup.description);
+  for (const FieldSetup& field : setup.fields) bytes += bytes_in(field.levels.front().description);
+  return bytes / bytes_in(setup.description);
+}
+
 // By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of(padded box, level)` tells what one
-// takes.
+// takes of the volume.
 template <class BytesOf>
 std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
   std::map<WorkerId, std::uint64_t> most = {{plan.display, 0}};
   for (const GroupPlan& group : plan.groups) {
     std::map<WorkerId, std::uint64_t> bytes;
     for (const Placement& placement : group.placements)
-      bytes[placement.worker] += bytes_of(PaddedBox(placement.at(), plan.setup), placement.level);
+      bytes[placement.worker] += bytes_of(PaddedBox(placement.at(), plan.setup), placement.level) + FieldBytes(placement, plan.setup);
     for (const auto& [worker, of_group] : bytes) most[worker] = std::max(most[worker], of_group);
   }
   return most;
@@ -105,21 +126,20 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double
     });
   }
   auto bytes = std::uint64_t((1 + derived_share) * double(voxels * BytesPerSample(summary.description.type)));
-  for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
-    if (layer != nullptr) bytes += VoxelBytes(padded, *layer, derived_share);
-  }
+  if (summary.labels != nullptr) bytes += VoxelBytes(padded, *summary.labels, derived_share);
   return bytes + BytesOfCells(padded, summary);
 }
 
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
-  if (limit == 0) return kBoxBytesTarget;
+  const double with_fields = BytesWithFields(setup);
+  if (limit == 0) return std::int64_t(double(kBoxBytesTarget) / with_fields);
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
   const std::uint64_t taken = IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
-  const double boxes = 2 + DerivedShare(setup);  // of that which is being read nothing is derived yet
+  const double boxes = (2 + DerivedShare(setup)) * with_fields;  // of that which is being read nothing is derived yet
   const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
-  return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
+  return std::min(std::int64_t(double(kBoxBytesTarget) / with_fields), std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {

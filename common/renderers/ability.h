@@ -21,12 +21,13 @@ enum class Ability : std::uint8_t {
   kLevels = 9,           // draws boxes of one picture from several levels of the dataset
   kShadows = 10,         // shows shadows and ambient occlusion (Shading)
   kRegions = 11,         // shows TransferFunction::regions
+  kFields = 12,          // shows several fields of a dataset in one picture
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 12> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
-                                                                   "overlay",     "cells",       "lights",           "depth-shading",
-                                                                   "transfer",    "levels",      "shadows",          "regions"};
+inline constexpr std::array<std::string_view, 13> kAbilityNames = {
+    "perspective",   "isosurfaces", "gradient-opacity", "labels",  "overlay", "cells", "lights",
+    "depth-shading", "transfer",    "levels",           "shadows", "regions", "fields"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

@@ -29,7 +29,7 @@ bool HasRegions(const TransferChoice& transfer) {
   return preset != nullptr && preset->has_regions;
 }
 
-std::vector<Need> NeedsOf(const FrameRequest& request) {
+std::vector<Need> NeedsOf(const FrameRequest& request, const FieldsKnown& fields) {
   std::vector<Need> needs;
   const auto add = [&](std::string_view what, const auto& has) {
     Need& need = needs.emplace_back(Need{std::string(what), {}});
@@ -48,6 +48,8 @@ std::vector<Need> NeedsOf(const FrameRequest& request) {
   need(request.shading.ambient_occlusion != 0, Ability::kShadows, "ambient-occlusion");
   need(request.labels.has_value(), Ability::kLabels, "labels");
   need(request.overlay.has_value(), Ability::kOverlay, "overlay");
+  need(fields.weighted, Ability::kFields, "channel-opacity");
+  need(fields.count > 1, Ability::kFields, fmt::format("a picture of {} fields", fields.count));
   for (const auto& [name, text] : request.parameters) {
     add(name, [&](const RendererKind* kind) { return FindParameter(*kind, name) != nullptr; });
   }
@@ -86,7 +88,7 @@ Status CannotBeHadTogether(std::vector<Need> needs) {
 
 }  // namespace
 
-Result<std::vector<const RendererKind*>> RenderersFor(const FrameRequest& request) {
+Result<std::vector<const RendererKind*>> RenderersFor(const FrameRequest& request, const FieldsKnown& fields) {
   const RendererKind* const named = FindRenderer(request.renderer);
   if (named == nullptr && request.renderer != kAutomatic) return NoSuchRenderer(request.renderer, fmt::format("{}, ", kAutomatic));
   if (named != nullptr) {
@@ -94,7 +96,7 @@ Result<std::vector<const RendererKind*>> RenderersFor(const FrameRequest& reques
   } else if (Status status = CheckParameters(request.parameters); !status.ok()) {
     return status;
   }
-  const std::vector<Need> needs = NeedsOf(request);
+  const std::vector<Need> needs = NeedsOf(request, fields);
   if (named == nullptr) {
     std::vector<const RendererKind*> able = AbleToDoAll(needs);
     return able.empty() ? Result<std::vector<const RendererKind*>>(CannotBeHadTogether(needs)) : std::move(able);

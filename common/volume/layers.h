@@ -2,7 +2,7 @@
 // cuts, stores or sends voxels treats it like one.
 //
 //   labels   which structure a voxel belongs to: a number of the dataset's LabelTable, 0: none. uint8 or uint16
-//   overlay  a second scalar value, NaN: none. float32, data values
+//   overlay  a second scalar value, NaN: none. float32, data values. Only of what a client sends: it becomes a field of the dataset
 //
 // The cells of an unstructured grid (Volume::cells) are no layer of voxels: a box of it has those that touch it.
 #pragma once
@@ -77,13 +77,12 @@ struct LabelTable {
 
 // The layers of a volume, on its grid. Null: there is no such layer.
 struct Layers {
-  std::shared_ptr<const Volume> labels = nullptr, overlay = nullptr;
+  std::shared_ptr<const Volume> labels = nullptr;
   std::shared_ptr<const LabelTable> table = nullptr;  // if there are labels
 
   LayerTypes types() const {
     LayerTypes types;
     if (labels != nullptr) types.labels = labels->description.type;
-    if (overlay != nullptr) types.overlay = overlay->description.type;
     return types;
   }
 };

@@ -244,7 +244,6 @@ VolumeSummary Summarize(const LayeredVolume& volume) {
     return layer == nullptr ? nullptr : std::make_shared<const VolumeSummary>(Summarize(*layer));
   };
   summary.labels = of_layer(volume.layers.labels);
-  summary.overlay = of_layer(volume.layers.overlay);
   summary.label_table = volume.layers.table;
   return summary;
 }

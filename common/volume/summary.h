@@ -47,8 +47,8 @@ struct VolumeSummary {
   Index3 brick_counts;                                    // bricks along each axis
   BrickRangeList bricks;        // ranges of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
   std::int64_t non_finite = 0;  // voxels that are NaN or infinite: never visible
-  // The summaries of its layers; null: there is no such layer. Values of labels are their numbers.
-  std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
+  // The summary of its labels, whose values are their numbers; null: there are none.
+  std::shared_ptr<const VolumeSummary> labels = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
   // Nobody holds the voxels, but they can be read there. None: they are held.
   std::optional<StoredAt> stored = {};
@@ -60,7 +60,6 @@ struct VolumeSummary {
   LayerTypes layers() const {
     LayerTypes types;
     if (labels != nullptr) types.labels = labels->description.type;
-    if (overlay != nullptr) types.overlay = overlay->description.type;
     types.cells = !cells.empty();
     return types;
   }

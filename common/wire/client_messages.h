@@ -84,6 +84,30 @@ const std::string& DatasetOf(const Query& query) {
     return query.frame.dataset;
   }
 }
+// A request for a picture that shows what the question is about.
+inline FrameRequest PictureOf(const Question& question) {
+  return std::visit(
+      []<class Query>(const Query& query) {
+        if constexpr (requires { query.frame; }) {
+          return query.frame;
+        } else {
+          FrameRequest picture{.dataset = query.dataset};
+          if (!query.field.empty()) picture.channels = {query.field};
+          picture.time = query.time;
+          return picture;
+        }
+      },
+      question);
+}
+// About what a picture's colours mean: the first channel that it names, at its time, with its transfer function.
+inline SummaryQuery SummaryOf(const FrameRequest& picture) {
+  return {.dataset = picture.dataset,
+          .transfer = picture.transfer,
+          .field = picture.channels.empty() ? "" : picture.channels.front(),
+          .time = picture.time,
+          .looks = picture.fields,
+          .flat = picture.clipping.slab.has_value()};
+}
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);
 }

@@ -65,18 +65,35 @@ void CheckLight(const FrameSetup& setup, Checker& check) {
 }
 
 void CheckLayers(const FrameSetup& setup, Checker& check) {
-  const auto& [labels, overlay] = setup.looks;
-  if (labels) check.That(setup.layers.labels.has_value(), "labels", "of a dataset without labels");
-  if (overlay) check.That(setup.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
   const RendererKind& renderer = *setup.renderer;
   if (renderer.Can(Ability::kCells)) check.That(setup.layers.cells, "renderer", "one of cells, which the dataset does not have");
-  if (labels) check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
-  if (!overlay) return;
-  check.That(renderer.Can(Ability::kOverlay), "renderer", "one that shows no overlays");
-  const TransferFunction& transfer = overlay->transfer;
-  check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty() && transfer.regions.empty(), "overlay.transfer",
-             "not of curves over values alone");
-  check.Adopt(Validate(transfer));
+  if (!setup.looks.labels) return;
+  check.That(setup.layers.labels.has_value(), "labels", "of a dataset without labels");
+  check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
+}
+
+void CheckFields(const FrameSetup& setup, Checker& check) {
+  if (setup.fields.empty()) return;
+  const auto scope = check.In("fields");
+  check.That(setup.renderer->Can(Ability::kFields), "", "not expected by this renderer");
+  for (std::size_t i = 0; i < setup.fields.size(); ++i) {
+    const auto of_field = check.In("", i);
+    const auto& [levels, of_volume, look] = setup.fields[i];
+    check.That(!levels.empty(), "levels", "missing");
+    check.That(of_volume.size() == setup.coarser.size() + 1, "of_volume", "not one for each level of the volume");
+    check.That(std::ranges::all_of(of_volume, [&](std::uint32_t level) { return level < levels.size(); }), "of_volume",
+               "a level that is missing");
+    for (const CoarserLevel& level : levels) {
+      const bool alike =
+          level.description.type == levels.front().description.type && level.description.mapping == levels.front().description.mapping;
+      check.That(alike, "levels", "of other values than the first one");
+    }
+    const TransferFunction& transfer = look.transfer;
+    check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty() && transfer.regions.empty(), "look.transfer",
+               "not of curves over values alone");
+    check.That(look.blend != Blend::kAuto, "look.blend", "not settled");
+    check.Adopt(Validate(transfer));
+  }
 }
 
 // `m` names every worker of the group and the display worker, nobody twice.
@@ -164,6 +181,7 @@ void Rules(const FrameSetup& m, Checker& check) {
   CheckCoarser(m, check);
   CheckLight(m, check);
   CheckLayers(m, check);
+  CheckFields(m, check);
   if (check.ok()) check.Adopt(Validate(m.transfer));
   if (check.ok()) check.Adopt(Validate(m.shading));
 }

@@ -70,7 +70,11 @@ class SchemaCheck {
     const std::size_t length = path_.size();
     for (std::size_t i = 0; i < items.size() && status_.ok(); ++i) {
       path_ += fmt::format("[{}]", i);
-      Members(items[i], limits);
+      if constexpr (std::is_same_v<T, std::string>) {
+        Text(items[i], 1, kMaxNameBytes);
+      } else {
+        Members(items[i], limits);
+      }
       path_.resize(length);
     }
   }
@@ -183,6 +187,30 @@ Status CheckRules(const OverlayChoice& overlay) {
   return CheckRules(overlay.scalar_range, "overlay.scalar_range");
 }
 
+Status CheckRules(const FieldChoice& choice, const std::string& name) {
+  const auto* function = std::get_if<TransferFunction>(&choice.choice);
+  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty() && function->regions.empty())) {
+    return Status::InvalidArgument(name +
+                                   ".function has isosurfaces, gradient_opacities or regions, which only a dataset's first field has");
+  }
+  const auto* preset = std::get_if<std::string>(&choice.choice);
+  const bool own = preset == nullptr || *preset != kAutomatic;
+  if (own && (choice.color || choice.gamma != 1))
+    return Status::InvalidArgument(
+        fmt::format("{} has both a transfer function and a {}, which would be part of one", name, choice.color ? "color" : "gamma"));
+  return CheckRules(choice.scalar_range, (name + ".scalar_range").c_str());
+}
+
+Status CheckRules(const std::vector<FieldChoice>& fields) {
+  std::set<std::string> named;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    if (!named.insert(fields[i].field).second)
+      return Status::InvalidArgument(fmt::format("fields names field '{}' twice", Printable(fields[i].field)));
+    if (Status s = CheckRules(fields[i], fmt::format("fields['{}']", Printable(fields[i].field))); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
 template <class T>
 Status ValidatePart(const char* name, const T& part) {
   if (Status s = CheckSchema(name, part); !s.ok()) return s;
@@ -210,6 +238,7 @@ Status Validate(const FrameRequest& request) {
   if (Status s = CheckRules(request.transfer); !s.ok()) return s;
   if (Status s = CheckRules(request.shading); !s.ok()) return s;
   if (Status s = request.labels ? CheckRules(*request.labels) : Status::Ok(); !s.ok()) return s;
+  if (Status s = CheckRules(request.fields); !s.ok()) return s;
   return request.overlay ? CheckRules(*request.overlay) : Status::Ok();
 }
 

@@ -14,7 +14,7 @@ namespace slabstream {
 
 void DatasetMachine::State::On(const SeekDataset& event) {
   const std::string& name = event.request->dataset;
-  if (IsLevelName(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
+  if (IsPart(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
     news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset};
     return;
   }
@@ -22,7 +22,7 @@ void DatasetMachine::State::On(const SeekDataset& event) {
       uses.insert_or_assign(event.use,
                             Use{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}})
           .first;
-  if (const Status found = DescendUse(use->second); !found.ok()) {
+  if (const Status found = Advance(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
     uses.erase(use);
     return;
@@ -83,55 +83,176 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
   return 0;
 }
 
-// If its dataset has several levels and is open, it seeks those that it draws. Errors of LevelsOf.
-Status DatasetMachine::State::DescendUse(Use& use) {
-  const std::shared_ptr<const VolumeLevels> levels = datasets.Find(use.entries.front().name)->levels;
-  if (levels == nullptr) return Status::Ok();
-  FrameRequest seen = *use.request;
-  const Result<ChosenView> chosen = ChooseView(seen, levels->levels.front().geometry, levels->overview);
-  if (!chosen.ok()) return chosen.status();
-  use.view = seen.view = chosen->view;
-  Result<LevelMap> map = LevelsOf(seen, *levels);
-  if (!map.ok()) return map.status();
-  if (use.most_level_bytes > 0) map = NoneLarger(*std::move(map), use.most_level_bytes, *levels);
-  use.map = std::make_shared<const LevelMap>(*std::move(map));
-  use.entries.clear();
-  for (const int level : use.map->levels) {
-    const std::string name = LevelName(use.request->dataset, level);
-    const CheckId check = Seek(name);
-    use.entries.push_back({name, check});
+// The entry of a field at a time of a dataset that is open.
+std::string DatasetMachine::State::SourceOf(const std::string& dataset, int field, int time) {
+  const DatasetTable::Entry& entry = *datasets.Find(dataset);
+  if (entry.fields != nullptr && !entry.fields->fields[std::size_t(field)].channel) time = entry.fields->time;  // it has one for all times
+  if (entry.fields == nullptr || (field == entry.fields->field && time == entry.fields->time)) return dataset;
+  std::string name = PartName(dataset, field, time);
+  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time), now);
+  return name;
+}
+
+// Seeks what it needs next, as far as that is known. Errors of FieldsToShow, TimeToShow and LevelsOf.
+Status DatasetMachine::State::Advance(Use& use) {
+  const auto ready = [&] {
+    return std::ranges::all_of(use.entries,
+                               [&](const Use::Entry& entry) { return datasets.Find(entry.name)->state == DatasetState::kReady; });
+  };
+  if (use.stage == Use::Stage::kDataset && ready()) {
+    if (Status sought = SeekSources(use); !sought.ok()) return sought;
   }
-  use.has_light = use.request->shading.needs_light_volume();
-  if (use.has_light) {
-    const std::string name = LevelName(use.request->dataset, LightLevelOf(*levels));
-    const CheckId check = Seek(name);
-    use.entries.push_back({name, check});
+  return use.stage == Use::Stage::kSources && ready() ? SeekVoxels(use) : Status::Ok();
+}
+
+Status DatasetMachine::State::SeekSources(Use& use) {
+  static const auto kOneField = std::make_shared<const DatasetFields>();
+  const FrameRequest& request = *use.request;
+  const std::shared_ptr<const DatasetFields> known = datasets.Find(request.dataset)->fields;
+  const DatasetFields& fields = known != nullptr ? *known : *kOneField;
+  const Result<FieldNumbers> shown = FieldsToShow(request, fields);
+  if (!shown.ok()) return shown.status();
+  const Result<int> time = TimeToShow(request, fields);
+  if (!time.ok()) return time.status();
+  use.fields = {.dataset = known != nullptr ? known : kOneField, .volume = shown->numbers.front(), .volume_shows = shown->volume_shows};
+  const Use::Entry dataset = use.entries.front();
+  std::vector<Use::Entry> entries;
+  for (const int number : shown->numbers) {
+    const std::string name = SourceOf(request.dataset, number, *time);
+    entries.push_back(name == dataset.name ? dataset : Use::Entry{name, Seek(name)});
+    if (number != use.fields.volume) use.fields.others.push_back({.number = number});
   }
+  // At another time than the dataset's own, looks need the values of that one, too.
+  const auto& statistics = datasets.Find(request.dataset)->statistics;
+  for (const int number : shown->numbers) {
+    if (*time == fields.time || statistics.contains(number) || !fields.fields[std::size_t(number)].channel) continue;
+    const std::string name = SourceOf(request.dataset, number, fields.time);
+    entries.push_back(name == dataset.name ? dataset : Use::Entry{name, Seek(name)});
+  }
+  use.entries = std::move(entries);
+  use.stage = Use::Stage::kSources;
   return Status::Ok();
+}
+
+Status DatasetMachine::State::SeekVoxels(Use& use) {
+  use.stage = Use::Stage::kVoxels;
+  use.volume = use.entries.front().name;
+  // All that is known of a source before its levels are chosen.
+  const auto overview = [&](const std::string& name) -> CoarserVolume {
+    const DatasetTable::Entry& entry = *datasets.Find(name);
+    return {1, entry.levels != nullptr ? entry.levels->overview : entry.summary};
+  };
+  std::vector<Use::Entry> sources = std::exchange(use.entries, {});
+  sources.resize(1 + use.fields.others.size());  // the rest was needed for its values alone
+  if (use.fields.dataset->times.count > 1) {
+    auto& statistics = datasets.Find(use.request->dataset)->statistics;
+    const auto of = [&](int number) {
+      const std::string name = SourceOf(use.request->dataset, number, use.fields.dataset->time);
+      if (datasets.Find(name)->state == DatasetState::kReady) statistics[number] = overview(name).summary;
+      const auto found = statistics.find(number);
+      return found == statistics.end() ? nullptr : found->second;
+    };
+    use.fields.statistics = of(use.fields.volume);
+    for (FieldVolume& field : use.fields.others) field.statistics = of(field.number);
+  }
+  ShownFields fields = use.fields;
+  for (std::size_t i = 0; i < fields.others.size(); ++i) {
+    fields.others[i].levels = {overview(sources[i + 1].name)};
+    fields.others[i].of_volume = {0};
+  }
+  const std::shared_ptr<const VolumeLevels> levels = datasets.Find(use.volume)->levels;
+  const CoarserVolume volume = overview(use.volume);
+  const VolumeGeometry finest = levels != nullptr ? levels->levels.front().geometry : volume.summary->description.geometry;
+  FrameRequest seen = *use.request;
+  std::vector<VolumeGeometry> drawn = {finest};
+  const auto seek_levels = [&](const std::string& source, const std::vector<int>& numbers) {
+    for (const int level : numbers) {
+      const std::string name = LevelName(source, level);
+      const CheckId check = Seek(name);
+      use.entries.push_back({name, check});
+    }
+  };
+  if (levels != nullptr) {
+    const Result<ChosenView> chosen = ChooseView(seen, finest, levels->overview, {}, fields);
+    if (!chosen.ok()) return chosen.status();
+    use.view = seen.view = chosen->view;
+    Result<LevelMap> map = LevelsOf(seen, *levels, fields);
+    if (!map.ok()) return map.status();
+    if (use.most_level_bytes > 0) map = NoneLarger(*std::move(map), use.most_level_bytes, *levels);
+    use.map = std::make_shared<const LevelMap>(*std::move(map));
+    drawn.clear();
+    for (const int level : use.map->levels) drawn.push_back(levels->levels[std::size_t(level)].geometry);
+    seek_levels(use.volume, use.map->levels);
+  } else {
+    use.entries.push_back(sources.front());
+  }
+  use.volume_entries = use.entries.size();
+  std::optional<double> pixel;
+  for (std::size_t i = 1; i < sources.size(); ++i) {
+    FieldVolume& field = use.fields.others[i - 1];
+    const std::shared_ptr<const VolumeLevels> of_field = datasets.Find(sources[i].name)->levels;
+    if (of_field == nullptr) {
+      use.entries.push_back(sources[i]);
+      field.of_volume.assign(drawn.size(), 0);
+      continue;
+    }
+    if (!pixel) {
+      const Result<double> found = DetailOf(seen, finest, volume.summary, fields);
+      if (!found.ok()) return found.status();
+      pixel = *found;
+    }
+    FieldLevels of = LevelsOfField(*of_field, finest, drawn, *pixel);
+    field.of_volume = std::move(of.of_volume);
+    seek_levels(sources[i].name, of.levels);
+  }
+  use.has_light = levels != nullptr && use.request->shading.needs_light_volume();
+  if (use.has_light) seek_levels(use.volume, {LightLevelOf(*levels)});
+  return Status::Ok();
+}
+
+// Of requests that wait for it. It has been opened or loaded.
+void DatasetMachine::State::AdvanceUses(const std::string& name) {
+  for (auto next = uses.begin(); next != uses.end();) {
+    const auto each = next++;
+    auto& [id, use] = *each;
+    if (!use.WaitsFor(name) || use.begun()) continue;
+    const Status advanced = Advance(use);
+    if (!advanced.ok()) {
+      news.uses[id] = DatasetLost{advanced, &RefusedRequests::bad_request};
+      uses.erase(each);
+    } else {
+      TellUse(*each);
+    }
+  }
 }
 
 // Until a check has shown that the files have not changed, requests are planned for the voxels that are there.
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
   DatasetReady ready;
+  std::vector<CoarserVolume> voxels;
   for (const Use::Entry& awaited : use.entries) {
     const DatasetTable::Entry& entry = *datasets.Find(awaited.name);
-    if (entry.state != DatasetState::kReady || entry.levels != nullptr) {
+    if (entry.state != DatasetState::kReady || use.stage != Use::Stage::kVoxels) {
       news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
       return;
     }
     ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
-    if (use.has_light && &awaited == &use.entries.back()) {
-      ready.light = {entry.id, entry.summary};
-    } else if (ready.dataset == 0) {
-      ready.dataset = entry.id;
-      ready.summary = entry.summary;
-    } else {
-      ready.coarser.push_back({entry.id, entry.summary});
-    }
+    voxels.push_back({entry.id, entry.summary});
   }
+  ready.dataset = voxels.front().dataset;
+  ready.summary = voxels.front().summary;
+  auto next = voxels.begin() + std::ptrdiff_t(use.volume_entries);
+  ready.coarser.assign(voxels.begin() + 1, next);
+  ready.fields = use.fields;
+  for (FieldVolume& field : ready.fields.others) {
+    const std::ptrdiff_t count = std::ptrdiff_t(std::ranges::max(field.of_volume)) + 1;
+    field.levels.assign(next, next + count);
+    next += count;
+  }
+  if (use.has_light) ready.light = voxels.back();
   if (use.map != nullptr) {
-    ready.levels = datasets.Find(use.request->dataset)->levels;
+    ready.levels = datasets.Find(use.volume)->levels;
     ready.drawn = use.map->levels;
     ready.view = use.view;
   }
@@ -155,7 +276,7 @@ void DatasetMachine::State::Lose(const std::string& name, const Status& why, Ref
   });
   std::erase_if(questions, [&](const auto& each) {
     const OpenQuestion& open = each.second;
-    if (open.asked || !(open.entry == name || DatasetOfLevel(open.entry) == name)) return false;
+    if (open.asked || !(open.WaitsFor(name) || DatasetOfPart(open.entry) == name)) return false;
     if (as != nullptr) ++(refused.*as);
     RefuseQuestion(open, why);
     return true;
@@ -164,7 +285,7 @@ void DatasetMachine::State::Lose(const std::string& name, const Status& why, Ref
 
 bool DatasetMachine::State::IsWanted(const std::string& name) const {
   return std::ranges::any_of(uses, [&](const auto& use) { return use.second.WaitsFor(name) && !use.second.begun(); }) ||
-         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.entry == name; });
+         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.WaitsFor(name); });
 }
 
 bool DatasetMachine::State::InUse(DatasetId dataset) const {
@@ -177,8 +298,9 @@ bool DatasetMachine::State::InUse(DatasetId dataset) const {
     if (use.begun()) return std::ranges::find(use.kept, dataset) != use.kept.end();
     return std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
   };
-  return std::ranges::any_of(uses, uses_it) ||
-         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && is_of(open.second.entry); });
+  return std::ranges::any_of(uses, uses_it) || std::ranges::any_of(questions, [&](const auto& open) {
+           return !open.second.asked && (is_of(open.second.entry) || is_of(open.second.overlay));
+         });
 }
 
 // ---------------------------------------------------------------- voxels
@@ -199,7 +321,7 @@ void DatasetMachine::State::On(const DatasetReading& event) {
 void DatasetMachine::State::On(const DatasetLoaded& event) {
   const DatasetTable::Entry* const loading = datasets.Find(event.name);
   const Time begun = loading == nullptr ? now : loading->since;
-  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary, event.bytes, event.stamp, now)) {
+  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary, event.bytes, event.stamp, event.fields, now)) {
     if (!datasets.Holds(event.dataset)) actions.emplace_back(UnloadDataset{event.dataset});  // the executor has its voxels
     return;
   }
@@ -209,7 +331,7 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
        MemoryText(event.bytes), std::chrono::duration<double, std::milli>(now - begun).count());
   if (event.stamp == nullptr) datasets.Find(event.name)->checks.AnswerAll();
   CheckFilesOf(event.name);
-  TellUses(event.name);
+  AdvanceUses(event.name);
 
   const std::uint64_t share = DatasetShare(config.memory_bytes);
   while (datasets.bytes() > share && UnloadOne()) {
@@ -224,21 +346,12 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
 
 void DatasetMachine::State::On(const DatasetOpened& event) {
   const int count = int(event.levels->levels.size());
-  if (!datasets.Opened(event.name, event.load, event.levels, event.sources, event.stamp, now)) return;
+  if (!datasets.Opened(event.name, event.load, event.levels, event.sources, event.stamp, event.fields, now)) return;
   const Index3& size = event.levels->levels.front().geometry.size;
-  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is open: {} x {} x {} voxels at the finest of {} levels", InQuotes(event.name),
-       size.x, size.y, size.z, count);
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "{} is open: {} x {} x {} voxels at the finest of {} levels", Named(event.name), size.x,
+       size.y, size.z, count);
   datasets.Find(event.name)->checks.AnswerAll();  // levels are checked for themselves
-  for (auto next = uses.begin(); next != uses.end();) {
-    const auto each = next++;
-    auto& [id, use] = *each;
-    if (!use.WaitsFor(event.name) || use.begun()) continue;
-    const Status found = DescendUse(use);
-    if (found.ok()) continue;
-    news.uses[id] = DatasetLost{found, &RefusedRequests::bad_request};
-    uses.erase(each);
-  }
-  for (int level = 0; level < count; ++level) TellUses(LevelName(event.name, level));
+  AdvanceUses(event.name);
 }
 
 Status DatasetMachine::State::TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const {
@@ -263,18 +376,18 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
 // What the dataset is read from is not what it was. Frames that have begun go on with the voxels that they began with.
 // All levels of a dataset change together.
 void DatasetMachine::State::RenewData(const std::string& changed) {
-  const std::string name = DatasetOfLevel(changed);
-  // What waits for a level waits for the dataset, which is opened anew.
+  const std::string name = DatasetOfPart(changed);
+  // What waits for a part waits for the dataset, which is opened anew.
   for (auto& [id, use] : uses) {
-    if (use.begun() || use.map == nullptr || use.request->dataset != name) continue;
-    use.entries = {{name}};
-    use.map = nullptr;
-    use.has_light = false;
+    if (use.begun() || use.stage == Use::Stage::kDataset || use.request->dataset != name) continue;
+    use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{name}}};
   }
   for (auto& [id, open] : questions) {
-    if (open.asked || DatasetOfLevel(open.entry) != name || open.entry == name) continue;
+    if (open.asked || DatasetOfPart(open.entry) != name || open.entry == name) continue;
     open.entry = name;
     open.check = 0;
+    open.fields = {};
+    open.overlay.clear();
   }
   datasets.Reset(name, now);
   if (IsWanted(name)) LoadData(name);
@@ -416,7 +529,7 @@ DatasetCounts DatasetMachine::counts() const {
   State& state = *state_;
   DatasetCounts counts{.voxel_bytes = state.datasets.bytes(), .refused = state.refused};
   state.datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
-    if (entry.awaited != 0 || IsLevelName(name)) return;
+    if (entry.awaited != 0 || IsPart(name)) return;
     switch (entry.state) {
       case DatasetState::kUnloaded: ++counts.unloaded; break;
       case DatasetState::kLoading: ++counts.loading; break;

@@ -72,6 +72,7 @@ struct DatasetLoaded {
   std::shared_ptr<const VolumeSummary> summary;
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // the state of its files when they were read; null: they never change
+  std::shared_ptr<const DatasetFields> fields = {};  // null: of a part, or there is one, of which nothing is known
 };
 // The dataset has several levels. None of them was loaded yet.
 struct DatasetOpened {
@@ -80,6 +81,7 @@ struct DatasetOpened {
   std::shared_ptr<const VolumeLevels> levels;  // never null
   std::vector<DataSource> sources;             // the source of each level
   std::shared_ptr<const FileStamp> stamp;      // as DatasetLoaded::stamp
+  std::shared_ptr<const DatasetFields> fields = {};
 };
 struct DatasetReading {  // not the end yet
   std::string name;
@@ -164,6 +166,10 @@ struct AnswerQuestion {
   std::shared_ptr<const VolumeSummary> summary;
   // the levels, for a ViewQuery about such a dataset; its summary is the overview's
   std::shared_ptr<const VolumeLevels> levels = nullptr;
+  ShownFields fields = {};  // the field that it is about
+  // Of a question about points of a dataset with an overlay: its voxels; 0: there is none.
+  DatasetId overlay = 0;
+  std::shared_ptr<const VolumeSummary> overlay_summary = nullptr;
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

@@ -9,12 +9,14 @@ namespace {
 // The picture that a question is about; null: it is about the dataset.
 FrameRequest* FrameOf(Question& question) {
   if (auto* pick = std::get_if<PickQuery>(&question)) return &pick->frame;
+  if (auto* view = std::get_if<ViewQuery>(&question)) return &view->frame;
   return nullptr;
 }
 
 }  // namespace
 
 void DatasetMachine::State::Ask(PeerToken client, Question question) {
+  if (FrameRequest* const frame = FrameOf(question)) *frame = WithOverlayAsField(std::move(*frame));
   const std::string& name = DatasetOf(question);
   OpenQuestion open{.client = client, .question = question, .entry = name};
   const auto of_client = std::ranges::count(questions, client, [](const auto& each) { return each.second.client; });
@@ -25,7 +27,7 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
         open, Status::ResourceExhausted(fmt::format("{} questions are open, which is the limit of {}",
                                                     own ? std::size_t(of_client) : questions.size(), own ? "a client" : "the service")));
   }
-  if (IsLevelName(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
+  if (IsPart(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
     ++refused.unknown_dataset;
     return RefuseQuestion(open, datasets.NoSuchDataset(name));
   }
@@ -38,10 +40,10 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
 Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
   int level = 0;
   if (FrameRequest* const frame = FrameOf(open.question)) {
-    const Result<ChosenView> chosen = ChooseView(*frame, levels.levels.front().geometry, levels.overview);
+    const Result<ChosenView> chosen = ChooseView(*frame, levels.levels.front().geometry, levels.overview, {}, open.fields);
     if (!chosen.ok()) return chosen.status();
     frame->view = chosen->view;
-    const Result<LevelMap> drawn = LevelsOf(*frame, levels);
+    const Result<LevelMap> drawn = LevelsOf(*frame, levels, open.fields);
     if (!drawn.ok()) return drawn.status();
     level = drawn->levels.front();
     *frame = AtLevel(*frame, levels.levels.front().geometry, levels.levels[std::size_t(level)].geometry);
@@ -51,15 +53,56 @@ Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLe
   return Status::Ok();
 }
 
+// Of a dataset that is open: the question waits for the first field that it is about. Errors of FieldsToShow and TimeToShow.
+Status DatasetMachine::State::FindField(OpenQuestion& open) {
+  static const auto kOneField = std::make_shared<const DatasetFields>();
+  const FrameRequest picture = PictureOf(open.question);
+  const std::shared_ptr<const DatasetFields> known = datasets.Find(open.entry)->fields;
+  open.fields.dataset = known != nullptr ? known : kOneField;
+  const Result<FieldNumbers> shown = FieldsToShow(picture, *open.fields.dataset);
+  if (!shown.ok()) return shown.status();
+  const Result<int> time = TimeToShow(picture, *open.fields.dataset);
+  if (!time.ok()) return time.status();
+  open.fields.volume = shown->numbers.front();
+  open.fields.volume_shows = shown->volume_shows;
+  const auto& fields = open.fields.dataset->fields;
+  const auto overlay = std::ranges::find(fields, false, &FieldInfo::channel);
+  const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
+  if (of_points && overlay != fields.end()) {
+    open.overlay = SourceOf(picture.dataset, int(overlay - fields.begin()), *time);
+    open.overlay_check = Seek(open.overlay);
+  }
+  const std::string source = SourceOf(picture.dataset, open.fields.volume, *time);
+  if (source == open.entry) return Status::Ok();
+  open.entry = source;
+  open.check = Seek(source);
+  return Status::Ok();
+}
+
 // What can be answered now.
 void DatasetMachine::State::AskExecutor() {
   std::vector<std::pair<QuestionId, Status>> wrong;
   for (auto& [id, open] : questions) {
-    const auto can_be_asked = [this](const OpenQuestion& question) {
-      const DatasetTable::Entry& entry = *datasets.Find(question.entry);
-      return entry.state == DatasetState::kReady && entry.checks.IsOver(question.check);
+    const auto is_there = [this](const std::string& name, CheckId check) {
+      const DatasetTable::Entry& entry = *datasets.Find(name);
+      return entry.state == DatasetState::kReady && entry.checks.IsOver(check);
+    };
+    const auto can_be_asked = [&](const OpenQuestion& question) {
+      return is_there(question.entry, question.check) && (question.overlay.empty() || is_there(question.overlay, question.overlay_check));
     };
     if (open.asked || !can_be_asked(open)) continue;
+    if (open.fields.dataset == nullptr) {
+      if (const Status found = FindField(open); !found.ok()) {
+        wrong.emplace_back(id, found);
+        continue;
+      }
+      if (!can_be_asked(open)) continue;
+    }
+    if (!open.overlay.empty() && datasets.Find(open.overlay)->levels != nullptr) {
+      open.overlay = LevelName(open.overlay, 0);
+      open.overlay_check = Seek(open.overlay);
+      if (!can_be_asked(open)) continue;
+    }
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
     const bool about_view = std::holds_alternative<ViewQuery>(open.question);
     std::shared_ptr<const VolumeSummary> summary;
@@ -76,8 +119,13 @@ void DatasetMachine::State::AskExecutor() {
     }
     const DatasetTable::Entry& entry = *datasets.Find(open.entry);
     open.asked = true;
-    actions.emplace_back(
-        AnswerQuestion{id, open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr});
+    AnswerQuestion ask{id,         open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
+                       open.fields};
+    if (!open.overlay.empty()) {
+      ask.overlay = datasets.Find(open.overlay)->id;
+      ask.overlay_summary = datasets.Find(open.overlay)->summary;
+    }
+    actions.emplace_back(std::move(ask));
   }
   for (const auto& [id, why] : wrong) {
     ++refused.bad_request;

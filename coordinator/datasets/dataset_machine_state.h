@@ -17,16 +17,9 @@
 #include <vector>
 
 #include "coordinator/datasets/dataset_machine.h"
+#include "data/catalogue/dataset_fields.h"
 
 namespace slabstream {
-
-inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
-
-// An entry of the table, named for messages: dataset "scan", or level 2 of dataset "scan".
-inline std::string Named(const std::string& entry) {
-  const std::string dataset = "dataset " + InQuotes(DatasetOfLevel(entry));
-  return IsLevelName(entry) ? "level " + entry.substr(entry.find('\n') + 1) + " of " + dataset : dataset;
-}
 
 struct DatasetMachine::State {
   explicit State(DatasetConfig c) : config(std::move(c)), datasets(config.datasets, config.folders) {}
@@ -35,16 +28,21 @@ struct DatasetMachine::State {
   struct Use {
     std::shared_ptr<const FrameRequest> request;
     std::int64_t most_level_bytes = 0;  // SeekDataset::most_level_bytes
-    // The entries of the table that it waits for: the dataset, or the levels of it that it draws, finest first, then
-    // that of its light volume.
+    // The entries of the table that it waits for: the dataset; then the sources of the fields that it shows, the volume's first; then the
+    // levels that it draws of each, finest first, or the source if it has one level, and at last that of the light volume.
     struct Entry {
       std::string name;
       CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
     };
+    enum class Stage { kDataset, kSources, kVoxels };
+    Stage stage = Stage::kDataset;
     std::vector<Entry> entries;
-    std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
-    std::optional<ViewParameters> view = {};   // set once it waits for levels (DatasetReady::view)
-    bool has_light = false;                    // once it waits for levels: the last one is that of its light volume
+    ShownFields fields = {};                   // from kSources on; `others` without levels
+    std::size_t volume_entries = 1;            // kVoxels: how many of the entries are the volume's
+    std::shared_ptr<const LevelMap> map = {};  // kVoxels: of a volume with levels
+    std::string volume = {};                   // kVoxels: the source of the volume
+    std::optional<ViewParameters> view = {};   // kVoxels: of a volume with levels (DatasetReady::view)
+    bool has_light = false;                    // kVoxels: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
     bool begun() const { return !kept.empty(); }
@@ -61,9 +59,14 @@ struct DatasetMachine::State {
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    std::string entry;   // the entry of the table that it waits for
-    CheckId check = 0;   // the check of its files, which must be over first; 0: none
-    bool asked = false;  // whether the executor was asked
+    std::string entry;         // the entry of the table that it waits for
+    CheckId check = 0;         // the check of its files, which must be over first; 0: none
+    bool asked = false;        // whether the executor was asked
+    ShownFields fields = {};   // once it waits for the field that it is about: that field alone
+    std::string overlay = {};  // the entry of the overlay that it waits for, too; empty: none
+    CheckId overlay_check = 0;
+
+    bool WaitsFor(const std::string& name) const { return entry == name || overlay == name; }
   };
   // A dataset on its way from a client.
   struct OpenUpload {
@@ -130,7 +133,11 @@ struct DatasetMachine::State {
 
   // ---- requests
   CheckId Seek(const std::string& name);
-  Status DescendUse(Use& use);
+  Status Advance(Use& use);
+  Status SeekSources(Use& use);
+  Status SeekVoxels(Use& use);
+  void AdvanceUses(const std::string& name);
+  std::string SourceOf(const std::string& dataset, int field, int time);
   void TellUse(const std::pair<const UseId, Use>& use);
   void TellUses(const std::string& name);
   void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
@@ -165,6 +172,7 @@ struct DatasetMachine::State {
 
   // ---- questions
   void Ask(PeerToken client, Question question);
+  Status FindField(OpenQuestion& open);
   Status DescendQuestion(OpenQuestion& open, const VolumeLevels& levels);
   void AskExecutor();
   void RefuseQuestion(const OpenQuestion& open, const Status& status);

@@ -24,13 +24,13 @@ DatasetTable::DatasetTable(Catalogue catalogue, std::set<std::string> watched) :
 }
 
 DatasetTable::Entry* DatasetTable::Find(const std::string& name) {
-  auto& table = IsLevelName(name) ? levels_ : entries_;
+  auto& table = IsPart(name) ? parts_ : entries_;
   const auto entry = table.find(name);
   return entry == table.end() ? nullptr : &entry->second;
 }
 
 const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
-  const auto& table = IsLevelName(name) ? levels_ : entries_;
+  const auto& table = IsPart(name) ? parts_ : entries_;
   const auto entry = table.find(name);
   return entry == table.end() ? nullptr : &entry->second;
 }
@@ -81,18 +81,23 @@ void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
 void DatasetTable::Await(const std::string& name, CheckId check) { entries_[name].awaited = check; }
 
 void DatasetTable::Remove(const std::string& name) {
-  RemoveLevels(name);
+  RemoveParts(name);
   const auto entry = entries_.find(name);
   Retire(entry->second);
   entries_.erase(entry);
 }
 
-void DatasetTable::RemoveLevels(const std::string& name) {
-  std::erase_if(levels_, [&](const auto& each) {
-    if (DatasetOfLevel(each.first) != name) return false;
+void DatasetTable::RemoveParts(const std::string& name) {
+  std::erase_if(parts_, [&](const auto& each) {
+    if (!each.first.starts_with(name + '\n')) return false;
     Retire(each.second);
     return true;
   });
+}
+
+void DatasetTable::AddPart(const std::string& name, DataSource source, Time now) {
+  CHECK(IsPart(name)) << name;
+  parts_.try_emplace(name, Entry{.source = std::move(source), .since = now});
 }
 
 LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
@@ -108,7 +113,8 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
 void DatasetTable::Use(const std::string& name) { Find(name)->last_use = ++uses_; }
 
 bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary,
-                          std::uint64_t bytes, std::shared_ptr<const FileStamp> stamp, Time now) {
+                          std::uint64_t bytes, std::shared_ptr<const FileStamp> stamp, std::shared_ptr<const DatasetFields> fields,
+                          Time now) {
   if (!IsLoading(name, load)) return false;
   Entry* const entry = Find(name);
   CHECK(summary != nullptr) << name;
@@ -118,20 +124,22 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   entry->summary = std::move(summary);
   entry->stamp = std::move(stamp);
   entry->bytes = bytes;
+  entry->fields = std::move(fields);
   retired_.erase(id);  // the same voxels again
   return true;
 }
 
 bool DatasetTable::Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
-                          std::shared_ptr<const FileStamp> stamp, Time now) {
+                          std::shared_ptr<const FileStamp> stamp, std::shared_ptr<const DatasetFields> fields, Time now) {
   if (!IsLoading(name, load)) return false;
   Entry& entry = *Find(name);
   entry.state = DatasetState::kReady;
   entry.since = now;
   entry.levels = std::move(levels);
+  entry.fields = std::move(fields);
   entry.stamp = std::move(stamp);
   for (std::size_t level = 0; level < sources.size(); ++level) {
-    levels_[LevelName(name, int(level))] = {.source = std::move(sources[level]), .since = now};
+    parts_[LevelName(name, int(level))] = {.source = std::move(sources[level]), .since = now};
   }
   return true;
 }
@@ -148,13 +156,18 @@ void DatasetTable::Fail(const std::string& name, const Status& status, Time now)
   entry.error = status.message();
 }
 
-void DatasetTable::Reset(const std::string& name, Time now) {
-  RemoveLevels(name);
-  Entry& entry = *Find(name);
-  Retire(entry);
+// The entry as if it had never been loaded.
+DatasetTable::Entry DatasetTable::Forgotten(Entry& entry, Time now) {
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
   fresh.checks.End();
-  entry = std::move(fresh);
+  return fresh;
+}
+
+void DatasetTable::Reset(const std::string& name, Time now) {
+  RemoveParts(name);
+  Entry& entry = *Find(name);
+  Retire(entry);
+  entry = Forgotten(entry, now);
 }
 
 void DatasetTable::Retire(const Entry& entry) {
@@ -184,8 +197,9 @@ std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(Datase
     last_use = entry.last_use;
   });
   if (oldest == nullptr) return std::nullopt;
-  const DatasetId id = Find(*oldest)->id;
-  Reset(*oldest, now);
+  Entry& entry = *Find(*oldest);
+  const DatasetId id = entry.id;
+  entry = Forgotten(entry, now);
   retired_.erase(id);
   return id;
 }
@@ -211,15 +225,19 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
       status.description = entry.levels->levels.front();
       status.range = entry.levels->overview->range;
       status.levels = entry.levels->levels;
-      for (const auto& [level, of_level] : levels_) status.memory_bytes += DatasetOfLevel(level) == name ? of_level.bytes : 0;
+
     } else if (entry.summary) {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
       status.memory_bytes = entry.source.held_bytes + entry.bytes;
       if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
-      status.overlay = entry.summary->overlay != nullptr;
       status.cells = std::accumulate(entry.summary->cells.begin(), entry.summary->cells.end(), std::uint64_t{0});
     }
+    if (entry.state == DatasetState::kReady) {
+      for (const auto& [part, of_part] : parts_) status.memory_bytes += DatasetOfPart(part) == name ? of_part.bytes : 0;
+    }
+    if (entry.state == DatasetState::kReady && entry.fields != nullptr) status.fields = *entry.fields;
+    status.overlay = entry.state == DatasetState::kReady && entry.source.overlay != nullptr;
     report.push_back(std::move(status));
   }
   std::ranges::sort(report, {}, [](const DatasetStatus& status) { return InNaturalOrder(status.name); });

@@ -2,12 +2,15 @@
 // is tried again at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that
 // nobody uses may be unloaded, the least recently used one first; they are loaded again when they are asked for.
 //
-// A dataset with several levels holds no voxels itself. Each level is an entry beside it (LevelName), which is loaded at its first use like
-// a dataset, and goes with it.
+// Beside a dataset stand entries of its parts, which are loaded at their first use like a dataset, and go with it: a field at a time
+// (PartName) other than what the dataset's own source shows, and each level (LevelName) of what has several. What has several levels holds
+// no voxels itself.
 //
 // Names come and go, and files change. Voxels that have left the table, but that frames are still rendered from, are retired:
 // they stay until no frame uses them.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <cstdint>
 #include <functional>
@@ -31,10 +34,23 @@ namespace slabstream {
 
 using LoadId = std::uint32_t;
 
-// The entry of a level. No dataset of a catalogue has such a name.
+// Entries of parts. No dataset of a catalogue has such a name.
 inline std::string LevelName(const std::string& name, int level) { return name + '\n' + std::to_string(level); }
-inline bool IsLevelName(const std::string& name) { return name.find('\n') != std::string::npos; }
-inline std::string DatasetOfLevel(const std::string& name) { return name.substr(0, name.find('\n')); }
+inline std::string PartName(const std::string& dataset, int field, int time) {
+  return fmt::format("{}\nfield {} time {}", dataset, field, time);
+}
+inline bool IsPart(const std::string& name) { return name.find('\n') != std::string::npos; }
+inline bool IsLevelName(const std::string& name) { return IsPart(name) && name.find(' ', name.rfind('\n')) == std::string::npos; }
+inline std::string DatasetOfPart(const std::string& name) { return name.substr(0, name.find('\n')); }
+
+inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
+
+// An entry of the table, named for messages: dataset "scan", or level 2 of field 1 time 0 of dataset "scan".
+inline std::string Named(const std::string& entry) {
+  const std::size_t last = entry.rfind('\n');
+  if (last == std::string::npos) return "dataset " + InQuotes(entry);
+  return (IsLevelName(entry) ? "level " : "") + entry.substr(last + 1) + " of " + Named(entry.substr(0, last));
+}
 
 class DatasetTable {
  public:
@@ -47,11 +63,14 @@ class DatasetTable {
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
-    std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change
-    std::string error;                             // kFailed only
-    std::uint64_t bytes = 0;                       // kReady only: memory of its voxels beside what the source holds
-    std::uint64_t last_use = 0;                    // greater: later
-    CheckCounter checks;                           // at its files, while it is ready
+    std::shared_ptr<const DatasetFields> fields;   // of a dataset, once it was ready; null: it has one field, of which nothing is known
+    // Of a dataset with several times: the statistics of fields at the time that it shows itself, as far as they are known.
+    std::map<int, std::shared_ptr<const VolumeSummary>> statistics;
+    std::shared_ptr<const FileStamp> stamp;  // kReady only: of its files as they were read; null: they never change
+    std::string error;                       // kFailed only
+    std::uint64_t bytes = 0;                 // kReady only: memory of its voxels beside what the source holds
+    std::uint64_t last_use = 0;              // greater: later
+    CheckCounter checks;                     // at its files, while it is ready
     // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
     CheckId awaited = 0;
   };
@@ -71,18 +90,19 @@ class DatasetTable {
   // ---- the catalogue
   void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
   void Await(const std::string& name, CheckId check);
-  void Remove(const std::string& name);  // retires its voxels
-  std::set<std::string> folders;         // folders that are watched
+  void AddPart(const std::string& name, DataSource source, Time now);  // unless it is there
+  void Remove(const std::string& name);                                // retires its voxels
+  std::set<std::string> folders;                                       // folders that are watched
 
   // ---- voxels
   LoadId BeginLoad(const std::string& name, Time now);  // begins to load a dataset that is unloaded or failed
   void Use(const std::string& name);                    // a request asks for it
   // The end of a load. False: another one was begun since, or none; nothing changes.
   bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes,
-              std::shared_ptr<const FileStamp> stamp, Time now);
+              std::shared_ptr<const FileStamp> stamp, std::shared_ptr<const DatasetFields> fields, Time now);
   // The same of a dataset with several levels, which are entries from then on.
   bool Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
-              std::shared_ptr<const FileStamp> stamp, Time now);
+              std::shared_ptr<const FileStamp> stamp, std::shared_ptr<const DatasetFields> fields, Time now);
   bool IsLoading(const std::string& name, LoadId load) const;
   // Both retire the voxels that it has. The first one as if it had never been loaded.
   void Reset(const std::string& name, Time now);
@@ -100,15 +120,16 @@ class DatasetTable {
 
  private:
   void Retire(const Entry& entry);
-  void RemoveLevels(const std::string& name);
+  void RemoveParts(const std::string& name);
+  static Entry Forgotten(Entry& entry, Time now);
   template <class Table, class Visit>
   static void VisitAll(Table& table, Visit&& visit) {
     for (auto& [name, entry] : table.entries_) visit(name, entry);
-    for (auto& [name, entry] : table.levels_) visit(name, entry);
+    for (auto& [name, entry] : table.parts_) visit(name, entry);
   }
 
   std::map<std::string, Entry> entries_;
-  std::map<std::string, Entry> levels_;         // by LevelName
+  std::map<std::string, Entry> parts_;          // by LevelName and PartName
   std::map<DatasetId, std::uint64_t> retired_;  // and the memory of each
   LoadId last_load_ = 0;
   std::uint64_t uses_ = 0;

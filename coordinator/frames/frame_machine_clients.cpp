@@ -27,8 +27,10 @@ FrameKind KindOf(const FrameRequest& frame) {
 
 }  // namespace
 
-void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& message) {
+void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& submitted) {
   const PeerToken client = event.from;
+  SubmitFrame message = submitted;
+  message.frame = WithOverlayAsField(std::move(message.frame));
   clients.Meet(client, now);
   if (IsOpen(client, message.request)) return;
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
@@ -80,7 +82,7 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   }
   const VolumeGeometry& drawn = ready.summary->description.geometry;
   const VolumeGeometry& finest = ready.levels == nullptr ? drawn : ready.levels->levels.front().geometry;
-  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(asked, finest, drawn), ready.dataset, ready.summary);
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(asked, finest, drawn), ready.dataset, ready.summary, ready.fields);
   if (!resolved.ok()) return resolved.status();
   resolved->map = ready.map;
   resolved->coarser = ready.coarser;

@@ -61,12 +61,23 @@ struct OpenRequest {
     std::vector<DatasetId> datasets() const {
       std::vector<DatasetId> all = {volume().dataset()};
       for (const CoarserVolume& level : resolved->coarser) all.push_back(level.dataset);
+      for (const FieldVolume& field : resolved->fields.others) {
+        for (const CoarserVolume& level : field.levels) all.push_back(level.dataset);
+      }
       if (resolved->light) all.push_back(resolved->light->dataset);
+      return all;
+    }
+    static std::vector<DatasetId> FieldsOf(const ShownFields& fields) {
+      std::vector<DatasetId> all;
+      for (const FieldVolume& field : fields.others) {
+        for (const CoarserVolume& level : field.levels) all.push_back(level.dataset);
+      }
       return all;
     }
     bool DrawsFrom(const DatasetReady& ready) const {
       return volume().dataset() == ready.dataset &&
              std::ranges::equal(resolved->coarser, ready.coarser, {}, &CoarserVolume::dataset, &CoarserVolume::dataset) &&
+             std::ranges::equal(FieldsOf(resolved->fields), FieldsOf(ready.fields)) &&
              (resolved->light ? resolved->light->dataset : 0) == (ready.light ? ready.light->dataset : 0);
     }
   };

@@ -17,13 +17,19 @@ std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
   return std::min(kBoxBytesTarget, BoxBytesFor(setup, request.worker_memory));
 }
 
+// Each field as it is drawn beside the finest level.
+ShownFields AtOneLevel(ShownFields fields) {
+  for (FieldVolume& field : fields.others) field.of_volume = {field.of_volume.front()};
+  return fields;
+}
+
 // Whether the frame fits if it is drawn from this level. Nobody may have loaded it, so it counts as one that is read in parts.
 bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const VolumeLevels& levels, const PlanRequest& request) {
   constexpr Index3 kSomeBlock = {32, 32, 32};
   auto summary = std::make_shared<VolumeSummary>(UnreadSummary(level, *levels.overview));
   summary->stored = StoredAt{.source = {}, .block = {{0, 0, 0}, kSomeBlock}};
-  Result<ResolvedRequest> resolved =
-      ResolveRequest(AtLevel(frame, levels.levels.front().geometry, level.geometry), request.resolved->volume.dataset(), summary);
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(frame, levels.levels.front().geometry, level.geometry),
+                                                    request.resolved->volume.dataset(), summary, AtOneLevel(request.resolved->fields));
   if (!resolved.ok()) return false;
   resolved->frame.shading = {};  // its light volume is that of the dataset, whichever level is drawn
   Result<FrameSetup> setup = MakeFrameSetup(*resolved);

@@ -77,7 +77,6 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
     sample.label.emplace();
     if (number > 0 && number <= labels.size()) *sample.label = {labels[number - 1].value, labels[number - 1].name};
   }
-  if (volume.overlay != nullptr) sample.overlay = finite(SampleOf(VoxelBricks(*volume.overlay), voxel));
   return sample;
 }
 

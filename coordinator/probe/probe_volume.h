@@ -33,7 +33,7 @@ class ProbedVoxels {
 
 struct ProbeVolume {
   ProbedVoxels voxels;
-  const BrickedVoxels *labels = nullptr, *overlay = nullptr;  // null: there is no such layer
+  const BrickedVoxels* labels = nullptr;  // null: there are none
   // The data value of a voxel inside the volume, where its stored sample may be rounded. Null: it never is.
   std::function<ExactValue(const Index3& voxel)> exact = nullptr;
 

@@ -27,6 +27,7 @@ struct Dataset {
   std::shared_ptr<const VolumeSummary> summary;
   DatasetId id;
   std::optional<WholeNumbers> exact = {};  // where stored samples round them
+  ShownFields fields = {};                 // AnswerQuestion::fields
 };
 
 WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
@@ -39,8 +40,22 @@ WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
   return found;
 }
 
-Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary) {
-  Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
+// What the picture is shown with.
+Result<TransferFunction> TransferOf(const SummaryQuery& query, const VolumeSummary& summary, const ShownFields& fields) {
+  FrameRequest picture = PictureOf(query);
+  picture.transfer = query.transfer;
+  picture.fields = query.looks;
+  if (query.flat) picture.clipping.slab.emplace();
+  const Result<bool> channel = ShowsAsChannel(picture, fields);
+  if (!channel.ok()) return channel.status();
+  if (!*channel) return ResolveTransfer(query.transfer, summary);
+  Result<FieldLook> look = LookOf(picture, *fields.dataset, fields.volume, summary, query.flat);
+  if (!look.ok()) return look.status();
+  return std::move(look->transfer);
+}
+
+Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary, const ShownFields& fields) {
+  Result<TransferFunction> transfer = TransferOf(query, summary, fields);
   if (!transfer.ok()) return transfer.status();
   SummaryReply reply{.nonce = query.nonce,
                      .description = summary.description,
@@ -55,7 +70,9 @@ Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSumma
   return QuestionReply(std::move(reply));
 }
 
-Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) { return AnswerSummary(query, *dataset.summary); }
+Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) {
+  return AnswerSummary(query, *dataset.summary, dataset.fields);
+}
 
 Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
   SampleReply reply{.nonce = query.nonce};
@@ -98,7 +115,7 @@ Result<QuestionReply> Answer(const JointHistogramQuery& query, const Dataset& da
 }
 
 Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
-  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary);
+  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary, dataset.fields);
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
@@ -111,15 +128,15 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   return QuestionReply(std::move(reply));
 }
 
-Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& finest,
-                                 const std::shared_ptr<const VolumeSummary>& overview) {
-  const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed);
+Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& finest, const std::shared_ptr<const VolumeSummary>& overview,
+                                 const ShownFields& fields) {
+  const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed, fields);
   if (!chosen.ok()) return chosen.status();
   if (Status status = CheckView(chosen->view, finest); !status.ok()) return status;
   return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
 }
 Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
-  return AnswerView(query, dataset.summary->description.geometry, dataset.summary);
+  return AnswerView(query, dataset.summary->description.geometry, dataset.summary, dataset.fields);
 }
 
 // ---- voxels that nobody holds are read for the answer
@@ -223,33 +240,59 @@ Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQ
 }
 
 Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
-  return AnswerSummary(query, *asked.summary);
+  return AnswerSummary(query, *asked.summary, asked.fields);
 }
 
 Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
-  return AnswerView(query, asked.summary->description.geometry, asked.summary);
+  return AnswerView(query, asked.summary->description.geometry, asked.summary, asked.fields);
 }
 
-}  // namespace
-
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
-  if (asked.levels != nullptr) {
-    return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary);
+// The values of the overlay at the voxels that samples tell of.
+Status AddOverlay(const AnswerQuestion& asked, const VoxelServer::Samples& overlay, std::span<VolumeSample> samples) {
+  const VolumeGeometry& grid = asked.summary->description.geometry;
+  const VolumeDescription& of = asked.overlay_summary->description;
+  std::optional<ReadVoxels> read;
+  if (overlay.in_parts.source != nullptr) read.emplace(overlay.in_parts);
+  const ProbeVolume volume{.voxels = read ? read->voxels() : ProbedVoxels(overlay.view())};
+  for (VolumeSample& sample : samples) {
+    const Vec3 p = DataPoint(of.geometry, grid.ToWorld(ToVec3(sample.voxel)));
+    if (!sample.inside || !of.geometry.bounds().Contains(VoxelAt(p))) continue;
+    const double value = of.mapping.FromStored(volume.Interpolated(p));
+    if (std::isfinite(value)) sample.overlay = value;
   }
-  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
+  return read ? read->status() : Status::Ok();
+}
+
+Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
+  if (asked.levels != nullptr) {
+    return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary, asked.fields);
+  }
+  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary, asked.fields);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
   }
-  ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
+  ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get()};
   if (const ExactSamples* const exact = samples.exact.get()) {
     volume.exact = [exact, size = samples.box().size()](const Index3& voxel) {
       return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
     };
   }
-  Dataset dataset{volume, asked.summary, asked.dataset};
+  Dataset dataset{.volume = volume, .summary = asked.summary, .id = asked.dataset, .fields = asked.fields};
   if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
+}
+
+}  // namespace
+
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay) {
+  Result<QuestionReply> reply = AnswerOf(asked, samples);
+  if (!reply.ok() || !overlay.any()) return reply;
+  Status added = Status::Ok();
+  if (auto* const points = std::get_if<SampleReply>(&*reply)) added = AddOverlay(asked, overlay, points->samples);
+  if (auto* const pick = std::get_if<PickReply>(&*reply); pick != nullptr && pick->sample)
+    added = AddOverlay(asked, overlay, {&*pick->sample, 1});
+  return added.ok() ? std::move(reply) : added;
 }
 
 }  // namespace slabstream

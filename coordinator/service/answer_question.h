@@ -8,6 +8,7 @@ namespace slabstream {
 
 // Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
 // Any thread.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples);
+// `overlay`: of AnswerQuestion::overlay.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay = {});
 
 }  // namespace slabstream

@@ -15,7 +15,7 @@
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/mesh/summarize_cells.h"
-#include "common/planning/layer_bricks.h"
+#include "common/planning/other_bricks.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/text/url.h"
 #include "common/threads/guarded.h"
@@ -23,6 +23,7 @@
 #include "coordinator/service/answer_question.h"
 #include "coordinator/service/dataset_id.h"
 #include "data/catalogue/client_file.h"
+#include "data/catalogue/dataset_fields.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
 
@@ -84,7 +85,7 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
   OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
                                                      : count(samples.view(), drawn);
-  AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
+  AddBricks(OtherBricks(*action.summary, action.volume), *action.summary, grid);
   return std::make_shared<const OccupancyGrid>(std::move(grid));
 }
 
@@ -153,11 +154,11 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   }
   samples.exact = loaded.exact;
   if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
-  if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   samples.description = volume->description;
   const DatasetId id = IdOf(action.name, *volume, layers, loaded.exact.get());
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp}, id, std::move(samples)};
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file)},
+              id, std::move(samples)};
 }
 
 // The levels of a source, or its only one.
@@ -177,8 +178,13 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
     if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
   }
-  if (sources.size() == 1) return LoadLevel(action, *sources.front().at_level, tell);
-  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp}};
+  const std::shared_ptr<const DatasetFields> fields = FieldsOf(action.source, info);
+  if (sources.size() == 1) {
+    Result<News> loaded = LoadLevel(action, *sources.front().at_level, tell);
+    if (loaded.ok()) std::get<DatasetLoaded>(loaded->event).fields = fields;
+    return loaded;
+  }
+  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp, fields}};
 }
 
 // Holds the voxels of the level if there is room for them.
@@ -229,7 +235,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
-  const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
+  const std::string barrier = Named(action.name) + " could not be loaded";
   const auto load = [action, inbox = inbox_] {
     const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
     Result<News> news = Load(action, tell);
@@ -239,7 +245,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const auto failed = EndOf<DatasetFailed>(action.name, action.load);
   const DataSource& source = action.source;
   FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
-  for (const std::string& layer : {source.layers.labels, source.layers.overlay}) server = server != 0 ? server : ServerOf(layer);
+  server = server != 0 ? server : ServerOf(source.layers.labels);
   if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
   return Post(loads_, barrier.c_str(), load, failed);
 }
@@ -273,7 +279,10 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   const std::optional<StoredAt>& stored = action.summary->stored;
   return PostResult(
       answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset)] { return AnswerTo(action, samples); }, EndOf<QuestionAnswered>(action.id));
+      [action, samples = voxels_.Find(action.dataset), overlay = voxels_.Find(action.overlay)] {
+        return AnswerTo(action, samples, overlay);
+      },
+      EndOf<QuestionAnswered>(action.id));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {

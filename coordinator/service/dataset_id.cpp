@@ -37,10 +37,8 @@ DatasetId IdOf(const std::string& name, const VolumeDescription& description, co
 
 DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers, const ExactSamples* exact) {
   std::string of_layers;
-  for (const Volume* layer : {layers.labels.get(), layers.overlay.get()}) {
-    if (layer != nullptr) of_layers += fmt::format(" {} {:x}", int(layer->block.type), Digest(layer->block.bytes));
-    of_layers += ",";
-  }
+  if (const Volume* const labels = layers.labels.get())
+    of_layers = fmt::format(" {} {:x}", int(labels->block.type), Digest(labels->block.bytes));
   for (const Label& label : layers.table == nullptr ? std::vector<Label>() : layers.table->labels) {
     of_layers += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
   }

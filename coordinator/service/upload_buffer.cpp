@@ -74,7 +74,6 @@ Result<DataSource> UploadBuffer::Finish() {
   }
   LayeredVolume whole;
   whole.volume = std::move(parts_[std::size_t(Layer::kVolume)]);
-  whole.layers.overlay = std::move(parts_[std::size_t(Layer::kOverlay)]);
   if (const auto labels = std::move(parts_[std::size_t(Layer::kLabels)])) {
     const std::uint32_t most = VisitScalarType(labels->block.type, [&]<class T>(const T*) {
       const T* const samples = labels->block.samples<T>();
@@ -89,6 +88,10 @@ Result<DataSource> UploadBuffer::Finish() {
   }
   DataSource source(DataLoader([whole](const TellRead&) -> Result<LoadedData> { return LoadedData{whole}; }));
   source.held_bytes = BytesToSend(order_);
+  if (auto overlay = std::shared_ptr<const Volume>(std::move(parts_[std::size_t(Layer::kOverlay)]))) {
+    source.overlay =
+        std::make_shared<const DataSource>(VolumeLoader([overlay]() -> Result<std::shared_ptr<const Volume>> { return overlay; }));
+  }
   return source;
 }
 

@@ -112,9 +112,7 @@ Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& 
   if (part.layer == Layer::kVolume && samples.volume != nullptr) {
     return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
   }
-  const BrickedVoxels& bricks = part.layer == Layer::kVolume   ? *samples.bricks
-                                : part.layer == Layer::kLabels ? *samples.labels
-                                                               : *samples.overlay;
+  const BrickedVoxels& bricks = part.layer == Layer::kVolume ? *samples.bricks : *samples.labels;
   UnwrittenVector<std::byte> cut(part.bytes);
   VoxelBricks(bricks).Read(box, part.begin, cut);
   return Bytes(std::move(cut));

@@ -41,7 +41,7 @@ class VoxelServer {
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
-    std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
+    std::shared_ptr<const BrickedVoxels> labels = nullptr;
     std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
     std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
@@ -62,7 +62,7 @@ class VoxelServer {
     }
     std::uint64_t bytes() const {
       if (in_parts.source != nullptr) return 0;
-      const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
+      const std::uint64_t of_layers = labels == nullptr ? 0 : labels->bytes();
       const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes(), of_exact = exact == nullptr ? 0 : exact->bytes.size();
       return of_layers + of_cells + of_exact + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
@@ -70,7 +70,6 @@ class VoxelServer {
       if (in_parts.source != nullptr) return in_parts.description().type;
       LayerTypes layers;
       if (labels != nullptr) layers.labels = labels->type();
-      if (overlay != nullptr) layers.overlay = overlay->type();
       layers.cells = cells != nullptr;
       return {volume != nullptr ? volume->block.type : bricks->type(), layers};
     }

@@ -167,7 +167,9 @@ Status CheckHeaders(const DataSource& data) {
   if (!source.ok()) return source.status();
   source->options.describe = true;
   if (const auto files = CheckVolumeHeaders(source->path, source->options); !files.ok()) return files.status();
-  return CheckLayerHeaders(data.layers).status();
+  if (const auto files = CheckLayerHeaders(data.layers); !files.ok()) return files.status();
+  const Status overlay = data.overlay != nullptr ? CheckHeaders(*data.overlay) : Status::Ok();
+  return overlay.ok() ? overlay : Status(overlay.code(), "overlay: " + overlay.message());
 }
 
 // Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.
@@ -242,11 +244,19 @@ Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::strin
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }
 
+// Channels and times are those of the dataset. Of a voxel's components it has the first one.
+void WarnOfComponents(const SourceText& text, const SourceInfo& info) {
+  ReadOptions options = text.options;
+  options.time.emplace();
+  if (info.components > 1) WarnOfPart(text.path, options, info);
+}
+
 // The voxels, those of layers too.
 Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const LayerFiles& layers) {
   Result<LoadedVolume> read = ReadVolume(source, text.path, text.options);
   if (!read.ok()) return read.status();
   if (!read->rounding.empty()) LogWarning(text.path + ": " + read->rounding);
+  WarnOfComponents(text, read->info);
   Result<Layers> with = ReadLayers(layers, read->info.finest().geometry);
   if (!with.ok()) return with.status();
   return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr, std::move(read->exact)});
@@ -289,7 +299,7 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
     way.read = [path = data.path, most_bytes, &progress] { return ReadStream(path, most_bytes, progress); };
   } else {
     way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, &progress] {
-      WarnOfPart(text.path, text.options, source->info());
+      WarnOfComponents(text, source->info());
       return Surveyed(source, place, FindIndex(source_text, source->info()), progress);
     };
   }

@@ -46,7 +46,11 @@ using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 struct DataSource {
   DataSource() = default;
   DataSource(std::string from_path, std::string of_folder, LayerFiles with_layers = {})
-      : path(std::move(from_path)), folder(std::move(of_folder)), layers(std::move(with_layers)) {}
+      : path(std::move(from_path)), folder(std::move(of_folder)), layers(std::move(with_layers)) {
+    if (layers.overlay.empty()) return;
+    overlay = std::make_shared<const DataSource>(std::move(layers.overlay), folder);
+    layers.overlay.clear();
+  }
   template <std::convertible_to<DataLoader> Loader>
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
@@ -59,7 +63,8 @@ struct DataSource {
 
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;   // the files of the layers; only a named dataset has them
+  LayerFiles layers;   // the files of its labels; only a named dataset has them
+  std::shared_ptr<const DataSource> overlay = {};  // a field with a grid of its own; null: there is none
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
   DataLoader load;                         // set: `path` and `layers` are not used

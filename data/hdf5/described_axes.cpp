@@ -8,7 +8,7 @@
 #include "data/hdf5/hdf5_image.h"
 #include "data/metadata/json_fields.h"
 #include "data/sources/axis_kind.h"
-#include "data/sources/even_steps.h"
+#include "data/volume_io/even_steps.h"
 #include "data/volume_io/length_names.h"
 
 namespace slabstream {
@@ -89,7 +89,7 @@ void TakeSizes(Hdf5File& file, const std::string& path, ImageDescription& image)
 // Where coordinates are even, they place the axis.
 void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t size, ImageAxis& axis, ImageDescription& image) {
   const AxisKind kind = AxisNamed(axis.name);
-  if (scale.empty() || kind == AxisKind::kTime || kind == AxisKind::kChannel) return;
+  if (scale.empty() || kind == AxisKind::kChannel) return;
   // netCDF writes a scale for each dimension, also where no variable has its coordinates.
   if (file.Text(scale, "NAME").value_or("").starts_with("This is a netCDF dimension but not a netCDF variable")) return;
   const Result<std::vector<double>> values = file.SmallDataset(scale);
@@ -97,6 +97,11 @@ void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t siz
   const std::string unit = file.Text(scale, "units").value_or(file.Text(scale, "unit").value_or(""));
   const std::string named = Printable(LastPart(scale) + (unit.empty() ? "" : " (" + unit + ")"));
   const std::optional<EvenSteps> even = EvenStepsOf(*values);
+  if (kind == AxisKind::kTime) {
+    if (even) axis.step = even->step;
+    axis.time_unit = unit.substr(0, unit.find(' '));  // "hours since 2000-01-01"
+    return;
+  }
   if (!even && size > 1) {
     LogWarning(fmt::format("{}: coordinates {} are not evenly spaced; voxels along it are shown at a distance of 1", file.path(), named));
     return;

@@ -9,6 +9,7 @@
 #include "data/sources/axis_choice.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/stated_field.h"
 #include "data/volume_io/world_placement.h"
 
 namespace slabstream {
@@ -142,6 +143,10 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
                   .notes = std::move(image->notes),
                   .files = {file->path()}};
   choice->Describe(pyramid.info);
+  if (const auto time = std::ranges::find(*kinds, AxisKind::kTime); time != kinds->end()) {
+    const ImageAxis& axis = image->axes[std::size_t(time - kinds->begin())];
+    pyramid.info.times = StatedTimes(choice->times, axis.step, axis.time_unit);
+  }
   pyramid.info.notes.insert(pyramid.info.notes.begin(), NoteOfAxes(*image, *kinds));
   return pyramid;
 }

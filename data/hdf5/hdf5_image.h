@@ -17,9 +17,10 @@ namespace slabstream {
 
 struct ImageAxis {
   std::string name = {};                // as AxisNamed knows them ("z"), or any other; "": it has none
-  double step = 1, start = 0;           // for x, y and z: voxel i lies at start + i * step along `direction`, in `unit`
+  double step = 1, start = 0;           // for x, y, z and time: voxel i lies at start + i * step along `direction`, in `unit`
   std::optional<Vec3> direction = {};   // in the world; none: that of the world's axis of this name
   std::optional<LengthUnit> unit = {};  // if the file states one that is known
+  std::string time_unit = {};           // of the step of an axis of time, as the file spells it
 };
 
 struct ImageDescription {

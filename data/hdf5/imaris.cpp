@@ -2,7 +2,10 @@
 // large the image is. Source: https://imaris.oxinst.com/learning/view/article/imaris-5-5-file-format-description
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
+#include <limits>
+#include <sstream>
 
 #include "common/base/log.h"
 #include "common/text/parse_number.h"
@@ -11,6 +14,7 @@
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream {
 namespace {
@@ -42,13 +46,46 @@ std::optional<Extent> ExtentOf(Hdf5File& file) {
   return extent;
 }
 
-// "0.000 255.000"
-std::optional<ValueRange> WindowOf(Hdf5File& file, int channel) {
-  const std::string text = file.Text(fmt::format("/DataSetInfo/Channel {}", channel), "ColorRange").value_or("");
-  const std::size_t space = text.find(' ');
-  if (space == std::string::npos) return std::nullopt;
-  const auto min = ParseNumber<float>(text.substr(0, space)), max = ParseNumber<float>(text.substr(space + 1));
-  return min && max && *min < *max && std::isfinite(*min) && std::isfinite(*max) ? std::optional(ValueRange{*min, *max}) : std::nullopt;
+// "0.000 255.000"; NaN where a word is no number.
+std::vector<double> NumbersIn(const std::string& text) {
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) numbers.push_back(ParseNumber<double>(word).value_or(std::numeric_limits<double>::quiet_NaN()));
+  return numbers;
+}
+
+FieldInfo ChannelOf(Hdf5File& file, int number) {
+  const auto text = [&](const char* attribute) {
+    return file.Text(fmt::format("/DataSetInfo/Channel {}", number), attribute).value_or("");
+  };
+  FieldInfo channel{.name = text("Name").substr(0, kMostNameBytes)};
+  const std::vector<double> window = NumbersIn(text("ColorRange")), color = NumbersIn(text("Color"));
+  if (window.size() == 2) channel.window = StatedWindow(window[0], window[1]);
+  // A channel may have a table of colours instead.
+  if (color.size() == 3 && text("ColorMode") != "TableColor") channel.color = StatedColor(color[0], color[1], color[2]);
+  return channel;
+}
+
+// Seconds since some day of "2008-01-31 23:59:59.250"; NaN: it is none.
+double SecondsOf(const std::string& stamp) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (stamp.size() < 19 || stamp.find_first_not_of("0123456789-: .") != std::string::npos) return kNone;
+  const std::string_view text = stamp;
+  const auto whole = [&](std::size_t begin, std::size_t size) { return ParseNumber<unsigned>(text.substr(begin, size)).value_or(9999); };
+  const std::chrono::year_month_day day{std::chrono::year(int(whole(0, 4))), std::chrono::month(whole(5, 2)),
+                                        std::chrono::day(whole(8, 2))};
+  const double of_minute = ParseNumber<double>(text.substr(17)).value_or(kNone);
+  if (!day.ok() || whole(11, 2) > 23 || whole(14, 2) > 59) return kNone;
+  const auto days = std::chrono::sys_days(day).time_since_epoch().count();
+  return 86400.0 * double(days) + 3600 * whole(11, 2) + 60 * whole(14, 2) + of_minute;
+}
+
+TimeAxis TimesOf(Hdf5File& file, int count) {
+  std::vector<double> seconds;
+  for (int i = 1; i <= count && (seconds.empty() || !std::isnan(seconds.back())); ++i) {
+    seconds.push_back(SecondsOf(file.Text("/DataSetInfo/TimeInfo", fmt::format("TimePoint{}", i)).value_or("")));
+  }
+  return StatedTimes(count, seconds, "s");
 }
 
 // z, y, x. Empty: the file does not say.
@@ -69,22 +106,19 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   if (!levels.ok()) return levels.status();
   const Result<std::vector<std::string>> times = file->Names("/DataSet/ResolutionLevel 0");
   if (!times.ok()) return times.status();
-  pyramid.info.times = CountNumbered(*times, "TimePoint ");
-  const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times, options);
+  pyramid.info.times = TimesOf(*file, CountNumbered(*times, "TimePoint "));
+  const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times.count, options);
   if (!time.ok()) return time.status();
   pyramid.info.time = int(*time);
 
   const Result<std::vector<std::string>> channels = file->Names(fmt::format("/DataSet/ResolutionLevel 0/TimePoint {}", *time));
   if (!channels.ok()) return channels.status();
   const int channel_count = CountNumbered(*channels, "Channel "), level_count = CountNumbered(*levels, "ResolutionLevel ");
-  for (int i = 0; i < channel_count; ++i) {
-    pyramid.info.channels.push_back(file->Text(fmt::format("/DataSetInfo/Channel {}", i), "Name").value_or("").substr(0, kMostNameBytes));
-  }
+  for (int i = 0; i < channel_count; ++i) pyramid.info.channels.push_back(ChannelOf(*file, i));
   if (pyramid.info.channels.empty()) return Status::InvalidArgument(file->path() + ": not an Imaris volume: it has no channel");
   const Result<int> channel = ChosenChannel(file->path(), pyramid.info.channels, options);
   if (!channel.ok()) return channel.status();
   pyramid.info.channel = *channel;
-  pyramid.info.window = WindowOf(*file, *channel);
 
   const std::optional<Extent> extent = ExtentOf(*file);
   if (extent) {

@@ -87,6 +87,10 @@ Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Datas
       const auto cosines = file.Numbers(dimension, "direction_cosines");
       if (cosines && cosines->size() == 3) axis.direction = Vec3{(*cosines)[0], (*cosines)[1], (*cosines)[2]};
     }
+    if (name == "time") {
+      if (const auto step = file.Numbers(fmt::format("{}/dimensions/time", kRoot), "step")) axis.step = step->front();
+      axis.time_unit = "s";
+    }
     image.axes.push_back(std::move(axis));
   }
   if (Status status = DescribeScale(file, dataset, image); !status.ok()) return status;

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "data/hdf5/hdf5_image.h"
+#include "data/volume_io/even_steps.h"
 
 namespace slabstream {
 namespace {
@@ -48,7 +49,11 @@ Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Datas
                     file.path(), extent.size(), origin.size(), spacing.size(), direction.size()));
   }
   ImageDescription image{.format = "VTKHDF", .axes_from = "VTKHDF", .world = World::kScene, .origin = {origin[0], origin[1], origin[2]}};
-  if (file.Has(kRoot + "/Steps")) image.axes.push_back({"t"});
+  if (file.Has(kRoot + "/Steps")) {
+    const Result<std::vector<double>> times = file.SmallDataset(kRoot + "/Steps/Values");
+    const std::optional<EvenSteps> even = times.ok() ? EvenStepsOf(*times) : std::nullopt;
+    image.axes.push_back({.name = "t", .step = even ? even->step : 1});
+  }
   std::vector<std::uint64_t> sides;  // z, y, x
   for (std::size_t i = 3; i-- > 0;) {
     const double points = extent[2 * i + 1] - extent[2 * i] + 1, half = cells && points > 1 ? 0.5 : 0;

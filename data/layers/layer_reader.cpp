@@ -231,20 +231,6 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
   return Status::Ok();
 }
 
-Status AddOverlay(const std::string& file, const VolumeGeometry& grid, Layers& layers) {
-  const Result<SourceText> source = ParseSourceText(file);
-  if (!source.ok()) return source.status();
-  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
-  if (!read.ok()) return read.status();
-  if (Status status = CheckSameWorld(read->info.finest().geometry, grid); !status.ok()) {
-    return Status(status.code(), source->path + ": " + status.message());
-  }
-  const VolumeDescription description{.geometry = grid, .type = ScalarType::kFloat32, .mapping = {}};
-  if (Status status = CheckFitsMemory(description.voxel_bytes(), source->path); !status.ok()) return status;
-  layers.overlay = AsVolume(grid, InterpolatedOn(grid, *read->volume));
-  return Status::Ok();
-}
-
 }  // namespace
 
 void SetLabelFiles(const std::string& text, LayerFiles& files) {
@@ -292,9 +278,6 @@ Result<Layers> ReadLayers(const LayerFiles& files, const VolumeGeometry& grid) {
   Layers layers;
   if (!files.labels.empty()) {
     if (Status status = AddLabels(files, grid, layers); !status.ok()) return Prefixed(kLabels, status);
-  }
-  if (!files.overlay.empty()) {
-    if (Status status = AddOverlay(files.overlay, grid, layers); !status.ok()) return Prefixed(kOverlay, status);
   }
   return layers;
 }

@@ -57,31 +57,6 @@ bool IsInside(const Vec3& p, const Index3& size) {
   return inside;
 }
 
-// The trilinear value at a position inside; `value(v)` is that of a voxel.
-template <class Value>
-double Interpolated(const Vec3& p, const Index3& size, Value&& value) {
-  Index3 low, high;
-  Vec3 fraction;
-  for (const Axis axis : kAxes) {
-    const double q = std::clamp(p[axis], 0.0, double(size[axis] - 1));
-    low[axis] = std::int32_t(q);
-    fraction[axis] = q - low[axis];
-    high[axis] = std::min(low[axis] + 1, size[axis] - 1);
-  }
-  double sum = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    Index3 v;
-    double weight = 1;
-    for (const Axis axis : kAxes) {
-      const bool upper = (corner >> Number(axis) & 1) != 0;
-      v[axis] = upper ? high[axis] : low[axis];
-      weight *= upper ? fraction[axis] : 1 - fraction[axis];
-    }
-    if (weight > 0) sum += weight * value(v);  // a voxel without a part may have any value
-  }
-  return sum;
-}
-
 }  // namespace
 
 VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, const VoxelBlock& numbers, ScalarType type) {
@@ -93,22 +68,6 @@ VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, co
       if (!IsInside(p, layer.size)) return;
       const auto nearest = [](double q) { return std::int32_t(std::floor(q + 0.5)); };
       to[offset] = To(from[numbers.Offset({nearest(p.x), nearest(p.y), nearest(p.z)})]);
-    });
-  });
-  return block;
-}
-
-VoxelBlock InterpolatedOn(const VolumeGeometry& grid, const Volume& layer) {
-  VoxelBlock block = MakeVoxelBlock(grid.bounds(), ScalarType::kFloat32);
-  VisitScalarType(layer.block.type, [&]<class From>(const From*) {
-    const Index3 size = layer.description.geometry.size;
-    const ValueMapping mapping = layer.description.mapping;
-    const From* const from = layer.block.samples<From>();
-    auto* const to = block.samples<float>();
-    const auto value = [&](const Index3& v) { return mapping.FromStored(double(from[layer.block.Offset(v)])); };
-    ForEachVoxel(grid, layer.description.geometry, [&](std::size_t offset, const Vec3& p) {
-      const float sample = IsInside(p, size) ? float(Interpolated(p, size, value)) : std::numeric_limits<float>::quiet_NaN();
-      to[offset] = std::isfinite(sample) ? sample : std::numeric_limits<float>::quiet_NaN();
     });
   });
   return block;

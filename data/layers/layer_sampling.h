@@ -16,8 +16,4 @@ namespace slabstream {
 // outside. If two voxels are equally near, the one with the higher index counts.
 VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, const VoxelBlock& numbers, ScalarType type);
 
-// Data values as float32, by trilinear interpolation; between the outermost voxels' centres and the layer's border the outermost value. NaN
-// outside, and where a voxel with a part in the value has none that is finite.
-VoxelBlock InterpolatedOn(const VolumeGeometry& grid, const Volume& layer);
-
 }  // namespace slabstream

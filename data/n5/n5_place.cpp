@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "data/volume_io/length_names.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream::n5 {
 namespace {
@@ -120,6 +121,18 @@ Result<std::vector<std::string>> AxisNames(const Field& own, const Field& group,
                            fmt::join(size.rbegin(), size.rend(), " x ")));
   }
   return std::vector<std::string>(size.size());
+}
+
+TimeAxis TimesOf(const Field& own, const Field& group, int count) {
+  for (const Field* const attributes : {&own, &group}) {
+    const Field transform = (*attributes)["transform"], units = transform["units"];
+    const std::vector<std::string> axes = TextsOf(transform["axes"]);
+    const auto axis = std::size_t(std::ranges::find(axes, "t") - axes.begin());
+    const Result<double> of_transform = transform["scale"][axis].Number(), interval = (*attributes)["frameInterval"].Number();
+    if (axis < axes.size() && of_transform.ok()) return StatedTimes(count, *of_transform, units[axis].is_text() ? *units[axis].Text() : "");
+    if (interval.ok()) return StatedTimes(count, *interval, "");
+  }
+  return {.count = count};
 }
 
 Result<std::optional<Place>> PlaceOf(const Field& attributes) {

@@ -12,6 +12,7 @@
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "common/volume/field_info.h"
 #include "common/volume/orientation.h"
 #include "data/metadata/json_fields.h"
 
@@ -21,6 +22,9 @@ namespace slabstream::n5 {
 // InvalidArgument: the channels and times that Fiji states are not those of the size.
 Result<std::vector<std::string>> AxisNames(const metadata::Field& own, const metadata::Field& group,
                                            const std::vector<std::uint64_t>& size);
+
+// The times of a dataset that has `count`: by its own attributes, else by those of its group.
+TimeAxis TimesOf(const metadata::Field& own, const metadata::Field& group, int count);
 
 struct Place {
   Vec3 spacing = {1, 1, 1};         // each > 0, finite

@@ -223,6 +223,7 @@ class Container {
     const Result<AxisChoice> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
     if (!choice.ok()) return choice.status();
     choice->Describe(pyramid.info);
+    pyramid.info.times = TimesOf(node.field(), group.field(), choice->times);
     pyramid.levels.push_back({.array = *array, .axes = choice->axes, .at = choice->at});
     return Status::Ok();
   }
@@ -264,9 +265,9 @@ class Container {
     if (!setups.ok()) return setups.status();
     const Result<ViewSetupFile> xml = ReadViewSetupsBeside(store_->name());
     if (!xml.ok()) return xml.status();
-    if (!xml->path.empty()) files_.push_back(xml->path);
-    std::vector<std::string> channels;
-    for (const std::string& name : *setups) channels.push_back(xml->Of(name, "setup").name);
+    files_.insert(files_.end(), xml->files.begin(), xml->files.end());
+    std::vector<FieldInfo> channels;
+    for (const std::string& name : *setups) channels.push_back(xml->Of(name, "setup").channel);
     const Result<int> channel = ChosenChannel(store_->name(), channels, options_);
     if (!channel.ok()) return channel.status();
     const std::string& setup = (*setups)[std::size_t(*channel)];
@@ -282,7 +283,7 @@ class Container {
     Result<Pyramid> pyramid = Levels(*group, *above, xml->Of(setup, "setup"), {});  // each level is of one channel and one time
     if (!pyramid.ok()) return pyramid;
     pyramid->info.format = "BigDataViewer N5";
-    pyramid->info.times = int(times->size());
+    pyramid->info.times.count = int(times->size());
     pyramid->info.time = int(*time);
     pyramid->info.channels = channels;
     pyramid->info.channel = *channel;
@@ -302,8 +303,8 @@ class Container {
   Result<Pyramid> Channels(const Node& group) {
     const Result<std::vector<std::string>> folders = FoldersOf(group.path, "c", "/s0");
     if (!folders.ok()) return folders.status();
-    const std::vector<std::string> names(folders->size());
-    const Result<int> channel = ChosenChannel(NameOf(group.path), names, options_);
+    const std::vector<FieldInfo> channels(folders->size());
+    const Result<int> channel = ChosenChannel(NameOf(group.path), channels, options_);
     if (!channel.ok()) return channel.status();
     const Result<Node> of_channel = Read(Join(group.path, (*folders)[std::size_t(*channel)]));
     if (!of_channel.ok()) return of_channel.status();
@@ -311,7 +312,7 @@ class Container {
     options.channel.reset();
     Result<Pyramid> pyramid = Levels(*of_channel, group, {}, options);
     if (!pyramid.ok()) return pyramid;
-    if (names.size() > 1) pyramid->info.channels = names;
+    if (channels.size() > 1) pyramid->info.channels = channels;
     pyramid->info.channel = *channel;
     return pyramid;
   }

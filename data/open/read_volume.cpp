@@ -14,7 +14,10 @@ namespace slabstream {
 
 Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options, bool all_exact) {
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
-  return source.ok() ? ReadVolume(**source, path, options, all_exact) : source.status();
+  if (!source.ok()) return source.status();
+  Result<LoadedVolume> loaded = ReadVolume(**source, path, options, all_exact);
+  if (loaded.ok()) WarnOfPart(path, options, loaded->info);
+  return loaded;
 }
 
 Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, bool all_exact) try {
@@ -25,7 +28,6 @@ Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, c
   if (!level.ok()) return level.status();
   LoadedVolume loaded{*std::move(level), source.info()};
   loaded.info.levels.front().description = loaded.volume->description;
-  WarnOfPart(path, options, loaded.info);
   return loaded;
 } catch (const std::bad_alloc&) {
   return Status::ResourceExhausted(path + ": does not fit the memory");
@@ -40,8 +42,9 @@ Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, con
 
 std::vector<std::string> PartTexts(const std::string& path, const ReadOptions& options, const SourceInfo& info) {
   std::vector<std::string> texts;
-  if (!options.time && info.times > 1) {
-    texts.push_back(fmt::format("{}: shows time {} of {}; --time takes another one: 0 to {}", path, info.time, info.times, info.times - 1));
+  if (!options.time && info.times.count > 1) {
+    texts.push_back(
+        fmt::format("{}: shows time {} of {}; --time takes another one: 0 to {}", path, info.time, info.times.count, info.times.count - 1));
   }
   if (info.components == 1) {
     if (auto channel = ShownChannelText(path, info.channels, info.channel, options)) texts.push_back(*std::move(channel));

@@ -17,7 +17,7 @@ SourceInfo InfoOfFile(const VolumeFormat& format, const std::string& path, const
                      .labels = header.labels || options.labels,
                      .channels = header.channels,
                      .channel = header.channel,
-                     .times = int(header.volumes),
+                     .times = header.times,
                      .time = int(header.number),
                      .notes = header.notes,
                      .files = {path},

@@ -132,8 +132,8 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
   if (!type) return info["data_type"].Wrong("one of " + SampleTypeNames());
   const Result<std::uint64_t> channels = info["num_channels"].Whole(1, kMostChannels);
   if (!channels.ok()) return channels.status();
-  const std::vector<std::string> names(*channels);
-  const Result<int> channel = ChosenChannel(store->name(), names, options);
+  const std::vector<FieldInfo> fields(*channels);
+  const Result<int> channel = ChosenChannel(store->name(), fields, options);
   if (!channel.ok()) return channel.status();
   const Field scales = info["scales"];
   if (!scales.is_array() || scales.size() < 1 || scales.size() > kMostScales) {
@@ -142,7 +142,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
 
   Pyramid pyramid{.info = {.format = "Neuroglancer precomputed", .files = {object}, .folder = store->name()}};
   pyramid.info.labels = info["type"].given() && info["type"].value() == "segmentation";
-  if (*channels > 1) pyramid.info.channels = names;
+  if (*channels > 1) pyramid.info.channels = fields;
   pyramid.info.channel = *channel;
   pyramid.orientation.world = World::kScene;
   pyramid.orientation.unit = LengthUnit::kNanometre;

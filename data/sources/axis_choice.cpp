@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
@@ -15,10 +16,10 @@ Status Wrong(const std::string& array, const std::string& why) { return Status::
 }  // namespace
 
 void AxisChoice::Describe(SourceInfo& info) const {
-  info.times = times;
+  info.times.count = times;
   info.time = time;
   info.channel = channel;
-  if (channels > 1) info.channels.resize(std::size_t(channels));
+  if (channels.size() > 1 || channels.front() != FieldInfo{}) info.channels = channels;
 }
 
 Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const std::vector<std::string>& names,
@@ -45,16 +46,16 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 }
 
 Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
-                              const ReadOptions& options, std::vector<std::string> names) {
+                              const ReadOptions& options, std::vector<FieldInfo> channels) {
   AxisChoice choice{.at = std::vector<std::uint64_t>(kinds.size(), 0)};
-  std::uint64_t times = 1, channels = 1;
+  std::uint64_t times = 1, channel_count = 1;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     switch (kinds[axis]) {
       case AxisKind::kX: choice.axes[0] = int(axis); break;
       case AxisKind::kY: choice.axes[1] = int(axis); break;
       case AxisKind::kZ: choice.axes[2] = int(axis); break;
       case AxisKind::kTime: times = sizes[axis]; break;
-      case AxisKind::kChannel: channels = sizes[axis]; break;
+      case AxisKind::kChannel: channel_count = sizes[axis]; break;
       case AxisKind::kOther:
         if (sizes[axis] == 1) break;
         return Wrong(array,
@@ -64,12 +65,14 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   if (times > std::uint64_t{kMaxVolumes}) return Wrong(array, fmt::format("has {} times, at most {} are supported", times, kMaxVolumes));
   const Result<std::int64_t> time = ChosenVolume(array, std::int64_t(times), options);
   if (!time.ok()) return time.status();
-  if (channels > kMostChannels) return Wrong(array, fmt::format("has {} channels, at most {} are supported", channels, kMostChannels));
-  names.resize(std::size_t(channels));
-  const Result<int> channel = ChosenChannel(array, names, options);
+  if (channel_count > kMostChannels) {
+    return Wrong(array, fmt::format("has {} channels, at most {} are supported", channel_count, kMostChannels));
+  }
+  channels.resize(std::size_t(channel_count));
+  const Result<int> channel = ChosenChannel(array, channels, options);
   if (!channel.ok()) return channel.status();
   choice.times = int(times);
-  choice.channels = int(channels);
+  choice.channels = std::move(channels);
   choice.time = int(*time);
   choice.channel = *channel;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {

@@ -18,8 +18,8 @@ namespace slabstream {
 struct AxisChoice {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
-  int times = 1, channels = 1;             // how many there are
-  int time = 0, channel = 0;
+  std::vector<FieldInfo> channels = {};    // at least one
+  int times = 1, time = 0, channel = 0;
 
   // Its times and channels.
   void Describe(SourceInfo& info) const;
@@ -29,9 +29,9 @@ struct AxisChoice {
 // InvalidArgument: there are fewer than two.
 Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const std::vector<std::string>& names, const ReadOptions& options);
 
-// `sizes`: of each axis. `names`: of the first channels. InvalidArgument, naming `array`: no time is taken although there are several; an
-// option takes what there is not; an axis that is none of the known ones has several indices; too many channels.
+// `sizes`: of each axis. `channels`: what is said of the first ones. InvalidArgument, naming `array`: no time is taken although there are
+// several; an option takes what there is not; an axis that is none of the known ones has several indices; too many channels.
 Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
-                              const ReadOptions& options, std::vector<std::string> names = {});
+                              const ReadOptions& options, std::vector<FieldInfo> channels = {});
 
 }  // namespace slabstream

@@ -1,5 +1,5 @@
 // The XML file of BigDataViewer and BigStitcher, beside the file or folder that holds the samples: how far voxels are apart, and in which
-// unit.
+// unit; and the file of settings beside it: how its user shows them.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,14 @@
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "common/volume/field_info.h"
 #include "common/volume/orientation.h"
 
 namespace slabstream {
 
 struct ViewSetup {
   int id = 0;
-  std::string name = {};
+  FieldInfo channel = {};
   std::optional<Vec3> spacing = {};  // each > 0, finite
   std::optional<LengthUnit> unit = {};
 };
@@ -23,10 +24,13 @@ struct ViewSetup {
 // Those that have a number; at most 65536. Elements that are not known are skipped. InvalidArgument: no well-formed XML.
 Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml);
 
-// The XML file beside `path` that has the same name with another ending. None: there is no such file. InvalidArgument,
-// ResourceExhausted: it cannot be taken; the message names it.
+// Takes colours, windows and what is shown from `xml`, of settings. InvalidArgument: no well-formed XML.
+Status TakeViewSettings(const std::string& xml, std::vector<ViewSetup>& setups);
+
+// The XML file beside `path` that has the same name with another ending, and its settings, NAME.settings.xml; a warning tells if these
+// cannot be taken. InvalidArgument, ResourceExhausted: the XML file cannot be taken; the message names it.
 struct ViewSetupFile {
-  std::string path;  // "": there is none
+  std::vector<std::string> files;  // paths of those that are there
   std::vector<ViewSetup> setups;
 
   // Of the group or folder that is called by `prefix` and the setup's number. One without a name if the file does not list it.

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/volume/field_info.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/exact_samples.h"
@@ -52,17 +53,17 @@ struct StoredAxes {
 };
 
 struct SourceInfo {
-  std::vector<SourceLevel> levels;         // at least one
-  std::string format;                      // "OME-Zarr 0.5"
-  std::string file_type;                   // the type of samples as they are stored: "int16"
-  ExactType exact = {};                    // the type of exact samples (BoxRoom::exact)
-  bool labels = false;                     // samples are numbers of structures, not measurements
-  std::vector<StatedLabel> looks = {};     // looks of labels, by ascending values, as far as the source says it
-  std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
-  int channel = 0;                         // which of them it shows; of a luminance: 0
-  int components = 1;                      // above 1: the channels are components of a voxel, such as red, green and blue
-  int times = 1, time = 0;                 // how many the source holds, and which of them it shows
-  std::optional<ValueRange> window = {};   // data values that its author shows
+  std::vector<SourceLevel> levels;       // at least one
+  std::string format;                    // "OME-Zarr 0.5"
+  std::string file_type;                 // the type of samples as they are stored: "int16"
+  ExactType exact = {};                  // the type of exact samples (BoxRoom::exact)
+  bool labels = false;                   // samples are numbers of structures, not measurements
+  std::vector<StatedLabel> looks = {};   // looks of labels, by ascending values, as far as the source says it
+  std::vector<FieldInfo> channels = {};  // empty: there is one, of which the source says nothing
+  int channel = 0;                       // which of them it shows; of a luminance: 0
+  int components = 1;                    // above 1: the channels are components of a voxel, such as red, green and blue
+  TimeAxis times = TimeAxis();           // those that the source holds
+  int time = 0;                          // which of them it shows
   // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
   std::vector<std::string> notes = {};
   std::vector<std::string> files = {};    // whose time of change tells that it is another volume now (FileStamp)

@@ -243,9 +243,8 @@ Result<std::shared_ptr<VolumeSource>> OpenTiff(const std::string& path, const Re
                   .info = {.format = "TIFF",
                            .channels = header.channels,
                            .channel = header.channels.empty() ? stack->of_pages.channel.value_or(0) : header.channel,
-                           .times = int(header.volumes),
+                           .times = header.times,
                            .time = int(header.number),
-                           .window = stack->window,
                            .notes = header.notes,
                            .files = WatchedFiles(path, *stack)}};
   if (header.channels.empty() && header.components > 1) {

@@ -10,18 +10,19 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/volume/field_info.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMostChannels = 65536;  // channels of an image: as many as ReadOptions::channel can tell apart
 
-// The one that the options take, else the first one: in [0, channels.size()). `channels`: the names of all, "" where there is none, at
-// least one. InvalidArgument, naming `path` and the channels: the options take one that is not there.
-Result<int> ChosenChannel(const std::string& path, const std::vector<std::string>& channels, const ReadOptions& options);
+// The one that the options take, else the first one: in [0, channels.size()). `channels`: all, at least one. InvalidArgument, naming `path`
+// and the channels: the options take one that is not there.
+Result<int> ChosenChannel(const std::string& path, const std::vector<FieldInfo>& channels, const ReadOptions& options);
 
 // A line for people who did not say which of several channels they want: which one is shown. None: they did, or there is one.
-std::optional<std::string> ShownChannelText(const std::string& path, const std::vector<std::string>& channels, int shown,
+std::optional<std::string> ShownChannelText(const std::string& path, const std::vector<FieldInfo>& channels, int shown,
                                             const ReadOptions& options);
 
 }  // namespace slabstream

@@ -60,14 +60,14 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   }
   const DicomImage& first = series.images.front();
   RawHeader header{.size = series.stack.size,
-                   .volumes = series.stack.volumes,
+                   .times = series.stack.times,
                    .world = World::kPatient,
                    .steps = series.stack.steps,
                    .origin = series.stack.origin,
                    .matrix = "ImageOrientationPatient"};
   const std::string& told_apart = series.stack.told_apart;
   const Result<std::int64_t> volume = ChosenVolume(
-      told_apart.empty() ? path : fmt::format("{}: series {}, of {}", path, series.number, told_apart), header.volumes, options);
+      told_apart.empty() ? path : fmt::format("{}: series {}, of {}", path, series.number, told_apart), header.times.count, options);
   if (!volume.ok()) return volume.status();
   header.number = *volume;
   if (!told_apart.empty()) header.notes.push_back(fmt::format("times are told apart by {}", told_apart));

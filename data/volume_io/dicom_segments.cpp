@@ -58,10 +58,10 @@ Result<RawVolume> ReadSegments(const std::string& path, const DicomSeries& serie
   const bool binary = image.segmentation == DicomSegmentation::kBinary, fractional = image.segmentation == DicomSegmentation::kFractional;
   std::optional<int> channel;  // none: all segments
   if (fractional || (binary && options.channel)) {
-    const Result<int> chosen = ChosenChannel(path, names, options);
+    for (std::string& name : names) header.channels.push_back({.name = std::move(name)});
+    const Result<int> chosen = ChosenChannel(path, header.channels, options);
     if (!chosen.ok()) return chosen.status();
     channel = *chosen;
-    header.channels = names;
     header.channel = *channel;
   } else {
     header.notes.push_back(fmt::format("labels are the numbers of segments: {}", fmt::join(names, ", ")));

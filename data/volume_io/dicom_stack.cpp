@@ -12,6 +12,7 @@
 
 #include "common/text/parse_number.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/stated_field.h"
 #include "data/volume_io/world_placement.h"
 
 namespace slabstream {
@@ -93,6 +94,18 @@ std::optional<Values> ValuesOf(std::span<const DicomSlice> slices, std::size_t d
   for (std::size_t i = 0; i < values.distinct.size(); ++i) numbers[values.distinct[i]] = i;
   for (const DicomSlice& slice : slices) values.of_slice.push_back(numbers[value_of(slice)]);
   return values;
+}
+
+// Milliseconds, if the attribute holds them.
+TimeAxis TimesOf(const Values& values) {
+  static constexpr std::string_view kMilliseconds[] = {"TriggerTime", "NominalCardiacTriggerDelayTime", "FrameReferenceTime"};
+  const auto count = std::int64_t(values.distinct.size());
+  if (std::ranges::find(kMilliseconds, values.name) == std::end(kMilliseconds)) return {.count = int(count)};
+  std::vector<double> times;
+  for (const std::string& text : values.distinct) {
+    times.push_back(ParseNumber<double>(text).value_or(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return StatedTimes(count, times, "ms");
 }
 
 // Two attributes as one, of the pairs of values that there are.
@@ -258,7 +271,7 @@ Result<DicomStack> ArrangeSlices(std::span<const DicomSlice> slices) {
     const std::optional<Values> apart = count < 2 ? std::nullopt : WhatTellsApart(slices, places, count);
     if (!apart) return sorted.Crowded(places, count);
     for (std::size_t i = 0; i < slices.size(); ++i) stack.order[apart->of_slice[i] * count + places[i]] = i;
-    stack.volumes = int(slices.size() / count);
+    stack.times = TimesOf(*apart);
     stack.told_apart = Text(*apart);
   }
   stack.size = {any.columns, any.rows, std::int32_t(count)};

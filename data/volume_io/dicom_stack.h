@@ -14,6 +14,7 @@
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "common/volume/field_info.h"
 #include "data/volume_io/dicom_image.h"
 
 namespace slabstream {
@@ -33,7 +34,7 @@ struct DicomSlice {
 
 struct DicomStack {
   Index3 size;                // the size of each volume
-  int volumes = 1;            // in the order of the values that tell them apart
+  TimeAxis times;             // volumes, in the order of the values that tell them apart
   std::string told_apart;     // "EchoTime 4.6, 9.2"; "": one volume
   std::array<Vec3, 3> steps;  // from a voxel to the next one along a row, a column and the stack; mm to right, anterior, superior
   Vec3 origin;

@@ -3,11 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <span>
 
 #include "common/text/parse_number.h"
+#include "data/volume_io/binary_header.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/page_layout.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream {
 namespace {
@@ -92,16 +98,59 @@ void SetCalibration(const Lines& lines, SampleType type, PageLayout& layout) {
   layout.notes.push_back(fmt::format("values are calibrated: {:g} + {:g} * sample{}", *offset, *scale, unit.empty() ? "" : ", " + unit));
 }
 
-// Of images with signed samples the limits are calibrated values, of others samples.
+// Windows and lookup tables of channels, which lie beside the description: first which kinds of entries there are and how many of each,
+// behind a mark of four bytes; then the entries.
+void SetLooks(const TiffFile& first, bool grey, PageLayout& layout) {
+  constexpr unsigned kEntryBytes = 50838, kEntries = 50839;
+  constexpr std::uint32_t kWindows = 0x72616e67, kTable = 0x6c757473;  // "rang", "luts"
+  constexpr std::size_t kWindowBytes = 2 * sizeof(double), kTableBytes = 3 * 256;
+  const std::span<const std::uint32_t> sizes = first.Numbers(kEntryBytes);
+  const std::span<const std::byte> bytes = first.Bytes(kEntries);
+  if (sizes.empty() || sizes.front() > bytes.size()) return;
+  const BinaryHeader fields(bytes, first.big_endian());
+  const std::size_t most = std::min(std::size_t(layout.channels), kMostChannels);
+  const auto channel = [&](std::size_t number) -> FieldInfo& {
+    if (number >= layout.described.size()) layout.described.resize(number + 1);
+    return layout.described[number];
+  };
+  const auto take = [&](std::uint32_t kind, std::size_t number, std::size_t begin, std::size_t size) {
+    for (std::size_t i = 0; kind == kWindows && i < std::min(size / kWindowBytes, most); ++i) {
+      const std::size_t at = begin + i * kWindowBytes;
+      channel(i).window = StatedWindow(fields.At<double>(at), fields.At<double>(at + sizeof(double)), layout.rescale);
+    }
+    if (kind != kTable || size != kTableBytes || number >= most || grey) return;
+    const auto brightest = [&](std::size_t component) { return std::to_integer<int>(bytes[begin + 256 * component + 255]) / 255.0; };
+    channel(number).color = StatedColor(brightest(0), brightest(1), brightest(2));
+  };
+  std::size_t entry = 1, begin = sizes.front();
+  for (std::size_t at = 4; at + 8 <= sizes.front(); at += 8) {
+    const auto kind = fields.At<std::uint32_t>(at), count = fields.At<std::uint32_t>(at + 4);
+    for (std::size_t i = 0; i < count && entry < sizes.size(); ++i, ++entry) {
+      const std::size_t size = sizes[entry];
+      if (size > bytes.size() - begin) return;
+      take(kind, i, begin, size);
+      begin += size;
+    }
+  }
+}
+
+// The window of the only channel. Of images with signed samples the limits are calibrated values, of others samples.
 void SetWindow(const Lines& lines, PageLayout& layout) {
   const std::optional<double> least = NumberOf(lines, "min"), greatest = NumberOf(lines, "max");
-  if (!least || !greatest || !(*least < *greatest) || layout.channels > 1) return;
+  if (!least || !greatest || layout.channels > 1) return;
   constexpr ValueMapping kSigned = {1, -32768};
-  const ValueMapping mapping = layout.rescale == kSigned ? ValueMapping{} : layout.rescale;
-  const auto [low, high] = std::minmax({float(mapping.FromStored(*least)), float(mapping.FromStored(*greatest))});
-  if (!std::isfinite(low) || !std::isfinite(high)) return;
-  layout.window = ValueRange{low, high};
-  layout.notes.push_back(fmt::format("ImageJ shows values from {:g} to {:g}", low, high));
+  const auto window = StatedWindow(*least, *greatest, layout.rescale == kSigned ? ValueMapping{} : layout.rescale);
+  layout.described.resize(1);
+  if (window) layout.described.front().window = window;
+}
+
+void SetTimes(const Lines& lines, PageLayout& layout) {
+  layout.time_step = NumberOf(lines, "finterval");
+  layout.time_unit = lines.contains("tunit") ? NameOfUnit(TextOf(lines, "tunit")) : "s";
+  const std::optional<double> per_second = NumberOf(lines, "fps");
+  if (layout.time_step || !per_second) return;
+  layout.time_step = 1 / *per_second;
+  layout.time_unit = "s";
 }
 
 }  // namespace
@@ -132,7 +181,9 @@ Result<PageLayout> ReadImageJHeader(const TiffFile& first, const RawHeader& head
   }
   SetSpacing(lines, first, layout);
   SetCalibration(lines, header.type, layout);
+  SetLooks(first, TextOf(lines, "mode") == "grayscale", layout);
   SetWindow(lines, layout);
+  SetTimes(lines, layout);
   return layout;
 }
 

@@ -17,6 +17,7 @@
 #include "data/volume_io/formats.h"
 #include "data/volume_io/nifti_header.h"
 #include "data/volume_io/output.h"
+#include "data/volume_io/stated_field.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {
@@ -47,6 +48,13 @@ Status SetSizes(const NiftiHeader& fields, const std::string& path, const ReadOp
   return SetSize(header, path, std::move(sizes), options, channels);
 }
 
+// The fourth size may also count frequencies (NIFTI_UNITS_HZ and the two behind it).
+TimeAxis TimesOf(const NiftiHeader& fields, std::int64_t count) {
+  constexpr std::array<std::string_view, 4> kUnits = {"", "s", "ms", "us"};  // NIFTI_UNITS_UNKNOWN, SEC, MSEC, USEC
+  const auto code = std::size_t(fields.time_unit / 8);
+  return code < kUnits.size() ? StatedTimes(count, fields.time_step, kUnits[code]) : TimeAxis{.count = int(count)};
+}
+
 // From samples to data values. A slope of 0 or that is not finite means that there is none.
 Status SetRescale(const NiftiHeader& fields, const std::string& path, RawHeader& header) {
   if (fields.slope == 0 || !std::isfinite(fields.slope) || IsColour(fields.data_type)) return Status::Ok();
@@ -69,6 +77,7 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path,
   }
   RawHeader header{.components = fields.data_type == kNiftiRgb ? 3 : fields.data_type == kNiftiRgba ? 4 : 1, .type = type->second};
   if (Status status = SetSizes(fields, path, options, header); !status.ok()) return status;
+  header.times = TimesOf(fields, header.times.count);
   constexpr int kLabels = 1002;  // NIFTI_INTENT_LABEL
   header.labels = fields.intent == kLabels;
   if (Status status = PlaceNifti(fields, path, options.matrix, header); !status.ok()) return status;

@@ -22,8 +22,10 @@ NiftiHeader FieldsOf(const BinaryHeader& bytes, const Layout& at) {
                      .data_type = bytes.At<std::int16_t>(at.data_type),
                      .intent = bytes.At<Intent>(at.intent),
                      .unit = int(bytes.At<Unit>(at.unit)) & 7,
+                     .time_unit = int(bytes.At<Unit>(at.unit)) & 56,
                      .qfac = real(at.pixdim, 0),
                      .spacing = reals(at.pixdim + sizeof(Real)),
+                     .time_step = real(at.pixdim, 4),
                      .vox_offset = double(bytes.At<Offset>(at.vox_offset)),
                      .slope = real(at.slope, 0),
                      .intercept = real(at.intercept, 0),
@@ -66,7 +68,7 @@ std::optional<NiftiHeader> ParseNifti(std::span<const std::byte> bytes, bool sin
   header.analyze = analyze;
   header.pair = pair || analyze;
   // Analyze 7.5 has a scale factor where SPM put one, and nothing else of NIfTI's fields.
-  if (analyze) header.intent = header.unit = header.qform_code = header.sform_code = 0, header.intercept = 0;
+  if (analyze) header.intent = header.unit = header.time_unit = header.qform_code = header.sform_code = 0, header.intercept = 0;
   return header;
 }
 

@@ -24,9 +24,10 @@ struct NiftiHeader {
   bool big_endian = false;
   std::vector<double> sizes;    // dim[1] ... dim[dim[0]]; empty: dim[0] is not in [1, 7]
   std::int64_t dimensions = 0;  // dim[0]
-  int data_type = 0, intent = 0, unit = 0;
+  int data_type = 0, intent = 0, unit = 0, time_unit = 0;
   double qfac = 1;
-  Vec3 spacing;  // pixdim[1] to pixdim[3]
+  Vec3 spacing;          // pixdim[1] to pixdim[3]
+  double time_step = 0;  // pixdim[4]
   double vox_offset = 0, slope = 0, intercept = 0;
   int qform_code = 0, sform_code = 0;
   Vec3 quaternion, qoffset;  // b, c, d

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/nrrd_axes.h"
 #include "data/volume_io/output.h"
+#include "data/volume_io/stated_field.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {
@@ -62,8 +64,8 @@ Space SpaceNamed(std::string name) {
   return {World::kScene, {1, 1, 1}};
 }
 
-// The unit of three axes from number `first` on, of "mm" "mm" "mm": a name in quotes for each axis. None unless it is the same for all.
-std::optional<LengthUnit> UnitOf(std::string_view text, std::size_t first) {
+// Of "mm" "mm" "s".
+std::vector<std::string_view> NamesIn(std::string_view text) {
   std::vector<std::string_view> names;
   for (std::size_t open = text.find('"'); open != std::string_view::npos; open = text.find('"')) {
     const std::size_t close = text.find('"', open + 1);
@@ -71,6 +73,11 @@ std::optional<LengthUnit> UnitOf(std::string_view text, std::size_t first) {
     names.push_back(text.substr(open + 1, close - open - 1));
     text.remove_prefix(close + 1);
   }
+  return names;
+}
+
+// The unit of three axes from number `first` on. None unless it is the same for all.
+std::optional<LengthUnit> UnitOf(const std::vector<std::string_view>& names, std::size_t first) {
   if (names.size() < first + 3 || names[first + 1] != names[first] || names[first + 2] != names[first]) return std::nullopt;
   return LengthUnitNamed(names[first]);
 }
@@ -97,7 +104,14 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   if (origin->size() == 2) origin->push_back(0);
   header.steps = StepsOf(Triple(*spacings, axes->first));
   const auto of_space = text.Find("space units");
-  header.unit = of_space ? UnitOf(*of_space, 0) : UnitOf(text.Find("units").value_or(""), axes->first);
+  const std::string of_axes = text.Find("units").value_or("");
+  const std::vector<std::string_view> units = NamesIn(of_space ? *of_space : of_axes);
+  header.unit = UnitOf(units, of_space ? 0 : axes->first);
+  if (axes->time) {
+    const std::size_t unit = of_space ? 3 : *axes->time;
+    const double step = text.Find("spacings") ? (*spacings)[*axes->time] : std::numeric_limits<double>::quiet_NaN();
+    header.times = StatedTimes(header.times.count, axes->time_step.value_or(step), unit < units.size() ? units[unit] : "");
+  }
   const std::string name = ToLower(text.Find("space").value_or(""));
   if (!axes->directions && name.empty()) return header;
   Space space = SpaceNamed(name);

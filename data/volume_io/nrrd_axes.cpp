@@ -20,6 +20,7 @@ struct NrrdAxis {
   std::string kind;  // in lower case; "": not stated
   Role role = Role::kSpace;
   Vec3 direction;
+  std::optional<double> time_step;  // along time, in a space that has it
 };
 
 // Of a kind that is stated.
@@ -72,6 +73,7 @@ Result<std::size_t> ReadDirections(const TextHeader& text, const std::string& va
     axes[i].direction = {vector[0], vector[1], plane ? 0 : vector[2]};
     const double time = count == 4 ? vector[3] : 0;
     axes[i].role = time != 0 && axes[i].direction == Vec3{} ? Role::kTime : Role::kSpace;
+    if (axes[i].role == Role::kTime) axes[i].time_step = time;
     if (time != 0 && axes[i].role == Role::kSpace) return wrong("has an axis that runs along space and time");
   }
   return count;
@@ -142,6 +144,12 @@ Result<NrrdAxes> ReadNrrdAxes(const TextHeader& text) {
     } else if (axis.size != 1) {
       return text.Refused(fmt::format("axis {} of {} lies between axes of space, but is none of them: not supported", i + 1, all.size()));
     }
+  }
+  const auto is_time = [](const NrrdAxis& axis) { return axis.role == Role::kTime; };
+  if (std::ranges::count_if(all, is_time) == 1) {
+    const auto time = std::ranges::find_if(all, is_time);
+    axes.time = std::size_t(time - all.begin());
+    axes.time_step = time->time_step;
   }
   if (is_slice) {
     steps[2] = Length(steps[0]) * Normalized(Cross(steps[0], steps[1]));  // as thick as its first pixel is wide

@@ -21,6 +21,8 @@ struct NrrdAxes {
   double channels = 1;                            // samples of an axis behind them that is none of time
   std::optional<std::array<Vec3, 3>> directions;  // directions of these three, as in `space directions`
   std::size_t space_numbers = 3;                  // numbers of a position: 3, or with time 4
+  std::optional<std::size_t> time;                // the axis of time, if it is the only one
+  std::optional<double> time_step;                // its step in the space, of four numbers
   std::vector<std::string> notes;                 // what was guessed
 };
 

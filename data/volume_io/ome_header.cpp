@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "common/text/parse_number.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/read_options.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream {
 namespace {
@@ -45,7 +47,12 @@ class OmeReader {
     if (name.starts_with("ModuloAlong")) ome_.modulo = true;
     if (ome_.images.size() != image_ + 1) return;
     if (name == "Pixels") ome_.pixels = tag;
-    if (name == "Channel") ome_.channels.push_back(tag.Attribute("Name"));
+    if (name == "Channel" && ome_.channels.size() < kMostChannels) {
+      ome_.channels.push_back({.name = tag.Attribute("Name")});
+      // Red, green, blue and alpha of eight bits each.
+      const std::optional<std::int32_t> color = ParseNumber<std::int32_t>(tag.Attribute("Color"));
+      if (color) ome_.channels.back().color = ColorOfBits(std::uint32_t(*color) >> 8);
+    }
     if (name == "TiffData") {
       // Without an IFD, all pages of a file.
       const std::int64_t count = Number(tag, "NumPlanes", tag.Attribute("IFD").empty() ? 0 : 1);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/volume/field_info.h"
 #include "data/volume_io/xml_events.h"
 
 namespace slabstream {
@@ -22,11 +23,11 @@ struct OmeTiffData {
 };
 
 struct OmeHeader {
-  std::string uuid;                        // the UUID of the file that has this header
-  std::string metadata_file;               // BinaryOnly: the file that has the rest; "": this one
-  std::vector<std::string> images = {};    // names of all
-  XmlTag pixels = {};                      // the chosen image
-  std::vector<std::string> channels = {};  // names, "" where there is none
+  std::string uuid;                      // the UUID of the file that has this header
+  std::string metadata_file;             // BinaryOnly: the file that has the rest; "": this one
+  std::vector<std::string> images = {};  // names of all
+  XmlTag pixels = {};                    // the chosen image
+  std::vector<FieldInfo> channels = {};
   std::vector<OmeTiffData> tiff_data = {};
   bool modulo = false;  // an axis stands for two, such as slices for phases of each
 };

@@ -137,7 +137,11 @@ Result<PageLayout> ReadOmeLayout(const std::string& path, const std::string& des
   if (*image >= images)
     return wrong(fmt::format("series is {}, its OME description has {} image{}", *image, images, images == 1 ? "" : "s"));
 
-  PageLayout layout{.source = "OME", .channel_names = ome->channels};
+  PageLayout layout{.source = "OME",
+                    .described = ome->channels,
+                    .time_step = ParseNumber<double>(ome->pixels.Attribute("TimeIncrement")),
+                    .time_unit = ome->pixels.Attribute("TimeIncrementUnit")};
+  if (layout.time_unit.empty()) layout.time_unit = "s";
   constexpr std::pair<const char*, std::int64_t PageLayout::*> kSizes[] = {
       {"SizeZ", &PageLayout::slices}, {"SizeC", &PageLayout::channels}, {"SizeT", &PageLayout::times}};
   for (const auto& [key, size] : kSizes) {

@@ -8,7 +8,7 @@
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
-#include "common/volume/summary.h"
+#include "common/volume/field_info.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/tiff_file.h"
@@ -29,13 +29,14 @@ struct PageLayout {
   std::string source;                                // the program that says so, for people: "ImageJ"
   std::int64_t slices = 1, channels = 1, times = 1;  // each in [1, kMaxVolumes]
   std::string order = "CZT";                         // which runs fastest from plane to plane, which next
-  std::vector<std::string> channel_names = {};       // those that it says
+  std::vector<FieldInfo> described = {};             // the channels of which it says something, perhaps only the first ones
   std::vector<PageRun> runs = {};                    // empty: planes are the pages of the file, one after the other
   std::vector<std::string> files = {};               // paths; the first one is the file itself
   std::optional<Vec3> spacing = {};                  // the spacing of voxels
   std::optional<LengthUnit> unit = {};               // the unit of the spacing
   ValueMapping rescale = {};                         // from samples to data values
-  std::optional<ValueRange> window = {};             // data values that its author shows
+  std::optional<double> time_step = {};              // from a time to the next one, as it is stated
+  std::string time_unit = {};                        // the unit of `time_step`, as it is spelled
   std::vector<std::string> notes = {};               // as of SourceInfo
 
   // The number of a plane in `order`.

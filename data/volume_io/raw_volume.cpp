@@ -32,7 +32,7 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
   }
   const Result<std::int64_t> number = ChosenVolume(path, std::int64_t(count), options);
   if (!number.ok()) return number.status();
-  header.volumes = std::int64_t(count);
+  header.times.count = int(count);
   header.number = *number;
   if (channels == 1) return Status::Ok();
   if (!(channels >= 1 && channels <= double(kMostChannels) && channels == std::floor(channels))) {
@@ -95,7 +95,7 @@ Status OfSamples(const std::string& path, const Payload& payload, const Status& 
 Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& located) {
   const RawHeader& header = located.header;
   constexpr std::int64_t kMost = std::int64_t{1} << 61;  // longer than any file
-  const std::int64_t number = header.channel * header.volumes + header.number;
+  const std::int64_t number = std::int64_t{header.channel} * header.times.count + header.number;
   if (number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
   Payload payload = located.payload;
   payload.Pass(number * header.sample_bytes());

@@ -16,6 +16,7 @@
 #include "common/base/status.h"
 #include "common/memory/aligned_buffer.h"
 #include "common/mesh/mesh.h"
+#include "common/volume/field_info.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/payload.h"
 #include "data/volume_io/read_options.h"
@@ -29,9 +30,9 @@ struct RawHeader {
   Index3 size;
   // Samples of one voxel, which lie together; above 1 only where options.channel takes one of them.
   int components = 1;  // in [1, kMaxComponents]
-  // In [1, kMaxVolumes], one after the other in the payload; of an image with channels: of each channel, one behind the other.
-  std::int64_t volumes = 1;
-  std::int64_t number = 0;  // the volume's number in [0, volumes)
+  // Volumes, at most kMaxVolumes, one after the other in the payload; of an image with channels: of each channel, one behind the other.
+  TimeAxis times = TimeAxis();
+  std::int64_t number = 0;  // the volume's number in [0, times.count)
   World world = World::kVoxels;
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
@@ -42,8 +43,8 @@ struct RawHeader {
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
   bool labels = false;   // samples are numbers of structures, not measurements
-  // The names of an image's channels, and which of them this is; empty: there is one channel.
-  std::vector<std::string> channels = {};
+  // An image's channels, and which of them this is; empty: there is one, of which the file says nothing.
+  std::vector<FieldInfo> channels = {};
   int channel = 0;
   std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: SourceInfo
 
@@ -54,7 +55,7 @@ struct RawHeader {
   // Bytes of all volumes, or more than any file has.
   std::int64_t all_bytes() const {
     constexpr std::int64_t kMost = std::int64_t{1} << 61;
-    const std::int64_t count = volumes * std::max<std::int64_t>(1, std::int64_t(channels.size()));
+    const std::int64_t count = times.count * std::max<std::int64_t>(1, std::int64_t(channels.size()));
     return count > kMost / sample_bytes() ? kMost : count * sample_bytes();
   }
 };

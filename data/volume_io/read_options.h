@@ -94,8 +94,8 @@ bool MayBeThere(const SourceText& source);
 
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
-// The source at one time; times that it names are replaced. `source` is right (ParseSourceText).
-std::string AtTime(const std::string& source, int time);
+// The source at one time, or at all that its file has; times that it names are replaced. `source` is right (ParseSourceText).
+std::string AtTime(const std::string& source, std::optional<int> time);
 
 // The source for a user to see: without the query of its own, and without the values of headers.
 std::string ShownSource(const std::string& source);

@@ -147,12 +147,12 @@ std::string WithReadOption(const std::string& source, std::string_view name, std
   return fmt::format("{}{}{}={}", source, has_query || OptionsBegin(source) != std::string::npos ? ',' : '?', name, value);
 }
 
-std::string AtTime(const std::string& source, int time) {
+std::string AtTime(const std::string& source, std::optional<int> time) {
   Parts parts = Divide(source);
   std::erase_if(parts.options, [](const OptionText& option) { return option.name == "time"; });
   std::string others = parts.query.empty() ? parts.place : fmt::format("{}?{}", parts.place, parts.query);
   for (const auto& [name, value] : parts.options) others = WithReadOption(others, name, value);
-  return WithReadOption(others, "time", std::to_string(time));
+  return time ? WithReadOption(others, "time", std::to_string(*time)) : others;
 }
 
 std::string ShownSource(const std::string& source) {

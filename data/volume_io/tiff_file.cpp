@@ -73,6 +73,16 @@ std::optional<SampleType> ToSampleType(unsigned bits, unsigned format) {
   return SampleTypeNamed(kind + std::to_string(bits));
 }
 
+// Of a field that libtiff does not know, and therefore gives with their number.
+template <class T>
+std::span<const T> Values(TIFF* tiff, ttag_t tag, TIFFDataType type) {
+  const TIFFField* const field = TIFFFindField(tiff, tag, TIFF_ANY);
+  if (field == nullptr || TIFFFieldDataType(field) != type || TIFFFieldReadCount(field) != TIFF_VARIABLE2) return {};
+  std::uint32_t count = 0;
+  const T* values = nullptr;
+  return TIFFGetField(tiff, tag, &count, &values) != 0 ? std::span(values, count) : std::span<const T>();
+}
+
 }  // namespace
 
 void TiffFile::Close::operator()(tiff* handle) const { TIFFClose(handle); }
@@ -149,6 +159,9 @@ bool TiffFile::HoldsDirectory(std::uint64_t offset) const {
   return entries <= input_->size() / entry && offset + counted + entries * entry + place <= input_->size();
 }
 std::uint64_t TiffFile::size() const { return input_->size(); }
+bool TiffFile::big_endian() const { return TIFFIsBigEndian(tiff_.get()) != 0; }
+std::span<const std::byte> TiffFile::Bytes(unsigned tag) const { return Values<std::byte>(tiff_.get(), tag, TIFF_BYTE); }
+std::span<const std::uint32_t> TiffFile::Numbers(unsigned tag) const { return Values<std::uint32_t>(tiff_.get(), tag, TIFF_LONG); }
 
 Status TiffFile::CheckCompression() const {
   const auto compression = Field<std::uint16_t>(tiff_.get(), TIFFTAG_COMPRESSION, COMPRESSION_NONE);

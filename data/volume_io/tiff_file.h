@@ -2,6 +2,7 @@
 // Errors name the file.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -57,6 +58,11 @@ class TiffFile : public SliceFile {
   // Whether the file goes on to the end of the directory at `offset`, where it says whether there is another one.
   bool HoldsDirectory(std::uint64_t offset) const;
   std::uint64_t size() const;  // the file's size in bytes
+  bool big_endian() const;
+  // A field of this page that libtiff does not know; empty: there is none, or its type is another one. Bytes are as in the file. Lives as
+  // long as the page is the open one.
+  std::span<const std::byte> Bytes(unsigned tag) const;
+  std::span<const std::uint32_t> Numbers(unsigned tag) const;
 
   // Its notes say what of the picture is not applied, such as a colour map. InvalidArgument: a compression, a kind of colours or a type
   // that is not supported.

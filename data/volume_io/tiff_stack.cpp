@@ -10,6 +10,7 @@
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/ome_header.h"
 #include "data/volume_io/page_layout.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream {
 namespace {
@@ -98,23 +99,25 @@ Status FitPages(const std::string& path, const RawHeader& page, std::int64_t pag
 }
 
 struct Chosen {
-  std::int64_t channel = 0, time = 0;      // of pages
-  int number = 0;                          // among the channels of the image, which counts the components of its pages
-  std::vector<std::string> channels = {};  // names of those; empty: there is one
+  std::int64_t channel = 0, time = 0;    // of pages
+  int number = 0;                        // among the channels of the image, which counts the components of its pages
+  std::vector<FieldInfo> channels = {};  // those; empty: there is one, of which nothing is said
 };
 
 Result<Chosen> Choose(const std::string& path, const PageLayout& layout, int components, const ReadOptions& options) {
   const Result<std::int64_t> time = ChosenVolume(path, layout.times, options);
   if (!time.ok()) return time.status();
   Chosen chosen{.time = *time};
-  if (layout.channels == 1) return chosen;
+  const bool one_described = components == 1 && !layout.described.empty() && layout.described.front() != FieldInfo{};
+  if (layout.channels == 1 && !one_described) return chosen;
   if (layout.channels > std::int64_t(kMostChannels) / components) {
     return Status::InvalidArgument(
         fmt::format("{}: {} channels of {} components, must be at most {}", path, layout.channels, components, kMostChannels));
   }
   for (std::int64_t i = 0; i < layout.channels * components; ++i) {
     const auto channel = std::size_t(i / components);
-    chosen.channels.push_back(channel < layout.channel_names.size() ? layout.channel_names[channel] : "");
+    chosen.channels.push_back(channel < layout.described.size() ? layout.described[channel] : FieldInfo{});
+    if (components > 1) chosen.channels.back().color.reset();  // it is that of all components together
   }
   const Result<int> number = ChosenChannel(path, chosen.channels, options);
   if (!number.ok()) return number.status();
@@ -247,7 +250,7 @@ Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& opti
   if (layout.slices == 1 && !(*file)->HoldsDirectory((*some_page)->offset)) return Status::DataLoss(path + ": truncated after page 1");
   Result<Chosen> chosen = Choose(path, layout, page->components, options);
   if (!chosen.ok()) return chosen.status();
-  TiffStack stack{.files = layout.files, .of_pages = options, .window = layout.window};
+  TiffStack stack{.files = layout.files, .of_pages = options};
   if (!chosen->channels.empty()) stack.of_pages.channel = chosen->number % page->components;
   Result<std::vector<TiffSlice>> slices =
       layout.runs.empty() ? SlicesOfFile(pages, layout, *chosen, *page) : SlicesOfRuns(pages, layout, *chosen);
@@ -267,7 +270,7 @@ Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& opti
   header->notes.insert(header->notes.end(), layout.notes.begin(), layout.notes.end());
   header = HeaderOfSlices(path, *header, layout.slices, BytesOfFiles(stack), options);
   if (!header.ok()) return header.status();
-  header->volumes = layout.times;
+  header->times = StatedTimes(layout.times, layout.time_step, layout.time_unit);
   header->number = chosen->time;
   header->channels = std::move(chosen->channels);
   header->channel = chosen->number;

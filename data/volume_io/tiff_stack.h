@@ -1,11 +1,9 @@
 // TiffStack: the pages of a TIFF file, or of the files of an OME-TIFF, that are the slices of a volume.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "common/volume/summary.h"
 #include "data/volume_io/tiff_file.h"
 
 namespace slabstream {
@@ -21,9 +19,8 @@ struct TiffSlice {
 struct TiffStack {
   std::vector<std::string> files;  // paths of those that are used
   std::vector<TiffSlice> slices;
-  RawHeader header;                  // the volume's header, as the first slice says
-  ReadOptions of_pages;              // what the options say of a page's components
-  std::optional<ValueRange> window;  // SourceInfo::window
+  RawHeader header;      // the volume's header, as the first slice says
+  ReadOptions of_pages;  // what the options say of a page's components
 
   // "a.tif: page 8", counted from 1, for messages.
   std::string NameOf(const TiffSlice& slice) const;

@@ -169,7 +169,7 @@ Result<std::shared_ptr<ImageFile>> OpenImage(const std::string& path, std::strin
   if (!grid.ok()) return grid.status();
   if (Status status = FindArrays(*image, path, options); !status.ok()) return status;
   if (Status status = SetGrid(image->header, path, *grid, image->at); !status.ok()) return status;
-  image->header.volumes = image->file.times();
+  image->header.times = image->file.times();
   image->header.number = image->file.time();
   return image;
 }
@@ -206,7 +206,7 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   const auto image = OpenImage(path, kKind, options);
   if (!image.ok()) return image.status();
   const auto& [file, pieces, bounds, arrays, at, header] = **image;
-  if (pieces.size() > 1 || file.times() > 1) return file.Wrong("its samples lie in several pieces, or are of several times");
+  if (pieces.size() > 1 || file.times().count > 1) return file.Wrong("its samples lie in several pieces, or are of several times");
   const auto plain = file.FindPlainSamples(*arrays[0], header.type, (*image)->Samples(pieces[0]));
   if (!plain.ok()) return plain.status();
   return LocatedSamples{header, {.file = path, .offset = plain->begin, .big_endian = plain->big_endian}};

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -19,6 +20,7 @@
 #include "data/codecs/codecs.h"
 #include "data/volume_io/payload.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/stated_field.h"
 #include "data/volume_io/text_cursor.h"
 
 namespace slabstream {
@@ -243,8 +245,12 @@ Status VtkXmlFile::TakeTime(const ReadOptions& options) {
     std::istringstream stream(text);
     return std::vector<std::string>(std::istream_iterator<std::string>(stream), {});
   };
-  times_ = std::max<std::int64_t>(1, std::int64_t(words(dataset_.Attribute("TimeValues")).size()));
-  const Result<std::int64_t> time = ChosenVolume(path_, times_, options);
+  std::vector<double> values;
+  for (const std::string& word : words(dataset_.Attribute("TimeValues"))) {
+    values.push_back(ParseNumber<double>(word).value_or(std::numeric_limits<double>::quiet_NaN()));
+  }
+  times_ = StatedTimes(std::max<std::int64_t>(1, std::int64_t(values.size())), values, "");
+  const Result<std::int64_t> time = ChosenVolume(path_, times_.count, options);
   if (!time.ok()) return time.status();
   time_ = *time;
   std::erase_if(arrays_, [&](const VtkArray& array) {

@@ -13,6 +13,7 @@
 
 #include "common/base/status.h"
 #include "common/memory/aligned_buffer.h"
+#include "common/volume/field_info.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/converted_samples.h"
 #include "data/volume_io/grid_arrays.h"
@@ -50,7 +51,7 @@ class VtkXmlFile {
 
   const XmlTag& dataset() const { return dataset_; }             // the element of the type's name
   const std::vector<XmlTag>& pieces() const { return pieces_; }  // at least one
-  std::int64_t times() const { return times_; }                  // times that the file holds, at least one
+  const TimeAxis& times() const { return times_; }               // times that the file holds
   std::int64_t time() const { return time_; }                    // the one whose arrays these are
   // The name of the active scalars of "PointData" or "CellData"; "": none.
   const std::string& ActiveScalars(std::string_view section) const { return section == "PointData" ? point_scalars_ : cell_scalars_; }
@@ -108,7 +109,8 @@ class VtkXmlFile {
   std::string path_;
   XmlTag file_, dataset_;
   std::vector<XmlTag> pieces_;
-  std::int64_t times_ = 1, time_ = 0;
+  TimeAxis times_;
+  std::int64_t time_ = 0;
   std::string point_scalars_, cell_scalars_;
   std::vector<VtkArray> arrays_;
   std::string appended_encoding_;

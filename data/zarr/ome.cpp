@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/base/printable.h"
+#include "data/volume_io/stated_field.h"
 
 namespace slabstream::zarr {
 namespace {
@@ -16,11 +17,14 @@ using metadata::Field;
 
 constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostLooks = 65536;
 
-OmeChannel ReadChannel(const Field& field) {
-  OmeChannel channel;
+FieldInfo ReadChannel(const Field& field) {
+  FieldInfo channel;
   if (const Field label = field["label"]; label.is_text()) channel.name = *label.Text();
+  if (const Field color = field["color"]; color.is_text()) channel.color = ColorOfHex(*color.Text());
   const Result<double> start = field["window"]["start"].Number(), end = field["window"]["end"].Number();
-  if (start.ok() && end.ok() && *start < *end) channel.window = ValueRange{float(*start), float(*end)};
+  if (start.ok() && end.ok()) channel.window = StatedWindow(*start, *end);
+  const Field active = field["active"];
+  channel.shown = !active.given() || active.value() != false;
   return channel;
 }
 

@@ -4,12 +4,11 @@
 // Pure. Every number is checked.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/volume/summary.h"
+#include "common/volume/field_info.h"
 #include "data/metadata/json_fields.h"
 #include "data/volume_io/stated_label.h"
 #include "data/zarr/ome_axes.h"
@@ -21,17 +20,12 @@ struct OmeLevel {
   OmePlace place;
 };
 
-struct OmeChannel {
-  std::string name;                       // "": it has none
-  std::optional<ValueRange> window = {};  // data values that its author shows
-};
-
 struct OmeImage {
   std::string version;                      // "0.4"
   std::vector<OmeAxis> axes;                // slowest first
   std::vector<OmeLevel> levels;             // finest first, at least one
   bool scaled = false, translated = false;  // a level states it
-  std::vector<OmeChannel> channels;         // those that are described, perhaps none
+  std::vector<FieldInfo> channels;          // those that are described, perhaps none; windows are of samples
   bool labels = false;
   std::vector<StatedLabel> looks = {};  // values ascend
   std::vector<std::string> notes = {};  // SourceInfo::notes

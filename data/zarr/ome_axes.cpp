@@ -26,6 +26,7 @@ Result<OmeAxis> ReadAxis(const Field& field, bool& space) {
   if (type.is_text() && type.value() == "channel") axis.kind = AxisKind::kChannel;
   if (space && !IsSpace(axis.kind)) axis.kind = AxisKind::kOther;
   if (space && unit.is_text()) axis.unit = LengthUnitNamed(*unit.Text());
+  if (axis.kind == AxisKind::kTime && unit.is_text()) axis.time_unit = *unit.Text();
   return axis;
 }
 

@@ -18,6 +18,7 @@ struct OmeAxis {
   std::string name;  // "z"
   AxisKind kind = AxisKind::kOther;
   std::optional<LengthUnit> unit = {};  // the unit of x, y and z
+  std::string time_unit = {};           // the unit of time, as the file spells it; "": it states none
 };
 
 // `list`: of 2 to kMaxArrayAxes axes; not stated: those of 0.1 and 0.2. Axes of type space whose names say nothing are z, y and x in this

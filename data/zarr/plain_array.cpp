@@ -16,9 +16,10 @@
 
 #include "common/base/printable.h"
 #include "common/volume/volume.h"
-#include "data/sources/even_steps.h"
 #include "data/sources/mapped_array.h"
+#include "data/volume_io/even_steps.h"
 #include "data/volume_io/length_names.h"
+#include "data/volume_io/stated_field.h"
 #include "data/zarr/find_volume.h"
 
 namespace slabstream::zarr {
@@ -96,13 +97,22 @@ Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& conte
   return std::optional(std::move(coordinates));
 }
 
-// Spacing, origin and unit by coordinates that lie beside the array.
+// Spacing, origin, unit and times by coordinates that lie beside the array.
 Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
-                          const AxisChoice& choice, const std::vector<std::uint64_t>& sizes, Pyramid& pyramid) {
+                          const std::vector<AxisKind>& kinds, const AxisChoice& choice, const std::vector<std::uint64_t>& sizes,
+                          Pyramid& pyramid) {
   const std::size_t slash = node.path.rfind('/');
   if (node.path.empty()) return Status::Ok();
   const std::string group = slash == std::string::npos ? "" : node.path.substr(0, slash);
   PyramidLevel& level = pyramid.levels.front();
+  if (const auto time = std::ranges::find(kinds, AxisKind::kTime); time != kinds.end() && choice.times > 1) {
+    const auto number = std::size_t(time - kinds.begin());
+    const Result<std::optional<AxisCoordinates>> coordinates = ReadCoordinates(context, group, names[number], sizes[number]);
+    if (coordinates.ok() && *coordinates) {
+      const auto& [values, unit] = **coordinates;
+      pyramid.info.times = StatedTimes(choice.times, values, unit.substr(0, unit.find(' ')));  // "hours since 2000-01-01"
+    }
+  }
   std::vector<std::string> placed, units;
   for (const Axis axis : kAxes) {
     const int number = choice.axes[std::size_t(axis)];
@@ -218,7 +228,7 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
     pyramid.levels.back().spacing = *options.spacing;
     return pyramid;
   }
-  if (Status status = PlaceByCoordinates(context, node, *names, *choice, sizes, pyramid); !status.ok()) return status;
+  if (Status status = PlaceByCoordinates(context, node, *names, *kinds, *choice, sizes, pyramid); !status.ok()) return status;
   return pyramid;
 }
 

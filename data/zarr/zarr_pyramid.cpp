@@ -20,6 +20,7 @@
 #include "data/metadata/open_store_for.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
+#include "data/volume_io/stated_field.h"
 #include "data/zarr/consolidated_store.h"
 #include "data/zarr/find_volume.h"
 #include "data/zarr/ome.h"
@@ -145,8 +146,6 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   if (options.spacing) return Status::InvalidArgument(name + ": states its spacing, so it takes no option spacing");
   std::vector<AxisKind> kinds;
   for (const OmeAxis& axis : image->axes) kinds.push_back(axis.kind);
-  std::vector<std::string> names;
-  for (const OmeChannel& channel : image->channels) names.push_back(channel.name);
 
   Pyramid pyramid;
   AxisChoice choice;
@@ -165,7 +164,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
       return Status::InvalidArgument(
           fmt::format("{}: has {} axes, must have {} as its image", array_name, sizes.back().size(), kinds.size()));
     }
-    const Result<AxisChoice> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, names);
+    const Result<AxisChoice> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, image->channels);
     if (!chosen.ok()) return chosen.status();
     if (sizes.size() == 1) choice = *chosen;
     pyramid.levels.push_back(LevelOf(*array, *chosen));
@@ -174,20 +173,15 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   if (Status status = PlaceInWorld(node.attributes_field()["slabstream"], pyramid); !status.ok()) return status;
 
   SourceInfo& info = pyramid.info;
-  info = {.format = "OME-Zarr " + Printable(image->version),
-          .labels = image->labels,
-          .looks = image->looks,
-          .channel = choice.channel,
-          .times = choice.times,
-          .time = choice.time,
-          .notes = image->notes};
-  const auto channel = std::size_t(choice.channel);
-  const bool described = channel < image->channels.size();
-  if (choice.channels > 1 || (described && !names.front().empty())) {
-    info.channels = names;
-    info.channels.resize(std::size_t(choice.channels));
+  info = {.format = "OME-Zarr " + Printable(image->version), .labels = image->labels, .looks = image->looks, .notes = image->notes};
+  choice.Describe(info);
+  for (FieldInfo& channel : info.channels) {
+    if (channel.window) channel.window = StatedWindow(channel.window->min, channel.window->max, pyramid.rescale);
   }
-  if (described) info.window = image->channels[channel].window;
+  if (const auto time = std::ranges::find(kinds, AxisKind::kTime); time != kinds.end() && image->scaled) {
+    const auto axis = std::size_t(time - kinds.begin());
+    info.times = StatedTimes(choice.times, image->levels.front().place.scale[axis], image->axes[axis].time_unit);
+  }
   return pyramid;
 }
 

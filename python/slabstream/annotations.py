@@ -48,8 +48,11 @@ def key_of(frame: Any, summary: Any) -> dict[str, Any]:
         return [min(channel * brightness, 1.0) for channel in (color.r, color.g, color.b)]
 
     key: dict[str, Any] = {}
-    colors = summary.transfer.colors
-    if colors[0].value < colors[-1].value and any(point.opacity > 0 for point in summary.transfer.opacities):
+    colors, opacities = list(summary.transfer.colors), summary.transfer.opacities
+    if len(colors) == 1 and len(opacities) > 1 and opacities[0].opacity == 0:  # a channel: one colour, from clear to opaque
+        only = colors[0]
+        colors = [type(only)(value=opacities[0].value), type(only)(value=opacities[-1].value, r=only.r, g=only.g, b=only.b)]
+    if colors[0].value < colors[-1].value and any(point.opacity > 0 for point in opacities):
         key["bar"] = {"colors": [[point.value, *bright(point)] for point in colors], "low": colors[0].value, "high": colors[-1].value}
     entries = []
     if frame.HasField("labels"):

@@ -5,7 +5,7 @@ import dataclasses
 import difflib
 import functools
 import unicodedata
-from typing import Any, Callable, Mapping
+from typing import Any, Callable, Iterable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
 
@@ -48,8 +48,7 @@ _MESSAGES: dict[str, Callable[[str, Any], Any]] = {
 def _text(option: Option, value: Any) -> str:
     if option.choices:
         values.choice(option.name, value, option.choices)
-    if isinstance(value, int) and not isinstance(value, bool):
-        value = str(value)  # level=2
+    value = values.whole_text(value)  # level=2
     if not isinstance(value, str) or not 1 <= len(value.encode()) <= values.MOST_NAME_BYTES:
         raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {values.MOST_NAME_BYTES} bytes")
     return value
@@ -96,15 +95,81 @@ def _transfer(draft: Draft, option: Option, value: Any, choice: Any) -> None:
         transfer.choose(option.name, value, choice)
     elif option.path.startswith("transfer."):
         draft.colors, choice.preset = colors, _PRESET_OF_MAPS
-    else:  # an overlay's: its values are not known here, so it is stretched over all of them
-        choice.function.CopyFrom(transfer.mapped(colors, 0, 1, transfer.TransferFunction(opacities=[(0, 0), (1, 1)]).message().opacities))
-        if not choice.HasField("scalar_range"):
-            choice.scalar_range.min, choice.scalar_range.max, choice.scalar_range.percentiles = 0, 100, True
+    else:
+        _stretch(colors, choice)
+
+
+def _stretch(colors: transfer.Colors, choice: Any) -> None:
+    """Of an overlay or a channel: its values are not known here, so the colours span all of them."""
+    choice.function.CopyFrom(transfer.mapped(colors, 0, 1, transfer.TransferFunction(opacities=[(0, 0), (1, 1)]).message().opacities))
+    if not choice.HasField("scalar_range"):
+        choice.scalar_range.min, choice.scalar_range.max, choice.scalar_range.percentiles = 0, 100, True
 
 
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
     text = _choice(option, value) if option.choices else values.text_of(_number(option, value))
     draft.frame.parameters.add(name=option.text_name, text=text)
+
+
+def _channel_color(name: str, value: Any) -> Any:
+    red, green, blue, alpha = values.color(name, value)
+    if alpha != 1:
+        raise InvalidArgument(f"{name} {value!r} has an opacity of {alpha:g}, but must be opaque")
+    return schema.Color(r=red, g=green, b=blue)
+
+
+_LOOK = ("color", "range", "gamma", "opacity", "transfer", "shown")
+
+
+def _channel_look(name: str, key: str, look: Mapping[str, Any]) -> Any:
+    """FieldChoice."""
+    choice = schema.FieldChoice(field=key)
+    for field in look:
+        if field not in _LOOK:
+            raise InvalidArgument(f"{name} has the field {field!r}, must be one of: {', '.join(_LOOK)}")
+    given = {field: value for field, value in look.items() if value is not None}
+    if "color" in given:
+        choice.color.CopyFrom(_channel_color(f"{name} color", given["color"]))
+    if "range" in given:
+        choice.scalar_range.CopyFrom(values.scalar_range(f"{name} range", given["range"]))
+    if "gamma" in given:
+        choice.gamma = values.number(f"{name} gamma", given["gamma"], 0.01, 100)
+    if "opacity" in given:
+        choice.weight = values.number(f"{name} opacity", given["opacity"], 0, 1)
+    if "transfer" in given:
+        colors = transfer.color_map(given["transfer"])
+        if colors is None:
+            transfer.choose(f"{name} transfer", given["transfer"], choice)
+        else:
+            _stretch(colors, choice)
+    return choice
+
+
+_MOST_CHANNELS = 16
+
+
+def _channels(draft: Draft, option: Option, value: Any) -> None:
+    """[0, "Actin"], one of them, "0,Actin", or looks by channel: {"Actin": {"color": "magenta"}, 1: {"shown": False}}."""
+    looks: Mapping[Any, Any] = value if isinstance(value, Mapping) else {}
+    shown = []
+    for item in value.split(",") if isinstance(value, str) else value if isinstance(value, Iterable) else [value]:
+        key = values.whole_text(item)
+        if not isinstance(key, str) or not 1 <= len(key.encode()) <= values.MOST_NAME_BYTES:
+            raise InvalidArgument(f"{option.name} {item!r} is neither a number nor a name of 1 to {values.MOST_NAME_BYTES} bytes")
+        look = looks.get(item)
+        name = f"{option.name}[{item!r}]"
+        if isinstance(look, (bool, type(None))):
+            look = {"shown": look is not False}
+        if not isinstance(look, Mapping):
+            raise InvalidArgument(f"{name} {look!r} is no look, such as {{'color': 'magenta', 'range': (100, 4000)}}")
+        choice = _channel_look(name, key, look)
+        if values.flag(f"{name} shown", look.get("shown", True)):
+            shown.append(key)
+        if choice != schema.FieldChoice(field=key):
+            draft.frame.fields.append(choice)
+    if not 1 <= len(shown) <= _MOST_CHANNELS:
+        raise InvalidArgument(f"{option.name} shows {len(shown)} channels, must be 1 to {_MOST_CHANNELS}")
+    draft.frame.channels.extend(shown)
 
 
 # ---- options that are no field, or several
@@ -204,6 +269,7 @@ def _in(place: str, parse: Callable[[Option, Any], Any], field: str = "") -> Put
 _PUT: dict[str, Put] = {
     "view": _view,
     "camera": _camera,
+    "channels": _channels,
     "background": _in("format", lambda option, value: values.color(option.name, value)),
     "depth": _in("format", lambda option, value: int(_choice(option, value)), "png_bits"),
     "quality": _in("format", _whole),

@@ -53,9 +53,23 @@ def _option(entry: dict[str, Any]) -> Option:
     return Option(**given, **{name: tuple(entry[name]) if isinstance(entry[name], list) else entry[name] for name in as_they_are})
 
 
+#: In place of --channel and of the options of single channels.
+_CHANNELS = {"name": "channels", "type": "CHANNELS", "help": (
+    "Channels that are shown, by their numbers or names, [0, \"Actin\"]; or with their looks, {\"Actin\": {\"color\": \"magenta\", "
+    "\"range\": (100, 4000), \"gamma\": 0.7, \"opacity\": 0.5}}, with \"transfer\" in place of colour and gamma, and with \"shown\": False for "
+    "one that is not shown (default: those that the file shows)")}
+
+
+def _in_python(entry: dict[str, Any]) -> dict[str, Any] | None:
+    """The option as it is here; None: it is part of another one."""
+    path = entry.get("path", "")
+    return None if path.startswith("fields.") else {"group": entry["group"], **_CHANNELS} if path == "channels" else entry
+
+
 def _load() -> dict[str, dict[str, Option]]:
     commands = json.loads(pathlib.Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
-    return {command: {option.name: option for option in map(_option, entries)} for command, entries in commands.items()}
+    kept = {command: [each for each in map(_in_python, entries) if each is not None] for command, entries in commands.items()}
+    return {command: {option.name: option for option in map(_option, entries)} for command, entries in kept.items()}
 
 
 #: By command and keyword.

@@ -32,6 +32,15 @@ _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
 
+def _of(field: int | str | None, time: int | str | None) -> dict[str, str]:
+    """What a question is about."""
+    of = {"field": values.whole_text(field), "time": values.whole_text(time)}
+    for name, text in of.items():
+        if text is not None and (not isinstance(text, str) or len(text.encode()) > values.MOST_NAME_BYTES):
+            raise InvalidArgument(f"{name} {text!r} is neither a number nor a text of at most {values.MOST_NAME_BYTES} bytes")
+    return {name: text for name, text in of.items() if text is not None}
+
+
 def _with_views(draft: Draft, views: Iterator[Any]) -> Iterator[Draft]:
     for view in views:
         moved = copy.copy(draft)
@@ -126,28 +135,36 @@ class Service(contextlib.AbstractContextManager["Service"]):
         self._settle(drafts)
         return side_by_side(list(self._pipelined(iter(drafts), 3, deadline)))
 
-    def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
-        """How often which value occurs in a dataset."""
-        return probe.histogram_of(self._summary(dataset, timeout))
+    def histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
+                  timeout: float = _QUESTION_SECONDS) -> Histogram:
+        """How often which value occurs in a dataset. `field`: a channel's number or name (usually the first one that is shown); `time`: as the
+        option of that name takes it (usually that of the file)."""
+        return probe.histogram_of(self._summary(dataset, timeout, **_of(field, time)))
 
-    def joint_histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> JointHistogram:
-        """How often which value occurs together with which slope, for two-dimensional transfer functions."""
-        return probe.joint_histogram_of(self._connection.ask("joint_histogram_query", schema.JointHistogramQuery(dataset=dataset), timeout))
+    def joint_histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
+                        timeout: float = _QUESTION_SECONDS) -> JointHistogram:
+        """How often which value occurs together with which slope, for two-dimensional transfer functions. `field`, `time`: as of histogram()."""
+        query = schema.JointHistogramQuery(dataset=dataset, **_of(field, time))
+        return probe.joint_histogram_of(self._connection.ask("joint_histogram_query", query, timeout))
 
     def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
         """The labels that occur in a dataset, by value; empty: it has no labels."""
         return probe.labels_of(self._summary(dataset, timeout))
 
-    def label_statistics(self, dataset: str, *, clip_box: Any = None, timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
+    def label_statistics(self, dataset: str, *, clip_box: Any = None, field: int | str | None = None, time: int | str | None = None,
+                         timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
         """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
-        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it."""
+        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it. `field`, `time`: as of
+        histogram()."""
         box = values.clip_box("clip_box", ":,:,:" if clip_box is None else clip_box)
-        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box)
+        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box, **_of(field, time))
         return probe.label_statistics_of(self._connection.ask("statistics_query", query, timeout))
 
-    def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
-        """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
-        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))])
+    def value(self, dataset: str, at: Any, *, field: int | str | None = None, time: int | str | None = None,
+              timeout: float = _QUESTION_SECONDS) -> Sample | None:
+        """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume. `field`, `time`: as of
+        histogram()."""
+        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], **_of(field, time))
         return probe.sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
 
     @takes_options_of("render")
@@ -208,9 +225,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def __repr__(self) -> str:
         return f"<slabstream.Service at {self.endpoint}>"
 
-    def _summary(self, dataset: str, timeout: float) -> Any:
+    def _summary(self, dataset: str, timeout: float, **of: str) -> Any:
         transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
-        return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout)
+        return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer, **of), timeout)
 
     def _settle(self, drafts: list[Draft]) -> None:
         """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans, and what colour bar and legend say."""
@@ -230,7 +247,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
 
     def _transfer_of(self, draft: Draft) -> Any:
         """The dataset's summary under the transfer function of the draft."""
-        query = schema.SummaryQuery(dataset=draft.frame.dataset, transfer=draft.frame.transfer)
+        frame = draft.frame
+        query = schema.SummaryQuery(dataset=frame.dataset, transfer=frame.transfer, field=frame.channels[0] if frame.channels else "", time=frame.time,
+                                    looks=frame.fields, flat=frame.clipping.HasField("slab"))
         if query.transfer.WhichOneof("choice") is None:
             query.transfer.preset = "auto"
         if not query.transfer.HasField("opacity_distance"):

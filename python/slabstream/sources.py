@@ -81,10 +81,13 @@ class Source:
         self.levels: tuple[Level, ...] = tuple(
             Level(number, _zyx(level["size"]), _zyx(level["spacing"]), dtype, self) for number, level in enumerate(described)
         )
-        self.channels: tuple[str, ...] = tuple(about.get("channels", ()))  # their names; none: there is one without a name
+        channels: list[dict[str, Any]] = about.get("channels", [])
+        self.channels: tuple[str, ...] = tuple(channel["name"] for channel in channels)  # none: there is one without a name
         self.times: int = about.get("times", 1)
+        self.time_step: float | None = about.get("time_step")  # from a time to the next one, in `time_unit`; None: not known
+        self.time_unit: str = about.get("time_unit", "")       # "s", "ms", ...; "": not known
         self.value_range: tuple[float, float] = (about["range"]["min"], about["range"]["max"])
-        window = about.get("window")        # that the file's author shows
+        window = channels[about["channel"]]["window"] if channels else None  # that the file's author shows
         self.window: tuple[float, float] | None = (window["min"], window["max"]) if window else None
 
     def read(self, level: int = 0, box: Any = None) -> Array:

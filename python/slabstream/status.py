@@ -14,6 +14,17 @@ class DatasetLevel:
 
 
 @dataclasses.dataclass(frozen=True)
+class Field:
+    """A channel of a dataset, or another field of it, such as an overlay. What its author shows is None where the file does not say."""
+
+    name: str = ""                                   # "": it has none, and is called by its number
+    channel: bool = True                             # of the volume, on its grid; else it has a grid of its own
+    color: tuple[float, float, float] | None = None  # straight red, green, blue, from 0 to 1
+    window: tuple[float, float] | None = None        # data values that are dark and bright
+    shown: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
 class Dataset:
     name: str
     state: str                                      # "unloaded", "loading", "ready" or "failed"
@@ -28,6 +39,12 @@ class Dataset:
     overlay: bool = False
     cells: int = 0                                  # tetrahedra of an unstructured grid; 0: it is a volume
     levels: tuple[DatasetLevel, ...] = ()           # finest first, at least one
+    fields: tuple[Field, ...] = ()                  # by number, channels first; of a ready one at least one
+    times: int = 1
+    time_step: float | None = None                  # from a time to the next one, in `time_unit`; None: not known
+    time_unit: str = ""                             # "s", "ms", "min", "h"; "": not known
+    field: int = 0                                  # these are shown if nothing is said
+    time: int = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,9 +95,15 @@ def dataset_of(message: Any) -> Dataset:
     if state != "ready":
         return Dataset(message.name, state, message.error)
     about = message.description
+    known = message.fields
+    fields = tuple(
+        Field(each.name, each.channel, (each.color.r, each.color.g, each.color.b) if each.HasField("color") else None,
+              (each.window.min, each.window.max) if each.HasField("window") else None, each.shown) for each in known.fields)
     levels = tuple(DatasetLevel(schema.zyx(level.size), schema.zyx(level.spacing)) for level in message.levels or [about])
     return schema.read(Dataset, message, state=state, shape=schema.zyx(about.size), spacing=schema.zyx(about.spacing),
-                       dtype=schema.word(about, "type") or None, value_range=(message.range.min, message.range.max), levels=levels)
+                       dtype=schema.word(about, "type") or None, value_range=(message.range.min, message.range.max), levels=levels,
+                       fields=fields or (Field(),), times=max(known.times, 1), time_unit=known.time_unit, field=known.field, time=known.time,
+                       time_step=known.time_step if known.HasField("time_step") else None)
 
 
 def status_of(message: Any, endpoint: str) -> Status:

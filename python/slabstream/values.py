@@ -79,6 +79,11 @@ def integer(name: str, value: object, least: int, most: int) -> int:
     return found
 
 
+def whole_text(value: Any) -> Any:
+    """The text of a whole number; anything else as it is."""
+    return str(operator.index(value)) if hasattr(value, "__index__") and not isinstance(value, (bool, numpy.bool_)) else value
+
+
 def flag(name: str, value: object) -> bool:
     if isinstance(value, (bool, numpy.bool_)):
         return bool(value)
@@ -195,15 +200,16 @@ def directions(name: str, value: object) -> list[Any]:
 
 
 def color(name: str, value: object) -> Color:
-    """(r, g, b) or (r, g, b, a) from 0 to 1, "R,G,B", "#rrggbb", "#rrggbbaa", or a name such as "white"."""
+    """(r, g, b) or (r, g, b, a) from 0 to 1, "R,G,B", "#rgb", "#rrggbb", "#rrggbbaa", or a name such as "white"."""
     text = NAMED_COLORS.get(value, value) if isinstance(value, str) else value
     if isinstance(text, str) and text.startswith("#"):
         try:
-            codes = bytes.fromhex(text[1:]) if text.isascii() and " " not in text else b""
+            digits = "".join(2 * digit for digit in text[1:]) if len(text) == 4 else text[1:]
+            codes = bytes.fromhex(digits) if text.isascii() and " " not in text else b""
         except ValueError:
             codes = b""
         if len(codes) not in (3, 4):
-            raise InvalidArgument(f"{name} '{value}' is neither #rrggbb nor #rrggbbaa")
+            raise InvalidArgument(f"{name} '{value}' is neither #rgb nor #rrggbb nor #rrggbbaa")
         channels = [float(numpy.float32(code) / numpy.float32(255)) for code in codes]
     else:
         parts = _listed(text)

@@ -240,7 +240,7 @@ TEST_F(ClientTest, AnAnswerLeavesTheEventsOfOthers) {
   const RequestId frame = client.Submit(SmallRequest());
   const RequestId question = client.Submit(SampleQuery{.dataset = "ball", .points = {{}}});
   EXPECT_TRUE(client.QueryStatus(seconds(30)).ok());
-  EXPECT_EQ(client.SampleAt("ball", {{}}, seconds(30)).value().size(), 1U);
+  EXPECT_EQ(client.SampleAt({.dataset = "ball", .points = {{}}}, seconds(30)).value().size(), 1U);
   EXPECT_TRUE(client.Render(SmallRequest()).ok());
   std::optional<ClientEvent> event = client.Next(seconds(30));
   ASSERT_TRUE(event && std::holds_alternative<FrameProgress>(event->what));
@@ -263,10 +263,10 @@ TEST_F(ClientTest, QuestionsAndOrdersThatAreNotAnsweredFail) {
   const Status order = client.OrderData({}, milliseconds(30)).status();
   EXPECT_EQ(order.code(), StatusCode::kUnavailable);
   EXPECT_THAT(order.message(), testing::AllOf(HasSubstr(service.endpoint()), HasSubstr("30 ms")));
-  const Status question = client.Summarize("ball", {}, milliseconds(30)).status();
+  const Status question = client.Summarize({.dataset = "ball"}, milliseconds(30)).status();
   EXPECT_EQ(question.code(), StatusCode::kDeadlineExceeded);
   EXPECT_THAT(question.message(), testing::AllOf(HasSubstr(service.endpoint()), HasSubstr("30 ms")));
-  EXPECT_EQ(client.Summarize("confused", {}, seconds(30)).status().code(), StatusCode::kInternal);
+  EXPECT_EQ(client.Summarize({.dataset = "confused"}, seconds(30)).status().code(), StatusCode::kInternal);
 
   client.Submit(SummaryQuery{.dataset = "confused"}, seconds(30));
   const std::optional<ClientEvent> event = client.Next(seconds(30));

@@ -186,7 +186,7 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--light", "1,2"}, "--light '1,2'"},
       {nine_lights, "at most 8"},
       {{"--background", "1,1,2"}, "--background 2"},
-      {{"--background", "#12"}, "is neither #rrggbb nor #rrggbbaa"},
+      {{"--background", "#12"}, "is neither #rgb nor #rrggbb nor #rrggbbaa"},
       {{"--background", "rouge"}, "nor the name of a colour"},
       {{"--clip-box", "0:1,0:1"}, "--clip-box '0:1,0:1' is not X0:X1,Y0:Y1,Z0:Z1"},
       {{"--clip-box", "0:1,3:2,:"}, "y runs from 3 to 2, but must rise"},

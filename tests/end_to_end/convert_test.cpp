@@ -174,7 +174,7 @@ TEST_F(ConvertTest, WhatIsWrongIsNamed) {
   ExpectRefused({"convert", "s.nrrd?time=1", "a.mha", "--time", "1"}, "time is given twice");
   ExpectRefused({"info", "s.nrrd", "--time", "1"}, "s.nrrd: time is 1, must be in [0, 0]");
   ExpectRefused({"info", "s.nrrd?tine=1"}, "'tine' is no option for reading a file");
-  ExpectRefused({"render", "s", "-o", "s.png", "--time", "1"}, "'s' is a dataset at the service");
+  ExpectRefused({"render", "s", "-o", "s.png", "--spacing", "1,1,1"}, "'s' is a dataset at the service");
   EXPECT_THAT(Files(), testing::ElementsAre("s.nrrd"));
 }
 

@@ -123,7 +123,7 @@ TEST_F(GridTest, WhatCannotBeDrawnIsRefused) {
                     {{{"ball.nrrd"}, "draws the cells of unstructured grids"},
                      {{"grid.vtu", "--array", "none"}, "has no array 'none'"},
                      {{"grid.vtu", "--lattice", "2000"}, "[1, 1024]"},
-                     {{"grid.vtu", "--channel", "1"}, "has 1 component a voxel, so channel must be 0"},
+                     {{"grid.vtu", "--channel", "1"}, "has no field '1': it has 0"},
                      {{"grid.vtu", "--isovalue", "1"}, "isovalue"},
                      {{"grid.vtu", "--sampling-rate", "0"}, "sampling-rate"}});
 }

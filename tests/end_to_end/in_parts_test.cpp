@@ -239,7 +239,7 @@ TEST_F(InPartsTest, AServiceGoesOnAfterBadChunksAndReadsThemAgainOnceTheyAreRepa
   for (const auto& damage : damages) {
     damage();
     const ProgramResult result = Slabstream({"render", "ball", "-o", "no.png", "--level", "0"});
-    EXPECT_EQ(result.exit_status, 1);
+    EXPECT_EQ(result.exit_status, 2);
     ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
     EXPECT_THAT(result.err, HasSubstr("ball.ome.zarr/0/c/0/0/0"));
     MustRun({"render", "other", "-o", "other.png"});

@@ -73,29 +73,23 @@ TEST_F(NotesTest, AnEmptyPictureSaysWhatWouldShowSomething) {
   EXPECT_THAT(SaidBy("slice", {"--plane", "z", "--at", "0,0,99"}), ElementsAre(HasSubstr("the plane of --at leaves nothing")));
 }
 
-TEST_F(NotesTest, WhoDidNotChooseAChannelIsToldWhichOneIsShown) {
+TEST_F(NotesTest, WhoConvertsOneChannelOfSeveralIsToldWhichOne) {
   std::filesystem::create_directories(Path("em/4_4_4"));
   std::ofstream(Path("em/info")) << R"({"data_type": "uint8", "num_channels": 2, "type": "image", "scales": [{"key": "4_4_4",
       "size": [4, 4, 4], "chunk_sizes": [[4, 4, 4]], "resolution": [4, 4, 4], "encoding": "raw"}]})";
   std::ofstream(Path("em/4_4_4/0-4_0-4_0-4"), std::ios::binary) << std::string(64, char(10)) << std::string(64, char(20));
   const std::string note = "em: shows channel 0 of 2; --channel takes another one: 0 to 1";
-  const auto said = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {"render", "em", "--local=1", "--size", "16", "-o", "x.png", "--scalar-range", "0:30"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return MustRun(arguments).err_lines();
-  };
-  EXPECT_THAT(said({}), ElementsAre(HasSubstr(note)));
-  EXPECT_THAT(said({"--channel", "0"}), IsEmpty());
+  EXPECT_THAT(MustRun({"render", "em", "--local=1", "--size", "16", "-o", "x.png", "--channel", "1"}).err_lines(), IsEmpty());
   EXPECT_THAT(MustRun({"info", "em", "--channel", "1"}).out,
-              AllOf(HasSubstr("channels     2: \"\" \"\"; this is number 1\n"), HasSubstr("values       20 ... 20")));
+              AllOf(HasSubstr("channels     2: name, colour, window; this is number 1\n   0  \"\"  no colour  no window\n   1  \"\""),
+                    HasSubstr("values       20 ... 20")));
   EXPECT_THAT(MustRun({"convert", "em", "em.ome.zarr"}).err_lines(), ElementsAre(HasSubstr(note)));
 }
 
-TEST_F(NotesTest, OfSeveralTimesTheFirstIsShownAndToldOf) {
+TEST_F(NotesTest, OfSeveralTimesTheFirstIsShown) {
   const std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 2, 2, 2), }\n";
   std::ofstream(Path("beat.npy"), std::ios::binary)
       << "\x93NUMPY\x01" << '\0' << char(header.size()) << '\0' << header << "abcdefghijklmnopqrstuvwx";
-  const std::string note = "beat.npy: shows time 0 of 3; --time takes another one: 0 to 2";
   const std::vector<std::string> render = {"render", "beat.npy", "--local=1", "--size", "16", "--transfer", "opaque", "-o"};
   const auto picture = [&](const std::string& name, const std::vector<std::string>& more) {
     std::vector<std::string> arguments = render;
@@ -103,12 +97,35 @@ TEST_F(NotesTest, OfSeveralTimesTheFirstIsShownAndToldOf) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return MustRun(arguments).err_lines();
   };
-  EXPECT_THAT(picture("any.png", {}), ElementsAre(HasSubstr(note)));
+  EXPECT_THAT(picture("any.png", {}), IsEmpty());
   EXPECT_THAT(picture("first.png", {"--time", "0"}), IsEmpty());
   EXPECT_EQ(LargestDifference(ReadPicture(Path("any.png")), ReadPicture(Path("first.png"))), 0);
   EXPECT_THAT(MustRun({"info", "beat.npy"}).out,
               AllOf(HasSubstr("times        3; this is number 0\n"), HasSubstr("values       97 ... 104")));
   ExpectRefused({"convert", "beat.npy", "beat.nrrd"}, "holds 3 volumes, of which --time takes one: 0 to 2");
+}
+
+TEST_F(NotesTest, InfoTellsHowChannelsAreShownAndHowFarTimesAreApart) {
+  std::filesystem::create_directories(Path("cells.zarr/0"));
+  std::ofstream(Path("cells.zarr/.zgroup")) << R"({"zarr_format": 2})";
+  std::ofstream(Path("cells.zarr/.zattrs")) << R"({"multiscales": [{"version": "0.4", "axes": [
+      {"name": "t", "type": "time", "unit": "second"}, {"name": "c", "type": "channel"}, {"name": "z", "type": "space"},
+      {"name": "y", "type": "space"}, {"name": "x", "type": "space"}],
+      "datasets": [{"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [0.5, 1, 1, 1, 1]}]}]}],
+      "omero": {"channels": [{"label": "DAPI", "color": "0000FF", "window": {"start": 5, "end": 200}}, {"active": false}]}})";
+  std::ofstream(Path("cells.zarr/0/.zarray")) << R"({"zarr_format": 2, "shape": [3, 2, 2, 2, 2], "chunks": [1, 1, 2, 2, 2], "dtype": "|u1",
+      "compressor": null, "filters": null, "fill_value": 0, "order": "C"})";
+  EXPECT_THAT(MustRun({"info", "cells.zarr"}).out, HasSubstr("times        3, 0.5 s apart; this is number 0\n"
+                                                             "channels     2: name, colour, window; this is number 0\n"
+                                                             "   0  \"DAPI\"  #0000ff  5 ... 200\n"
+                                                             "   1  \"\"  no colour  no window  (hidden)\n"));
+  const Json json = Json::Parse(MustRun({"info", "cells.zarr", "--json"}).out).value();
+  EXPECT_EQ(json["channels"], Json::Parse(R"([{"name": "DAPI", "color": "#0000ff", "window": {"min": 5, "max": 200}, "shown": true},
+      {"name": "", "color": null, "window": null, "shown": false}])")
+                                  .value());
+  EXPECT_EQ(json["times"], 3);
+  EXPECT_EQ(json["time_step"], 0.5);
+  EXPECT_EQ(json["time_unit"], "s");
 }
 
 TEST_F(NotesTest, OfSeveralComponentsTheFirstIsShownAndToldOf) {
@@ -117,7 +134,8 @@ TEST_F(NotesTest, OfSeveralComponentsTheFirstIsShownAndToldOf) {
                                                     << "a..b..c..d..e..f..g..h..";
   EXPECT_THAT(MustRun({"render", "rgb.nrrd", "--local=1", "--size", "16", "--transfer", "opaque", "-o", "x.png"}).err_lines(),
               ElementsAre(HasSubstr("rgb.nrrd: shows component 0 of 3; --channel takes another one: 0 to 2, or luminance")));
-  EXPECT_THAT(MustRun({"info", "rgb.nrrd"}).out, HasSubstr("values       97 ... 104"));
+  EXPECT_THAT(MustRun({"info", "rgb.nrrd"}).out,
+              AllOf(HasSubstr("components   3 of a voxel; this is number 0\n"), HasSubstr("values       97 ... 104")));
   ExpectRefused({"convert", "rgb.nrrd", "grey.nrrd"}, "has 3 components a voxel, of which --channel takes one");
 }
 

@@ -35,7 +35,7 @@ void CheckSound(const DicomSeries& series, std::int64_t file_bytes) {
   if (!series.trouble.ok()) return CheckRefusal(series.trouble);
   const DicomStack& stack = series.stack;
   if (stack.places.empty()) {
-    CHECK_EQ(std::size_t(stack.size.z) * std::size_t(stack.volumes), series.frame_count());
+    CHECK_EQ(std::size_t(stack.size.z) * std::size_t(stack.times.count), series.frame_count());
     std::vector<std::size_t> order = stack.order;
     std::ranges::sort(order);
     for (std::size_t i = 0; i < order.size(); ++i) CHECK_EQ(order[i], i);

@@ -44,6 +44,16 @@ bool DecodeColor(const std::string& text) {
   return true;
 }
 
+bool DecodeNames(const std::string& text) {
+  const Result<std::vector<std::string>> names = ParseNames("--channel", text);
+  if (Taken(names) != nullptr) CHECK(*ParseNames("--channel", slabstream::TextOf(*names)) == *names);
+  const Result<std::vector<NamedText>> named = ParseNamedTexts("--channel-color", text);
+  if (Taken(named) != nullptr) {
+    for (const auto& [name, value] : *named) CHECK(!name.empty());
+  }
+  return names.ok() || named.ok();
+}
+
 bool DecodePattern(const std::string& text) {
   const Result<FramePattern> pattern = FramePattern::Parse("-o", text);
   if (Taken(pattern) == nullptr) return false;
@@ -95,16 +105,34 @@ bool DecodeValue(std::span<const std::byte> bytes) {
   bool taken = false;
   // A path of the input would be a file of this machine.
   const bool names_file = text.find_first_of("/.") != std::string::npos;
-  for (const auto decode : {DecodeSize, DecodeDirection, DecodeColor, DecodePattern, DecodeNumbers, DecodeEndpoint, DecodeLink})
+  for (const auto decode :
+       {DecodeSize, DecodeDirection, DecodeColor, DecodeNames, DecodePattern, DecodeNumbers, DecodeEndpoint, DecodeLink})
     taken = decode(text) || taken;
   return (!names_file && DecodeVolumeArgument(text)) || taken;
 }
 
 std::vector<FuzzBytes> ValueSeeds() {
   std::vector<FuzzBytes> seeds;
-  for (const char* text :
-       {"640x480", "512", "1,-2,0.5", "0,0.5,1", "0,0,0,0.25", "frame_%04d.png", "100%%_%3i.exr", "2.5e1", "+0.001", "tcp://127.0.0.1:7420",
-        "tcp://[::1]:*", "tcp://node7.cluster:80", "ipc:///run/a.sock", "inproc://name", "10gbit", "1gbit:30,1", "brain:opaque"})
+  for (const char* text : {"640x480",
+                           "512",
+                           "1,-2,0.5",
+                           "0,0.5,1",
+                           "0,0,0,0.25",
+                           "frame_%04d.png",
+                           "100%%_%3i.exr",
+                           "2.5e1",
+                           "+0.001",
+                           "tcp://127.0.0.1:7420",
+                           "tcp://[::1]:*",
+                           "tcp://node7.cluster:80",
+                           "ipc:///run/a.sock",
+                           "inproc://name",
+                           "0=green,Actin=1,0.5,0",
+                           "a\\\\,b,c\\\\=d",
+                           "0={\"a\": [\",]\"]},1=[2]",
+                           "10gbit",
+                           "1gbit:30,1",
+                           "brain:opaque"})
     seeds.push_back(SeedOf(text));
   return seeds;
 }

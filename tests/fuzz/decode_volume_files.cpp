@@ -7,6 +7,7 @@
 #include "data/volume_io/formats.h"
 #include "data/volume_io/volume_writer.h"
 #include "tests/data/volume_io/more_files.h"
+#include "tests/data/volume_io/tiff_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
@@ -152,11 +153,16 @@ std::vector<FuzzBytes> VolumeFileSeeds() {
     }
   }
   const std::string ome =
-      "<OME><Image><Pixels SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"2\"/></Image></OME>";
+      "<OME><Image><Pixels SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"2\" TimeIncrement=\"2\">"
+      "<Channel Color=\"-1\"/></Pixels></Image></OME>";
   const std::string imagej = "ImageJ=1.54f\nimages=2\nslices=2\nspacing=2\nunit=um\ncf=0\nc0=1\nc1=2\nmin=3\nmax=4\n";
   for (const std::string& description : {ome, imagej, std::string("{\"shape\": [2, 3, 4], \"axes\": \"ZYX\"}")}) {
     WriteTiff(path, {}, FileBytes(24, 'x'), {.description = description});
     seeds.push_back(Seed(".tif", ReadFile(path)));
+  }
+  for (const bool big_endian : {false, true}) {
+    const ImageJEntries looks = LooksOfImageJ(big_endian, {3, 4}, {{255, 0, 0}});
+    seeds.push_back(Seed(".tif", OneDirectoryTiff({4, 3, 2}, 8, big_endian, imagej, FileBytes(24, 'x'), looks)));
   }
   seeds.push_back(Seed(".bmp", Bmp({4, 2, 1}, {.bits = 8, .palette = FileBytes(1024, 'x')}, FileBytes(8, 1))));
   seeds.push_back(Seed(".bmp", Bmp({1, 2, 1}, {.bits = 24}, FileBytes(8, 1)), 3));

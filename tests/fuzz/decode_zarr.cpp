@@ -124,7 +124,8 @@ std::vector<FuzzBytes> ZarrSeeds() {
       const Json scale = {{"type", "scale"}, {"scale", {2, 1, 1}}};
       const Json level = {{"path", "0"}, {"coordinateTransformations", {scale}}};
       const Json image = {{"axes", axes}, {"datasets", {level, level}}, {"coordinateTransformations", Json::array({scale})}};
-      Json attributes = {{"multiscales", Json::array({image})}, {"omero", {{"channels", {{{"label", "a"}}}}}}};
+      const Json channel = {{"label", "a"}, {"color", "0000FF"}, {"window", {{"start", 1}, {"end", 9}}}, {"active", false}};
+      Json attributes = {{"multiscales", Json::array({image})}, {"omero", {{"channels", Json::array({channel})}}}};
       if (spec.version == 3) {
         attributes = {{"zarr_format", 3}, {"node_type", "group"}, {"attributes", {{"ome", attributes}}}};
       }

@@ -99,6 +99,19 @@ def write_labels(folder):
     (folder / "names.txt").write_text("3 1 0.5 0 Corner \"low\"\n5 1 1 1 Nowhere\n70 0 0 1 Größte Ecke\n", encoding="utf-8")
 
 
+NAMES = {"a", "b", "c", "levels", "channels", "times"}  # of datasets
+
+
+def write_channels(folder):
+    """A volume of two channels, which hold 10 and 20, and one of three times, which hold 1, 2 and 3."""
+    (folder / "channels" / "4").mkdir(parents=True)
+    scale = {"key": "4", "size": [4, 4, 4], "chunk_sizes": [[4, 4, 4]], "resolution": [4, 4, 4], "encoding": "raw"}
+    (folder / "channels" / "info").write_text(json.dumps({"data_type": "uint8", "num_channels": 2, "type": "image", "scales": [scale]}))
+    (folder / "channels" / "4" / "0-4_0-4_0-4").write_bytes(bytes([10]) * 64 + bytes([20]) * 64)
+    header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 4, 4, 4), }\n"
+    (folder / "times.npy").write_bytes(b"\x93NUMPY\x01\0" + bytes([len(header), 0]) + header.encode() + b"".join(bytes([t]) * 64 for t in (1, 2, 3)))
+
+
 class WithService(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -107,9 +120,11 @@ class WithService(unittest.TestCase):
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
         cls.programs.run("sphere", "--class", 2, "--size", 20, "--occupancy", 0.3, "-o", "b.nrrd")
         write_labels(cls.programs.folder)
+        write_channels(cls.programs.folder)
         cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "large.nrrd")
         cls.programs.run("convert", "large.nrrd", "large.ome.zarr")
-        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt", "--data", "levels=large.ome.zarr")
+        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt", "--data", "levels=large.ome.zarr", "--data", "channels=channels",
+                                          "--data", "times=times.npy")
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
 
@@ -160,7 +175,7 @@ class UploadTest(WithService):
         self.assertEqual(one, same)
         for each in (upload, second, again):
             self.assertEqual(self.post(upload=each, drop="true"), (200, {}))
-        wait_until(lambda: self.names() <= {"a", "b", "c", "levels"}, "they are gone")
+        wait_until(lambda: self.names() <= NAMES, "they are gone")
         self.assertEqual(self.get("/api/v1/render.png", dataset=name, size=16)[0], 404)
         status, answer = self.post(b"x", upload=upload, begin=0)
         self.assertEqual((status, "no such upload" in answer["error"]), (404, True))
@@ -230,6 +245,10 @@ class HttpTest(WithService):
                         "isovalue": "1:blue:0.5", "legend": "true"}),
             ("slice", {"size": 160, "plane": "zyx", "color-bar": "T", "title": "Planes", "scale-bar": "true", "orientation-marker": "true"}),
             ("slice", {"size": 160, "label-mode": "tint", "legend": "true", "dataset": "c"}),
+            ("render", {"dataset": "channels", "channel": "1", "channel-color": "1=green,0=#f0f", "channel-range": "1=0:30"}),
+            ("render", {"dataset": "channels", "channel": ["1"], "channel-transfer": "1=opaque", "channel-opacity": "1=0.5", "blend": "add"}),
+            ("slice", {"dataset": "channels", "size": 160, "plane": "zyx", "channel": 0, "channel-gamma": "0=0.5", "color-bar": "true"}),
+            ("render", {"dataset": "times", "time": "last", "transfer": "opaque"}),
         ]
         for kind, options in cases:
             with self.subTest(kind=kind, **{k.replace("-", "_"): v for k, v in options.items()}):
@@ -325,7 +344,7 @@ class HttpTest(WithService):
     def test_what_the_service_has(self):
         self.get("/api/v1/render.png", dataset="a", size=16)
         datasets = self.datasets_with("a")
-        self.assertEqual(set(datasets), {"a", "b", "c", "levels"})
+        self.assertEqual(set(datasets), NAMES)
         self.assertEqual(datasets["a"]["size"], [24, 24, 24])
         self.assertEqual([level["size"] for level in datasets["a"]["levels"]], [[24, 24, 24]])
         status, service = self.gateway.json("/api/v1/status")
@@ -367,6 +386,25 @@ class HttpTest(WithService):
         self.assertEqual(values, sorted(values))
         info = json.loads(self.programs.run("info", "a.nrrd", "--json").stdout)
         self.assertEqual(histogram["counts"], info["histogram"])
+
+    def test_channels_and_times_are_told_and_asked_about(self):
+        for field, value in (("0", 10), ("1", 20)):
+            self.assertEqual(self.ask("histogram", dataset="channels", field=field)["range"], [value, value])
+            self.assertEqual(self.ask("value", dataset="channels", field=field, at="4,4,4")["value"], value)
+            self.assertEqual(self.ask("statistics", dataset="channels", field=field)["mean"], value)
+        for time, value in (("0", 1), ("1", 2), ("last", 3)):
+            self.assertEqual(self.ask("histogram", dataset="times", time=time)["range"], [value, value])
+            profile = self.ask("profile", **{"dataset": "times", "time": time, "from": "0,0,0", "to": "1,0,0", "samples": 2})
+            self.assertEqual(profile["values"], [value, value])
+        channels = self.datasets_with("channels")["channels"]
+        self.assertEqual(channels["fields"], 2 * [{"name": "", "channel": True, "shown": True}])
+        self.assertEqual((channels["times"], channels["field"], channels["time"]), ({"count": 1}, 0, 0))
+        self.assertEqual(self.datasets_with("times")["times"]["times"]["count"], 3)
+        listed = self.programs.run("data", "list", "--endpoint", self.endpoint).stdout
+        self.assertIn("channels 0, 1\n", listed)
+        self.assertIn("    3 times", listed)
+        shown = json.loads(self.get("/api/v1/transfer", dataset="channels", field="1", **{"transfer": "window"})[2])
+        self.assertIn("RGBPoints", shown[0])
 
     def test_labels_have_their_names_and_colours(self):
         self.assertEqual(self.ask("labels", dataset="c"), {"dataset": "c", "labels": [
@@ -470,6 +508,9 @@ class HttpTest(WithService):
             ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
             ("joint-histogram", {"dataset": "nonesuch"}, 404, "nonesuch"),
             ("statistics", {"dataset": "a", "labels": "maybe"}, 400, "labels 'maybe' is neither true nor false"),
+            ("histogram", {"dataset": "channels", "field": "2"}, 400, "has no field '2': it has 0, 1"),
+            ("value", {"dataset": "times", "time": "3", "at": "0,0,0"}, 400, "time is '3', but dataset \"times\" has times 0 to 2"),
+            ("histogram", {"dataset": "a", "field": "x" * 300}, 400, "field or time has 300 bytes, at most 256 are possible"),
             ("statistics", {"dataset": "a", "format": "csv"}, 400, "format 'csv' is the table of labels"),
             ("statistics", {"dataset": "a", "labels": "true"}, 400, "has no labels"),
             ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),

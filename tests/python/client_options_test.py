@@ -160,6 +160,23 @@ LEVEL_CASES: list[tuple[dict, list[str]]] = [
     ({"detail": 0.1}, ["--detail", "0.1"]),
     ({"level": "0", "renderer": "raycast"}, ["--level", "0", "--renderer", "raycast"]),
 ]
+# Of a dataset of two channels at three times.
+CHANNEL_CASES: list[tuple[dict, list[str]]] = [
+    ({"channels": [1]}, ["--channel", "1"]),
+    ({"channels": "Actin", "time": 2}, ["--channel", "Actin", "--time", "2"]),
+    ({"channels": {"DAPI": {"color": "#f0f", "range": (10, 150), "gamma": 0.5, "opacity": 0.5}, 1: {"shown": False}}, "time": "last"},
+     ["--channel", "DAPI", "--channel-color", "DAPI=#f0f", "--channel-range", "DAPI=10:150", "--channel-gamma", "DAPI=0.5",
+      "--channel-opacity", "DAPI=0.5", "--time", "last"]),
+    ({"channels": {0: {"transfer": "viridis", "range": "2%:98%"}}}, ["--channel", "0", "--channel-transfer", "0=viridis", "--channel-range", "0=2%:98%"]),
+    ({"channels": ["Actin"], "color_bar": True, "size": 96}, ["--channel", "Actin", "--color-bar", "--size", "96"]),
+    ({"blend": "add"}, ["--blend", "add"]),
+]
+CHANNEL_SLICE_CASES: list[tuple[dict, list[str]]] = [
+    ({"plane": "z", "channels": {"Actin": {"color": "lime"}}, "time": 1},
+     ["--plane", "z", "--channel", "Actin", "--channel-color", "Actin=lime", "--time", "1"]),
+    ({"plane": "zyx", "color_bar": True, "size": 96, "channels": [0]}, ["--plane", "zyx", "--color-bar", "--size", "96", "--channel", "0"]),
+    ({"plane": "z", "channels": [1], "blend": "max"}, ["--plane", "z", "--channel", "1", "--blend", "max"]),
+]
 # Of an unstructured grid.
 GRID_CASES: list[tuple[dict, list[str]]] = [
     ({"renderer": "slice", "sampling_rate": 2, "azimuth": 30}, ["--renderer", "slice", "--sampling-rate", "2", "--azimuth", "30"]),
@@ -188,6 +205,8 @@ class Pixels(WithAService):
         super().setUpClass()
         (cls.folder / "grid.vtk").write_text(GRID)
         added = cls.running.run("data", "add", f"grid={cls.folder}/grid.vtk", "--endpoint", cls.running.endpoint)
+        assert added.returncode == 0, added.stderr
+        added = cls.running.run("data", "add", f"cells={client_support.write_cells(cls.folder)}", "--endpoint", cls.running.endpoint)
         assert added.returncode == 0, added.stderr
         ball = cls.folder / "ball.nrrd"
         for arguments in (["sphere", "--class", "1", "--size", "80", "-o", ball], ["convert", ball, cls.folder / "levels.ome.zarr"],
@@ -219,6 +238,7 @@ class Pixels(WithAService):
         self.compare("render", RENDER_CASES)
         self.compare("render", GRID_CASES, "grid")
         self.compare("render", LEVEL_CASES, "levels")
+        self.compare("render", CHANNEL_CASES, "cells")
 
     def test_every_field_changes_the_picture_or_says_that_it_does_not(self) -> None:
         def differ(one, other) -> bool:
@@ -231,10 +251,10 @@ class Pixels(WithAService):
             except ss.SlabstreamError:  # it cannot be had without this option
                 return None
 
-        of = {"head": RENDER_CASES, "grid": GRID_CASES, "levels": LEVEL_CASES}
+        of = {"head": RENDER_CASES, "grid": GRID_CASES, "levels": LEVEL_CASES, "cells": CHANNEL_CASES}
         cases = [(dataset, python) for dataset, listed in of.items() for python, _ in listed]
         for name, option in COMMANDS["render"].items():
-            if not option.path or name == "pixel_error":  # which says itself by how much
+            if not option.path or name in ("pixel_error", "blend"):  # which says itself by how much; of several channels
                 continue
             with self.subTest(option=name):
                 changes = False
@@ -252,9 +272,11 @@ class Pixels(WithAService):
 
     def test_slice_makes_the_command_lines_pixels(self) -> None:
         self.compare("slice", SLICE_CASES)
+        self.compare("slice", CHANNEL_SLICE_CASES, "cells")
 
     def test_every_option_is_compared(self) -> None:
-        for command, cases in (("render", RENDER_CASES + GRID_CASES + LEVEL_CASES), ("slice", SLICE_CASES)):
+        for command, cases in (("render", RENDER_CASES + GRID_CASES + LEVEL_CASES + CHANNEL_CASES),
+                               ("slice", SLICE_CASES + CHANNEL_SLICE_CASES)):
             compared = {name for python, _ in cases for name in python}
             of_files = {"dpi", "quality"}  # which have no pixels of their own
             self.assertEqual(set(COMMANDS[command]) - compared, of_files)
@@ -333,6 +355,11 @@ class Requests(unittest.TestCase):
             ({"groups": 4, "zoom": np.float32(0.5)}, {"groups": "4", "zoom": "0.5"}),
             ({"detail": "auto", "groups": "auto"}, {"detail": "0", "groups": "0"}),
             ({"light": np.eye(3)}, {"light": ["1,0,0", "0,1,0", "0,0,1"]}),
+            ({"time": 17}, {"time": "17"}),
+            ({"channels": [0, "Actin"]}, {"channels": "0,Actin"}),
+            ({"channels": np.int64(2)}, {"channels": "2"}),
+            ({"channels": {0: None, "Actin": True, 3: False}}, {"channels": "0,Actin"}),
+            ({"channels": {0: {"color": (0, 1, 0), "range": (1, 9)}}}, {"channels": {"0": {"color": "lime", "range": "1:9", "shown": True}}}),
         ):
             self.assertEqual(draft_of("a", python), draft_of("a", text))
 
@@ -370,7 +397,20 @@ class Requests(unittest.TestCase):
             ({"scalar_range": "5:7%"}, "scalar_range '5:7%' is neither LOW:HIGH nor LOW%:HIGH%"),
             ({"clip_box": ((3, 1), (0, 1), (0, 1))}, "clip_box ((3, 1), (0, 1), (0, 1)): x runs from 3 to 1, but must rise"),
             ({"background": "blurple"}, "background 'blurple' is neither R,G,B[,A] nor #rrggbb nor the name of a colour"),
-            ({"background": "#12345"}, "background '#12345' is neither #rrggbb nor #rrggbbaa"),
+            ({"background": "#12345"}, "background '#12345' is neither #rgb nor #rrggbb nor #rrggbbaa"),
+            ({"channels": []}, "channels shows 0 channels, must be 1 to 16"),
+            ({"channels": {0: False}}, "channels shows 0 channels, must be 1 to 16"),
+            ({"channels": [""]}, "channels '' is neither a number nor a name of 1 to 256 bytes"),
+            ({"channels": {0: {"hue": 1}}}, "channels[0] has the field 'hue', must be one of: color, range, gamma"),
+            ({"channels": {"a": {"color": "#ff000080"}}}, "channels['a'] color '#ff000080' has an opacity of 0.50"),
+            ({"channels": {0: {"gamma": 0}}}, "channels[0] gamma 0 is out of range [0.01, 100]"),
+            ({"channels": {0: {"opacity": 2}}}, "channels[0] opacity 2 is out of range [0, 1]"),
+            ({"channels": {0: {"range": (5, 1)}}}, "channels[0] range (5, 1) must rise"),
+            ({"channels": {0: "red"}}, "channels[0] 'red' is no look"),
+            ({"channels": 1.5}, "channels 1.5 is neither a number nor a name"),
+            ({"blend": "multiply"}, "blend 'multiply' is not one of auto, add, over, max"),
+            ({"time": 1.5}, "time 1.5 must be a text of 1 to 256 bytes"),
+            ({"channel": 1}, "there is no option 'channel'; did you mean 'channels'?"),
             ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
             ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
             ({"transfer": 3}, "transfer 3 is neither the name of a preset nor a colour map of ParaView or matplotlib"),

@@ -17,7 +17,7 @@ import unittest.mock
 
 import numpy as np
 
-from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithAService, volume_arrays, write_volumes
+from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
 from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
@@ -270,6 +270,29 @@ class AtAService(WithAService):
         head = {dataset.name: dataset for dataset in self.service.datasets()}["head"]
         self.assertEqual((head.state, head.shape, head.spacing, head.dtype), ("ready", (20, 24, 28), (2, 1.5, 1.25), "uint8"))
         self.assertEqual((head.labels, head.overlay), (3, True))
+
+    def test_channels_and_times_are_told_and_asked_about(self) -> None:
+        self.service.add_data(cells=write_cells(self.folder))
+        try:
+            first = self.service.histogram("cells")
+            cells = {dataset.name: dataset for dataset in self.service.datasets()}["cells"]
+            self.assertEqual([(field.name, field.channel, field.shown) for field in cells.fields], [("DAPI", True, True), ("Actin", True, True)])
+            self.assertEqual((cells.times, cells.field, cells.time), (3, 0, 0))
+            self.assertEqual(first.value_range, (0, 200))
+            self.assertEqual(self.service.histogram("cells", field="Actin", time=2).value_range, (0, 1000))
+            self.assertEqual(self.service.joint_histogram("cells", field=1).value_edges[-1], 1000)
+            for field, time, centre, value in ((0, 0, 4, 200), ("DAPI", "last", 6, 200), (1, 1, 10, 1000)):
+                self.assertEqual(self.service.value("cells", (centre, 8, 8), field=field, time=time).value, value)
+            for given, sentence in (({"field": 2}, "has no field '2': it has 0 (DAPI), 1 (Actin)"), ({"time": 3}, "has times 0 to 2"),
+                                    ({"field": 1.5}, "field 1.5 is neither a number nor a text")):
+                with self.assertRaises(ss.InvalidArgument) as caught:
+                    self.service.histogram("cells", **given)
+                self.assertIn(sentence, str(caught.exception))
+            self.service.histogram("head")
+            head = {dataset.name: dataset for dataset in self.service.datasets()}["head"]
+            self.assertEqual((head.fields, head.times), ((ss.Field(), ss.Field(name="overlay", channel=False, shown=False)), 1))
+        finally:
+            self.service.remove_data("cells")
 
     def test_data_comes_and_goes(self) -> None:
         names = {dataset.name for dataset in self.service.add_data(copy=self.folder / "head.nrrd")}

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import pathlib
 import select
@@ -43,6 +44,29 @@ def write_volumes(folder: pathlib.Path) -> str:
         volumes.write_nrrd(volumes.volume_of(array, **grid), folder / f"{name}.nrrd")
     (folder / "names.txt").write_text("1 left_1 200 60 40 0\n2 left_2 60 190 130 0\n3 right_2 50 100 255 0\n")
     return f"head={folder}/head.nrrd,labels={folder}/labels.nrrd:{folder}/names.txt,overlay={folder}/overlay.nrrd"
+
+
+def write_cells(folder: pathlib.Path) -> pathlib.Path:
+    """An OME-Zarr of two channels, "DAPI" and "Actin", at three times, 2.5 s apart: a ball in each, which moves."""
+    path, size = folder / "cells.ome.zarr", 16
+    (path / "0").mkdir(parents=True)
+    axes = [{"name": "t", "type": "time", "unit": "second"}, {"name": "c", "type": "channel"}]
+    axes += [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
+    places = [{"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [2.5, 1, 1, 1, 1]}]}]
+    looks = [{"label": "DAPI", "color": "0000FF", "active": True, "window": {"start": 0, "end": 200, "min": 0, "max": 65535}},
+             {"label": "Actin", "color": "FF8000", "active": True, "window": {"start": 0, "end": 1000, "min": 0, "max": 65535}}]
+    about = {"multiscales": [{"version": "0.4", "axes": axes, "datasets": places}], "omero": {"channels": looks}}
+    (path / ".zgroup").write_text('{"zarr_format": 2}')
+    (path / ".zattrs").write_text(json.dumps(about))
+    array = {"zarr_format": 2, "shape": [3, 2, size, size, size], "chunks": [1, 1, size, size, size], "dtype": "<u2", "compressor": None,
+             "fill_value": 0, "order": "C", "filters": None, "dimension_separator": "."}
+    (path / "0" / ".zarray").write_text(json.dumps(array))
+    z, y, x = np.mgrid[:size, :size, :size]
+    for time in range(3):
+        for channel, (strongest, centre) in enumerate([(200, 4), (1000, 9)]):
+            ball = strongest * np.exp(-((x - centre - time) ** 2 + (y - 8) ** 2 + (z - 8) ** 2) / 20)
+            (path / "0" / f"{time}.{channel}.0.0.0").write_bytes(ball.astype("<u2").tobytes())
+    return path
 
 
 class RunningService:

@@ -211,7 +211,7 @@ TEST_F(BadStoresTest, DamagedObjectsAreNamedAndReadAgainAfterARepair) {
   for (const auto& [kind, damage] : damages) {
     SCOPED_TRACE(kind);
     Start({{"ball", DataSource(path, "")}}, 2);
-    ASSERT_TRUE(client_->Summarize("ball").ok()) << "it is open, and nothing is wrong so far";
+    ASSERT_TRUE(client_->Summarize({.dataset = "ball"}).ok()) << "it is open, and nothing is wrong so far";
     damage();
     const Result<Picture> picture = Render(Request());
     if (picture.ok()) {  // what was read before
@@ -248,7 +248,7 @@ TEST_F(BadStoresTest, AMissingObjectHasTheFillValue) {
 TEST_F(BadStoresTest, AStoreThatIsReplacedOrGoneIsAnErrorOrTheNewPicture) {
   const std::string path = Zarr();
   Start({{"ball", DataSource(path, "")}}, 2);
-  ASSERT_TRUE(client_->Summarize("ball").ok());
+  ASSERT_TRUE(client_->Summarize({.dataset = "ball"}).ok());
   fs::rename(path, directory_ / "elsewhere");
   ExpectOneLine(Render(Request()).status(), HasSubstr("ball.ome.zarr"));
   fs::rename(directory_ / "elsewhere", path);

@@ -25,6 +25,7 @@
 #include "coordinator/service/peer_table.h"
 #include "coordinator/service/voxel_server.h"
 #include "data/catalogue/catalogue.h"
+#include "data/catalogue/dataset_fields.h"
 #include "data/volume_io/volume_writer.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
@@ -208,17 +209,14 @@ TEST_F(VoxelServerTest, ChunksPutTogetherAreTheBox) {
 // The chunks of a dataset with layers are those of its volume, then those of each layer.
 TEST_F(VoxelServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
   const Box box = volume_->block.box;
-  VoxelBlock labels = MakeVoxelBlock(box, ScalarType::kUint16), overlay = MakeVoxelBlock(box, ScalarType::kFloat32);
+  VoxelBlock labels = MakeVoxelBlock(box, ScalarType::kUint16);
   for (std::int64_t i = 0; i < box.voxel_count(); ++i) {
     labels.samples<std::uint16_t>()[i] = std::uint16_t(random_.Real(0, 3000));
-    overlay.samples<float>()[i] = float(random_.Real(-1, 1));
   }
-  server_->Publish(7, {.volume = volume_,
-                       .labels = std::make_shared<const BrickedVoxels>(labels),
-                       .overlay = std::make_shared<const BrickedVoxels>(overlay)});
-  const SampleTypes types(volume_->block.type, {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32});
-  const std::array<const VoxelBlock*, 3> expected = {&volume_->block, &labels, &overlay};
-  std::array<std::vector<std::byte>, 3> samples;
+  server_->Publish(7, {.volume = volume_, .labels = std::make_shared<const BrickedVoxels>(labels)});
+  const SampleTypes types(volume_->block.type, {.labels = ScalarType::kUint16});
+  const std::array<const VoxelBlock*, 2> expected = {&volume_->block, &labels};
+  std::array<std::vector<std::byte>, 2> samples;
   for (std::uint32_t i = 0; i < ChunkCount(box, types); ++i) {
     const ChunkPart part = PartOfChunk(box, types, i);
     std::vector<std::byte>& of_layer = samples.at(std::size_t(part.layer));
@@ -230,7 +228,7 @@ TEST_F(VoxelServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
     ASSERT_NE(chunk, nullptr) << NameOf(answer);
     ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), std::span(of_layer).subspan(part.begin)).ok());
   }
-  for (std::size_t layer = 0; layer < 3; ++layer) {
+  for (std::size_t layer = 0; layer < expected.size(); ++layer) {
     ASSERT_EQ(samples.at(layer).size(), expected.at(layer)->bytes.size());
     EXPECT_EQ(std::memcmp(samples.at(layer).data(), expected.at(layer)->bytes.data(), samples.at(layer).size()), 0) << "layer " << layer;
   }
@@ -535,16 +533,25 @@ TEST_F(CatalogueTest, LayersFollowANamedVolume) {
        std::vector<std::string>{"a=v,labels=", "a=v,labels=x,labels=y", "a=,labels=x", "a=v,overlay=" + std::string(5000, 'x')}) {
     EXPECT_EQ(ParseDataArgument(wrong).status().code(), StatusCode::kInvalidArgument) << wrong.substr(0, 40);
   }
-  // Other layers, other ids; a layer that is replaced is noticed.
-  const DataSource source(volume, "", {.overlay = layer});
+  // Other labels, other ids; a layer that is replaced is noticed.
+  const DataSource source(volume, "", {.labels = layer});
   const Result<LoadedSource> loaded = LoadWhole(source);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  ASSERT_NE(loaded->layers.overlay, nullptr);
+  ASSERT_NE(loaded->layers.labels, nullptr);
   EXPECT_NE(IdOf("a", *loaded->volume, loaded->layers), IdOf("a", *loaded->volume));
   EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
   Write("layer.nrrd", 6);
   EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
   EXPECT_NE(IdOf("a", *loaded->volume, LoadWhole(source)->layers), IdOf("a", *loaded->volume, loaded->layers));
+  // An overlay is a field that is read from its own file.
+  const DataSource with_overlay(volume, "", {.overlay = layer});
+  EXPECT_FALSE(with_overlay.layers.any());
+  const auto fields = FieldsOf(with_overlay, {});
+  ASSERT_NE(fields, nullptr);
+  ASSERT_EQ(fields->fields.size(), 2U);
+  EXPECT_FALSE(fields->fields[1].channel || fields->fields[1].shown);
+  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 1, 0).path, layer);
+  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 0, 0).path, volume);
 }
 
 TEST_F(CatalogueTest, ALoadedFileHasAStampThatTellsOfEveryChange) {

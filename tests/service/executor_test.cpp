@@ -415,6 +415,46 @@ TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
   }
 }
 
+// Several fields of a frame may have the same box, and one may not reach there.
+TEST_F(ExecutorTest, ARenderReadsTheBoxOfEachFieldThatItShows) {
+  const std::shared_ptr<const Volume> volume = TestSphere(24);
+  FrameSetup alone = PlanFrame(TestRequest(FindRenderer("raycast"), 40), 1, Summarize(*volume), Roster{{1}}).value().setup, several = alone;
+  const FieldSetup field = {
+      .levels = {{1, alone.description, {}}}, .of_volume = {0}, .look = {.transfer = alone.transfer, .range = alone.range}};
+  several.fields = {field, field, field};
+  const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
+  executor_.Perform(OpenBox{padded, {}});
+  Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
+  const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+  executor_.Perform(StoreChunk{padded, chunk, payload});
+  ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+  const PixelBounds frame = FrameBounds(alone);
+  const auto rendered = [&](ImageHandle image, const FrameSetup& setup, std::vector<std::optional<BoxKey>> fields) {
+    const auto fields_shown = std::size_t(std::ranges::count_if(fields, [](const auto& of) { return of.has_value(); }));
+    executor_.Perform(StartRender{.key = kKey,
+                                  .padded = padded,
+                                  .placement = {.box = padded.box, .worker = 1},
+                                  .setup = std::make_shared<const FrameSetup>(setup),
+                                  .image = image,
+                                  .fields = std::move(fields)});
+    const auto done = outputs_.NextEvent<RenderDone>();
+    EXPECT_TRUE(done.status.ok()) << done.status.message();
+    EXPECT_EQ(done.field_bytes.size(), setup.fields.size());
+    for (std::size_t i = 0; i < fields_shown; ++i) EXPECT_GE(done.field_bytes.at(i), volume->block.bytes.size());
+    return PixelsOf(image, {0, std::uint64_t(frame.pixel_count())}, frame);
+  };
+  const LocalImage one = rendered(1, alone, {}), three = rendered(2, several, {padded, padded, std::nullopt});
+  ExpectSameBits(rendered(3, several, {padded, padded, std::nullopt}), three);
+  ExpectSameBits(rendered(4, alone, {}), one);
+  const auto opacity = [](const LocalImage& image) {
+    double sum = 0;
+    for (std::size_t i = 3; i < image.rgba.size(); i += 4) sum += double(image.rgba[i]);
+    return sum;
+  };
+  EXPECT_GT(opacity(one), 0);
+  EXPECT_GT(opacity(three), 1.05 * opacity(one));
+}
+
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {
   const auto volume = std::make_shared<const Volume>(AsGrid(*TestSphere(60), 6));
   const Box whole = volume->block.box;

@@ -257,7 +257,7 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
 
 // What layers and cells weigh is in the boxes' bytes: their chunks are not simulated one by one.
 TEST(SimulateFrames, TheVoxelsOfABoxTravelAtOnceWhateverTheDatasetHas) {
-  for (const LayerTypes& layers : {LayerTypes{.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32}, LayerTypes{.cells = true}}) {
+  for (const LayerTypes& layers : {LayerTypes{.labels = ScalarType::kUint16}, LayerTypes{.cells = true}}) {
     MadeFrame frame(2, 1, kSide, 0, 1, "fan-in");
     for (RenderCost& cost : frame.costs()) cost.voxel_bytes = 500;
     const double alone = Simulate({frame.input()}, WithoutDelays()).frames[0].latency();

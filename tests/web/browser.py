@@ -33,13 +33,13 @@ def start(chromium, chromedriver):
 
 
 class Viewer:
-    """A tab with the page."""
+    """A tab with the page. `script` runs before it."""
 
-    def __init__(self, driver, url, width=1000, height=640, pixels=1, mobile=False, theme="dark"):
+    def __init__(self, driver, url, width=1000, height=640, pixels=1, mobile=False, theme="dark", script=""):
         self.driver = driver
         driver.switch_to.new_window("tab")
         self.handle = driver.current_window_handle
-        self.command("Page.addScriptToEvaluateOnNewDocument", source=WATCH)
+        self.command("Page.addScriptToEvaluateOnNewDocument", source=WATCH + script)
         self.command("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=pixels, mobile=mobile)
         self.command("Emulation.setTouchEmulationEnabled", enabled=mobile)
         self.theme(theme)

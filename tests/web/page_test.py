@@ -58,6 +58,26 @@ def write_grid(path):
     path.write_text("\n".join(lines) + "\n")
 
 
+# Runs before the page: it believes that "patient" has more than this file, and what it asks of that is kept from the gateway.
+MORE = """
+const more = ARGUMENT, send = WebSocket.prototype.send, parse = JSON.parse, json = Response.prototype.json;
+window.more = more;
+window.sent = []; // times, each with the one that was shown then
+const told = answer => { for (const dataset of answer?.datasets ?? []) if (dataset.name === 'patient') Object.assign(dataset, more); return answer; };
+JSON.parse = (...given) => told(parse(...given));
+Response.prototype.json = async function () { return told(await json.call(this)); };
+WebSocket.prototype.send = function (text) {
+  const message = parse(text);
+  if (message.options?.time) window.sent.push([message.options.time, window.drawn[window.drawn.length - 1]?.options.time]);
+  for (const name of Object.keys(message.options ?? {})) if (/^(channel|blend$|time$)/.test(name)) delete message.options[name];
+  return send.call(this, JSON.stringify(message));
+};
+"""
+CHANNELS = [{"name": "DAPI", "channel": True, "color": "#0000ff", "window": [20, 120], "shown": True},
+            {"name": "Actin", "channel": True, "color": None, "window": None, "shown": True},
+            {"name": "Tubulin", "channel": True, "color": "#ffff00", "window": [50, 250], "shown": False}]
+
+
 class PageTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -87,8 +107,8 @@ class PageTest(unittest.TestCase):
         parts = ([f"token={self.gateway.token}"] if token else []) + [f"{name.replace('_', '-')}={urllib.parse.quote(str(value), safe=',:;')}" for name, value in {"dataset": "patient", **fields}.items()]
         return f"http://127.0.0.1:{port or self.gateway.port}/#{'&'.join(parts)}"
 
-    def viewer(self, port=None, width=1000, height=640, pixels=1, mobile=False, theme="dark", token=True, **fields):
-        viewer = Viewer(self.driver, self.url(port, token, **fields), width, height, pixels, mobile, theme)
+    def viewer(self, port=None, width=1000, height=640, pixels=1, mobile=False, theme="dark", token=True, script="", **fields):
+        viewer = Viewer(self.driver, self.url(port, token, **fields), width, height, pixels, mobile, theme, script)
         self.addCleanup(viewer.close)
         return viewer
 
@@ -1054,6 +1074,219 @@ class PageTest(unittest.TestCase):
         viewer.until("arguments[0].selectedOptions[0].text === 'Own'", choice)
         choice.find_element(By.XPATH, "option[. = 'Automatic']").click()
         viewer.final("o.window === undefined", "axial")
+
+    # ---- channels and times
+
+    def more(self, asked=None, delay=0.0, **more):
+        """A port and a script for viewer(), of a gateway whose dataset has more."""
+        histogram = {"dataset": "patient", "range": [0, 255], "counts": [1000] + [1] * 200 + [0] * 55, "percentiles": {}}
+        note = lambda fields: asked.append(fields) if asked is not None else None
+        answers = {"/api/v1/histogram": lambda fields, body: note(fields) or histogram, "/api/v1/transfer": lambda fields, body: note(fields) or [{"RGBPoints": [0, 0, 0, 0, 250, 1, 1, 1]}]}
+        return {"port": self.proxy(delay, answers).port, "script": MORE.replace("ARGUMENT", json.dumps(more))}
+
+    def test_channels_have_a_row_each(self):
+        asked = []
+        more = self.more(asked, fields=CHANNELS)
+        viewer = self.viewer(**more)
+        shown = "[...document.querySelectorAll('details')].filter(d => !d.hidden).map(d => d.querySelector('h2').textContent)"
+        pressed = "[...document.querySelectorAll('.channel-head > .icon-button')].map(b => b.getAttribute('aria-pressed') === 'true')"
+        viewer.final("o['look-at'] && o.transfer === undefined && o.channel === undefined")
+        viewer.until("document.querySelectorAll('.channel').length === 3 && document.querySelectorAll('.channel .of-channel[d^=M]').length === 2")
+        self.assertEqual(viewer.js(pressed), [True, True, False])
+        self.assertNotIn("Transfer function", viewer.js(shown))
+        self.assertNotIn("Isosurfaces", viewer.js(shown))
+        self.assertEqual(sorted(fields["field"] for fields in asked if "transfer" not in fields)[:2], ["0", "1"])
+        self.assertEqual(viewer.js("[...document.querySelectorAll('.channel input[type=color]')].map(c => c.value)"), ["#0000ff", "#00ff00", "#ffff00"])
+        row = lambda of, inside: viewer.find(f"[data-channel='{of}'] {inside}")
+        type_into = lambda label, value: (viewer.js("(arguments[0].value = '', true)", viewer.find(f"[aria-label='{label}']")), viewer.find(f"[aria-label='{label}']").send_keys(value, Keys.ENTER))
+        viewer.js("(e => { e.value = '#ff8800'; e.dispatchEvent(new Event('input')); return true; })(arguments[0])", row(1, "input[type=color]"))
+        viewer.final("o['channel-color'] === '1=#ff8800'")
+        # The range: as the file says, by keys, by hand, by numbers and from the histogram.
+        self.assertEqual(viewer.js("[...document.querySelectorAll('[data-channel=\"0\"] .point')].map(p => +p.getAttribute('aria-valuenow'))"), [20, 120])
+        viewer.js("(arguments[0].focus(), true)", row(0, ".point[data-index='1']"))
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_LEFT * 10)
+        drawn = viewer.final("o['channel-range']?.startsWith('0=20:')")["options"]["channel-range"]
+        self.assertTrue(90 < float(drawn.split(":")[1]) < 105, drawn)
+        x, y = viewer.js("(b => [b.left + b.width / 2, b.top + b.height / 2])(arguments[0].getBoundingClientRect())", row(0, ".point[data-index='0']"))
+        for kind, dx in (("mousePressed", 0), ("mouseMoved", 40), ("mouseReleased", 40)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x + dx, y=y, button="left", buttons=1, clickCount=1)
+        viewer.final("Number(/^0=(.*):/.exec(o['channel-range'])[1]) > 40")
+        type_into("DAPI, from", "11")
+        viewer.final("o['channel-range'].startsWith('0=11:')")
+        row(1, "[aria-label^=Auto]").click()
+        viewer.final("o['channel-range'].endsWith(',1=19.9219:199.219')")
+        type_into("Gamma of DAPI", "0.5")
+        type_into("Opacity of Actin", "0.7")
+        viewer.final("o['channel-gamma'] === '0=0.5' && o['channel-opacity'] === '1=0.7'")
+        viewer.save(SHOTS, "channels")
+        # The right button moves all ranges that show, as one step for undo.
+        before = viewer.drawn()["options"]["channel-range"]
+        viewer.drag(60, 0, button="right")
+        viewer.final(f"o['channel-range'] !== '{before}' && o['scalar-range'] === undefined")
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final(f"o['channel-range'] === '{before}'")
+        viewer.driver.find_element(By.XPATH, "//div[label[. = 'Blend']]/select/option[. = 'Max']").click()
+        drawn = viewer.final("o.blend === 'max'")["options"]
+        # All of it is in the link, and a page that is opened by it shows the same.
+        viewer.until("location.hash.includes('blend=max')")
+        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"), script=more["script"])
+        self.addCleanup(other.close)
+        self.assertEqual(other.final("o.transfer === undefined && o.blend === 'max'")["options"], drawn)
+        viewer.focus()
+        viewer.driver.find_element(By.XPATH, "//button[contains(., 'As the file says')]").click()
+        viewer.final("!Object.keys(o).some(name => /^channel|^blend/.test(name))")
+
+    def test_one_channel_alone_may_have_a_transfer_function(self):
+        viewer = self.viewer(**self.more(fields=CHANNELS), channel_color="1=#123456")
+        viewer.final("o.transfer === undefined && o['channel-color'] === '1=#123456'")
+        viewer.until("document.querySelectorAll('.channel').length === 3")
+        functions = "[...document.querySelectorAll('details')].find(d => d.querySelector('h2').textContent === 'Transfer function')"
+        solo = lambda name: viewer.find(f"[aria-label='Solo: only {name}']")
+        solo("Actin").send_keys(Keys.ENTER)
+        viewer.final("o.channel === '1' && o.transfer === undefined && o['channel-color'] === '1=#123456'")
+        self.assertEqual(solo("Actin").get_attribute("aria-pressed"), "true")
+        viewer.until(f"!{functions}.hidden && {functions}.innerText.includes('takes its place')")
+        viewer.driver.find_element(By.XPATH, "//div[label[. = 'Preset']]/select/option[. = 'Opaque']").click()
+        viewer.final("o.channel === '1' && o.transfer === 'opaque' && o['channel-color'] === undefined")
+        solo("Actin").click()
+        viewer.final("o.channel === undefined && o.transfer === undefined && o['channel-color'] === '1=#123456'")
+        self.assertTrue(viewer.js(f"{functions}.hidden"))
+        for name, channels in (("Tubulin", "0,1,2"), ("DAPI", "1,2"), ("Actin", "2"), ("Tubulin", "0")):  # the last one: none shows
+            viewer.find(f"[aria-label='Show {name}']").click()
+            drawn = viewer.final(f"o.channel === '{channels}'")
+        self.assertEqual(drawn["options"]["channel-opacity"], "0=0")
+        viewer.until("location.hash.includes('channel=none')")
+
+    def test_a_channel_whose_name_is_a_number_is_not_confused_with_another_one(self):
+        viewer = self.viewer(**self.more(fields=[{**field, "name": str(i + 1)} for i, field in enumerate(CHANNELS)]), channel="1,2", channel_gamma="3=2")
+        viewer.until("document.querySelectorAll('.channel').length === 3")
+        self.assertEqual(viewer.js("[...document.querySelectorAll('.channel')].map(c => c.dataset.channel)"), ["0", "2", "3"])
+        viewer.final("o.channel === '0,2'")
+        viewer.find("[aria-label='Show 3']").click()
+        viewer.final("o.channel === '0,2,3' && o['channel-gamma'] === '3=2'")
+
+    def test_looks_of_channels_stay_with_their_dataset(self):
+        viewer = self.viewer(**self.more(fields=CHANNELS), channel="0,7", channel_range="0=5:6,Actin=7:9", channel_opacity="0=3")
+        drawn = viewer.final("o.channel === '0' && o.transfer === undefined")["options"]
+        self.assertEqual((drawn["channel-range"], "channel-opacity" in drawn), ("0=5:6", False), "what is wrong in a link is left out")
+        viewer.until("document.querySelectorAll('.channel').length === 3")
+        viewer.find("[aria-label='Show Actin']").click()
+        viewer.final("o['channel-range'] === '0=5:6,1=7:9'")
+        show = lambda name: viewer.js("(s => (s.value = arguments[0], s.dispatchEvent(new Event('change', {bubbles: true})), true))(document.querySelector('.dataset select'))", name)
+        show("other")
+        viewer.final("o.dataset === 'other' && o.channel === undefined && o.transfer === 'auto'")
+        viewer.until("document.querySelector('.channel') === null || !document.querySelector('.channel').checkVisibility()")
+        viewer.until("!location.hash.includes('channel')")
+        show("patient")
+        viewer.final("o.dataset === 'patient' && o.channel === undefined && o.transfer === undefined")
+
+    def test_times_are_played_and_stepped_through(self):
+        asked = []
+        more = self.more(asked, times={"count": 6, "step": 0.5, "unit": "s"}, time=1)
+        viewer = self.viewer(**more)
+        viewer.settled()
+        text, present = "document.querySelector('.player output').textContent", lambda number: f"document.querySelector('.player input').value === '{number}'"
+        viewer.until(f"!document.querySelector('.player').hidden && {text} === '0.5 s / 2.5 s'")
+        self.assertNotIn("time", viewer.drawn()["options"])
+        press = lambda *keys: viewer.actions().send_keys(*keys).perform()
+        viewer.keys(".")
+        viewer.final("o.time === '2'")
+        viewer.keys(",", ",")
+        viewer.final("o.time === '0' && o.roll === 0")
+        viewer.keys(",")
+        viewer.final("o.time === '5'")  # in a loop
+        viewer.until("location.hash.includes('time=5')")
+        viewer.find("[aria-label=Loop]").click()
+        viewer.keys(".")
+        viewer.until(f"{present(5)} && {text} === '2.5 s / 2.5 s'")
+        viewer.keys(Keys.SHIFT, ".")
+        viewer.final("o.roll !== 0")
+        # Played to the end: times follow each other, and a time is asked for once the last one is there.
+        viewer.js("(window.drawn.length = 0, true)")
+        viewer.driver.find_element(By.XPATH, "//label[. = 'Times a second']/../select/option[. = '25 /s']").click()
+        viewer.js("(document.querySelector('canvas').focus(), true)")
+        press(" ")
+        viewer.until("document.querySelector('[aria-label=Play]').getAttribute('aria-pressed') === 'true'")
+        viewer.final("o.time === '5'")
+        viewer.until("document.querySelector('[aria-label=Play]').getAttribute('aria-pressed') === 'false'")
+        played = viewer.js("window.drawn.map(d => +d.options.time)")
+        self.assertEqual(played[played.index(0):], sorted(played[played.index(0):]))
+        viewer.save(SHOTS, "times")
+        press("?")
+        viewer.until("[...document.querySelectorAll('dialog[open] h3')].some(h => h.textContent === 'Time')")
+        viewer.save(SHOTS, "times-help")
+        press(Keys.ESCAPE)
+        # In text fields keys are text; on buttons, Space presses.
+        viewer.js("(document.querySelector('.panel input[type=number]').focus(), true)")
+        press(" ", ".")
+        press(Keys.TAB)
+        self.assertEqual(viewer.js(f"[{present(5)}, document.querySelector('[aria-label=Play]').getAttribute('aria-pressed')]"), [True, "false"])
+        viewer.js("(document.querySelector('[aria-label=Loop]').focus(), true)")
+        press(" ")
+        viewer.until("document.querySelector('[aria-label=Loop]').getAttribute('aria-pressed') === 'true'")
+        # In a loop, until it is paused; another choice of time is where it goes on.
+        press(Keys.SHIFT + Keys.TAB)
+        viewer.js("(window.drawn.length = 0, document.querySelector('canvas').focus(), true)")
+        press(" ")
+        viewer.until("window.drawn.filter(d => d.options.time === '1').length > 0 && window.drawn.filter((d, i, all) => d.options.time < all[i - 1]?.options.time).length > 1")
+        press(" ")
+        viewer.until("document.querySelector('[aria-label=Play]').getAttribute('aria-pressed') === 'false'")
+        # Live: the newest one, also when there are more.
+        viewer.find("[aria-label^=Live]").click()
+        viewer.final("o.time === '5'")
+        viewer.until("location.hash.includes('time=last')")
+        viewer.js("(window.more.times = {count: 8, step: 0.5, unit: 's'}, true)")
+        viewer.final("o.time === '7'")
+        viewer.until(f"{text} === '3.5 s / 3.5 s'")
+
+    def test_times_are_left_out_rather_than_late(self):
+        viewer = self.viewer(**self.more(delay=0.1, times={"count": 30}), renderer="raycast")
+        viewer.settled()
+        viewer.until("!document.querySelector('.player').hidden")
+        viewer.js("(window.sent.length = 0, window.drawn.length = 0, true)")
+        viewer.driver.find_element(By.XPATH, "//label[. = 'Times a second']/../select/option[. = '25 /s']").click()
+        viewer.find("[aria-label=Loop]").click()
+        viewer.find("[aria-label=Play]").click()
+        viewer.final("o.time === '29'")
+        viewer.until("document.querySelector('[aria-label=Play]').getAttribute('aria-pressed') === 'false'")
+        sent = viewer.js("window.sent")  # each with the time that was shown then
+        self.assertLess(len(sent), 20)
+        times = [time for time, _ in sent]
+        self.assertEqual(times, sorted(times, key=int))
+        for i, (_, shown) in enumerate(sent[2:]):  # the picture before is there; if it has just come, this is not told yet
+            self.assertIn(shown, times[i:i + 2], sent)
+
+    def test_a_link_says_the_time_in_any_unit(self):
+        for time, number in (("1.5s", "3"), ("500ms", "1"), ("4", "4"), ("last", "5")):
+            viewer = self.viewer(**self.more(times={"count": 6, "step": 0.5, "unit": "s"}), time=time)
+            viewer.final(f"o.time === '{number}'")
+        plain = self.viewer(**self.more(times={"count": 6}), time="2")
+        plain.until("document.querySelector('.player output')?.textContent === '2 / 5'")
+        far = self.viewer(**self.more(times={"count": 6}), time="9")
+        far.final("o.time === undefined")
+
+    def test_channels_and_times_fit_and_have_names(self):
+        script = (HERE / "accessibility.js").read_text()
+        more = self.more(fields=[{**CHANNELS[0], "name": "A channel of a long name, emission 461 nm"}, *CHANNELS[1:]], times={"count": 40, "step": 250, "unit": "ms"})
+        for theme in ("dark", "light"):
+            viewer = self.viewer(**more, theme=theme)
+            viewer.settled()
+            viewer.until("document.querySelectorAll('.channel .of-channel[d^=M]').length === 2")
+            self.assertEqual(viewer.driver.execute_script(script), [], theme)
+            self.assertTrue(viewer.js("(p => p.scrollWidth <= p.clientWidth)(document.querySelector('.panel'))"))
+            viewer.save(SHOTS, f"channels-{theme}")
+        narrow = self.viewer(**more, width=320, height=640, mobile=True, theme="light", color_bar=1)
+        narrow.settled()
+        narrow.find("[aria-label='Settings']").click()
+        narrow.until("document.querySelectorAll('.channel .of-channel[d^=M]').length === 2")
+        outside = """[...document.querySelectorAll('.player *, .channel *')].filter(e => e.checkVisibility()).filter(e => { const b = e.getBoundingClientRect();
+            return b.left < -1 || b.right > innerWidth + 1; }).map(e => e.outerHTML.slice(0, 80))"""
+        self.assertEqual(narrow.js(outside), [])
+        self.assertEqual(narrow.js("document.documentElement.scrollWidth"), 320)
+        small = """[...document.querySelectorAll('.player button, .player select, .channel button, .channel input')].filter(e => e.checkVisibility())
+            .filter(e => { const b = e.getBoundingClientRect(); return b.height < 43.5 || (e.matches('button') && b.width < 43.5); }).map(e => e.outerHTML.slice(0, 80))"""
+        self.assertEqual(narrow.js(small), [])
+        narrow.save(SHOTS, "channels-narrow")
 
     # ---- slices and what lies below the pointer
 

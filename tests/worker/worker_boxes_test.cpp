@@ -350,6 +350,113 @@ TEST_F(WorkerBoxesTest, CountsTheBytesThatTheLastFrameOfABoxReported) {
   EXPECT_EQ(cached_after(3 * kVoxels, Status::Internal("render")), 3 * kVoxels) << "derived before the frame failed";
 }
 
+// A frame of several fields needs a box of each field beside its padded box.
+class FieldBoxesTest : public WorkerBoxesTest {
+ public:
+  // Dataset 2 on the volume's grid; dataset 3 of 32-bit floats, whose voxels have twice the volume's spacing.
+  static GroupAssignment OfFields(FrameId frame) {
+    GroupAssignment a = Assignment(frame, {kSelf});
+    a.setup.fields.push_back({.levels = {{2, a.setup.description, {}}}, .of_volume = {0}, .look = {}});
+    VolumeDescription coarse = a.setup.description;
+    coarse.type = ScalarType::kFloat32;
+    coarse.geometry.size = {64, 64, 320};
+    coarse.geometry.spacing = {2, 2, 2};
+    a.setup.fields.push_back({.levels = {{3, coarse, {}}}, .of_volume = {0}, .look = {}});
+    return a;
+  }
+  static Chunk AnswerOf(const SendChunkRequest& sent) {
+    Chunk chunk = Answer(sent.request);
+    chunk.raw_bytes = BytesOfChunk(sent.request.box, sent.padded.types, sent.request.chunk);
+    return chunk;
+  }
+};
+
+TEST_F(FieldBoxesTest, ARenderBeginsOnceTheBoxesOfAllFieldsAreThere) {
+  WorkerConfig config = Config();
+  config.credit_bytes = std::uint64_t{1} << 30;
+  Start(config);
+  const auto assignment = OfFields(1);
+  const auto requests = All<SendChunkRequest>(Tell(assignment));
+  std::map<DatasetId, Box> asked;
+  for (const SendChunkRequest& request : requests) asked[request.request.dataset] = request.request.box;
+  EXPECT_EQ(asked[1], (Box{{0, 0, 0}, {128, 128, 72}}));
+  EXPECT_EQ(asked[2], asked[1]);
+  EXPECT_EQ(asked[3], PaddedBox(assignment.group.placements[0].at(), assignment.setup, assignment.setup.fields[1]));
+  std::vector<StartRender> renders;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    EXPECT_THAT(renders, IsEmpty()) << "before chunk " << i << " of " << requests.size();
+    for (const StoreChunk& store : All<StoreChunk>(Tell(AnswerOf(requests[i])))) {
+      renders = All<StartRender>(Tell(ChunkStored{store.padded, store.chunk.box, store.chunk.chunk, {}}));
+    }
+  }
+  ASSERT_THAT(renders, SizeIs(1));
+  const StartRender& render = renders[0];
+  EXPECT_EQ(render.padded.dataset, 1U);
+  ASSERT_THAT(render.fields, SizeIs(2));
+  EXPECT_EQ(render.fields.at(0)->dataset, 2U);
+  EXPECT_EQ(render.fields.at(1)->dataset, 3U);
+  EXPECT_EQ(render.fields.at(1)->types.volume, ScalarType::kFloat32);
+
+  constexpr std::uint64_t kVoxels = 128U * 128 * 72;
+  const std::uint64_t coarse = 4 * std::uint64_t(asked[3].voxel_count());
+  Tell(RenderDone{render.key, render.rank, render.image, {}, {}, kVoxels, {3 * kVoxels, coarse}});
+  EXPECT_EQ(Sent<Heartbeat>(After(seconds(2))).back().cached_bytes, 4 * kVoxels + coarse) << "with what was derived of a field";
+  EXPECT_THAT(All<SendChunkRequest>(Tell(OfFields(2))), IsEmpty()) << "they are kept";
+}
+
+TEST_F(FieldBoxesTest, AFieldThatDoesNotReachABoxIsNotAskedFor) {
+  GroupAssignment assignment = OfFields(1);
+  assignment.setup.fields[1].levels[0].description.geometry.orientation.origin = {0, 0, 300};
+  std::vector<DatasetId> opened;
+  for (const OpenBox& open : All<OpenBox>(Tell(assignment))) opened.push_back(open.padded.dataset);
+  EXPECT_THAT(opened, testing::UnorderedElementsAre(1, 2));
+}
+
+TEST_F(FieldBoxesTest, AFieldWhoseVoxelsDoNotComeFailsTheGroup) {
+  WorkerConfig config = Config();
+  config.chunk_attempts = 1;
+  Start(config);
+  Actions fed = Tell(OfFields(1));
+  std::vector<WorkerTrouble> troubles;
+  for (std::size_t i = 0; i < fed.size() && troubles.empty(); ++i) {
+    Actions more;
+    if (const auto* sent = std::get_if<SendChunkRequest>(&fed[i])) {
+      more = sent->request.dataset == 3
+                 ? Tell(ChunkRefused{kEpoch, 3, sent->request.box, sent->request.chunk, Status::DataLoss("bad block")})
+                 : Tell(AnswerOf(*sent));
+    } else if (const auto* store = std::get_if<StoreChunk>(&fed[i])) {
+      more = Tell(ChunkStored{store->padded, store->chunk.box, store->chunk.chunk, {}});
+    }
+    troubles = Sent<WorkerTrouble>(more);
+    fed.insert(fed.end(), more.begin(), more.end());
+  }
+  ASSERT_THAT(troubles, SizeIs(1));
+  EXPECT_EQ(troubles[0].key, (GroupKey{1, 1, 0}));
+  EXPECT_THAT(troubles[0].status.message(), testing::HasSubstr("bad block"));
+  EXPECT_EQ(machine->sizes().renders, 0U);
+}
+
+TEST_F(FieldBoxesTest, OneBoxMayServeTwoFields) {
+  GroupAssignment assignment = OfFields(1);
+  assignment.setup.fields[1] = assignment.setup.fields[0];
+  const auto render = All<StartRender>(Feed(Tell(assignment))).at(0);
+  EXPECT_EQ(render.fields.at(0), render.fields.at(1));
+  Rendered(render);
+  EXPECT_EQ(machine->sizes().renders, 0U);
+  assignment.key.frame = 2;
+  EXPECT_THAT(All<StartRender>(Tell(assignment)), SizeIs(1));
+}
+
+// A render needs all of its boxes at once: they may take more room than there is.
+TEST_F(FieldBoxesTest, TheNextRenderGetsAllOfItsBoxes) {
+  WorkerConfig config = Config();
+  config.memory_bytes = kIdleMemoryBytes + 128 * 128 * 100;
+  Start(config);
+  GroupAssignment assignment = Sized(1, 0, {16, 16});
+  assignment.setup.fields = {OfFields(1).setup.fields[0]};
+  EXPECT_THAT(All<StartRender>(Feed(Tell(assignment))), SizeIs(1));
+}
+
 TEST_F(WorkerBoxesTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
   Rendered(first);

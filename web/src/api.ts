@@ -8,11 +8,20 @@ export class ApiError extends Error {
   constructor(readonly status: number, message: string) { super(message); }
 }
 
+// What requests call fields and times; the link, too.
+export const NAMES = {
+  channels: "channel", channelColors: "channel-color", channelRanges: "channel-range", channelGammas: "channel-gamma", channelOpacities: "channel-opacity", blend: "blend", time: "time", field: "field",
+} as const;
+export interface Field { name: string; channel: boolean; color: string | null; window: [number, number] | null; shown: boolean }
+export interface Times { count: number; step?: number | null; unit?: string } // `step`: from a time to the next one, if it is known
+export type Source = Record<string, string>; // of what is asked about: the dataset, and which of its fields and times
+
 export interface Level { size: [number, number, number]; spacing: [number, number, number]; voxel_bytes: number }
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
   layers?: { labels: number; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
+  fields?: Field[]; times?: Times; field?: number; time?: number; // absent: one field, one time
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
@@ -58,13 +67,13 @@ export class Api {
   };
 
   // Older gateways lack these: null.
-  histogram = (dataset: string): Promise<Histogram | null> => this.maybe("histogram", { dataset });
-  jointHistogram = (dataset: string): Promise<JointHistogram | null> => this.maybe("joint-histogram", { dataset });
-  transfer = (dataset: string, transfer: string): Promise<unknown> => this.maybe("transfer", { dataset, transfer });
+  histogram = (source: Source): Promise<Histogram | null> => this.maybe("histogram", source);
+  jointHistogram = (source: Source): Promise<JointHistogram | null> => this.maybe("joint-histogram", source);
+  transfer = (source: Source, transfer: string): Promise<unknown> => this.maybe("transfer", { ...source, transfer });
   labels = (dataset: string): Promise<{ labels: LabelName[] } | null> => this.maybe("labels", { dataset });
-  value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);
-  profile = (dataset: string, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { dataset, from: from.join(","), to: to.join(",") });
-  statistics = (dataset: string, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { dataset, box });
+  value = (source: Source, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { ...source, at: at.join(",") }, undefined, signal);
+  profile = (source: Source, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { ...source, from: from.join(","), to: to.join(",") });
+  statistics = (source: Source, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { ...source, box });
   labelStatistics = (dataset: string): Promise<LabelStatistics | null> => this.maybe("statistics", { dataset, labels: "true" });
   pick = (options: Options, x: number, y: number, signal?: AbortSignal): Promise<Value | null> => this.maybe("pick", {}, { ...options, x, y }, signal);
 

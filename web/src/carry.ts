@@ -1,12 +1,14 @@
 // What stays when another dataset is shown, so that two patients or two times can be compared: the camera, the colours, cuts and measurements,
 // as far as they apply to the other one.
 import { startOf } from "./camera";
+import { AS_SAID } from "./channels";
 import { rangeOf } from "./transfer";
 import { INITIAL, type Bounds, type State } from "./state";
 import { length, rounded, type Vec3 } from "./vec";
 import type { Volume } from "./volume";
 
 const inside = (p: Vec3, { low, high }: Volume): boolean => p.every((c, i) => c >= (low[i] as number) && c <= (high[i] as number));
+const namesOf = ({ channels }: Volume): string => channels.map(channel => channel.name).join("\n");
 const overlap = ([a, b]: readonly [number, number], [c, d]: readonly [number, number]): boolean => a <= d && c <= b;
 
 // What has to change in the state that a volume was seen with, for another volume.
@@ -23,6 +25,7 @@ export function carried(state: State, from: Volume, to: Volume): Partial<State> 
   const surfaces = state.surfaces.filter(({ value }) => value >= to.range[0] && value <= to.range[1]);
   if (surfaces.length < state.surfaces.length) patch.surfaces = surfaces;
   if (state.window !== null && state.level !== null && !overlap([state.level - state.window / 2, state.level + state.window / 2], to.range)) Object.assign(patch, { window: null, level: null });
+  if (namesOf(from) !== namesOf(to)) Object.assign(patch, AS_SAID);
   // Places.
   const cutsThrough = ([low, high]: Bounds, i: number): boolean => overlap([low ?? -Infinity, high ?? Infinity], [to.low[i] as number, to.high[i] as number]);
   if (state.clipBox && !(sameWorld && state.clipBox.every(cutsThrough))) patch.clipBox = null;

@@ -15,6 +15,12 @@ export function iconButton(label: string, name: IconName, press: () => void, key
   return h("button", { type: "button", class: "icon-button", "aria-label": label, title: key ? `${label} (${key})` : label, onclick: press }, icon(name));
 }
 
+// Buttons for undo and redo; refresh() says whether there is anything to bring back.
+export function undoButtons(store: { undo(): void; redo(): void; readonly canUndo: boolean; readonly canRedo: boolean }): { elements: readonly HTMLElement[]; refresh(): void } {
+  const undo = iconButton("Undo", "undo", () => store.undo(), "Ctrl+Z"), redo = iconButton("Redo", "redo", () => store.redo(), "Ctrl+Y");
+  return { elements: [undo, redo], refresh: () => { undo.disabled = !store.canUndo; redo.disabled = !store.canRedo; } };
+}
+
 export function row(label: string, control: HTMLElement, id = ""): HTMLElement {
   return h("div", { class: "row" }, id ? h("label", { for: id }, label) : h("span", { class: "label" }, label), control);
 }

@@ -1,7 +1,9 @@
 // The transfer function as points: that of the state, or what its preset is for this dataset, which the gateway tells.
 import type { ColorBar } from "./annotations";
+import type { Source } from "./api";
+import { sourceOf } from "./channels";
 import type { Context } from "./context";
-import { can } from "./offers";
+import { renderOptions } from "./options";
 import { colorAt, type ColorMap, hexOf, parseParaView, ramp, rangeOf, stretched, visibleRangeOf } from "./transfer";
 
 const BAR_COLORS = 64;
@@ -35,11 +37,13 @@ export class FunctionSource {
     return map === null && this.presets.get(this.key(preset)) === undefined;
   }
 
+  // Whether the picture follows it.
+  get shows(): boolean { return "transfer" in renderOptions(this.context.store.state); }
+
   // What colours of the picture mean; null: no bar can say it.
   bar(): ColorBar | null {
-    const { state } = this.context.store;
     const map = this.current(), [low, high] = visibleRangeOf(map);
-    if (this.pending || map.regions || !can("transfer", state.renderer) || (state.surfaces.length > 0 && state.surfacesAlone && can("isosurfaces", state.renderer))) return null;
+    if (this.pending || map.regions || !this.shows) return null;
     return low < high ? { low, high, colors: Array.from({ length: BAR_COLORS }, (_, i) => hexOf(colorAt(map, low + ((high - low) * (i + 0.5)) / BAR_COLORS))) } : null;
   }
 
@@ -58,13 +62,19 @@ export class FunctionSource {
     return known ?? ramp(...(volume ? ([volume.range[0], Math.max(volume.range[1], volume.range[0] + 1e-6)] as const) : ([0, 1] as const)));
   }
 
-  private key(preset: string): string { return `${this.context.volume()?.name ?? ""}\n${preset}`; }
+  // What it is a function of; presets are those of all times. Null: it is not known yet.
+  of(): Source | null {
+    const volume = this.context.volume();
+    return volume && { ...sourceOf({ ...this.context.store.state, time: "" }), dataset: volume.name };
+  }
+
+  private key(preset: string): string { return JSON.stringify([this.of(), preset]); }
 
   private ask(preset: string): void {
-    const volume = this.context.volume(), key = this.key(preset);
-    if (!volume || this.asked.has(key)) return;
+    const source = this.of(), key = this.key(preset);
+    if (!source || this.asked.has(key)) return;
     this.asked.add(key);
-    this.context.api.transfer(volume.name, preset)
+    this.context.api.transfer(source, preset)
       .then(json => { this.presets.set(key, json === null ? null : parseParaView(json)); this.changed(); })
       .catch(() => { this.asked.delete(key); }); // it is asked again with the next change
   }

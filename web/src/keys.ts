@@ -7,10 +7,12 @@ export interface KeyGroup { title: string; keys: readonly Key[] }
 const TEXT_FIELDS = "input[type=text], input[type=number], textarea";
 // Controls that arrows change.
 const ARROW_CONTROLS = "input[type=range], input[type=radio], select, [role=menuitem]";
+// Those that Space presses.
+const SPACE_CONTROLS = "button, summary, select, input:not([type=range])";
 
 // Keys act wherever the focus is, but in text fields, where they are text, and while a dialog is open. A control keeps the arrows that change it.
 function actsOn(target: EventTarget | null, key: string): boolean {
-  return target instanceof Element && !document.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS));
+  return target instanceof Element && !document.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS)) && !(key === " " && target.matches(SPACE_CONTROLS));
 }
 
 // Keys whose place counts where their letter is none of ours, by their places on the keyboard of the United States.
@@ -28,7 +30,7 @@ export function meaningsOf({ key, code, shiftKey }: Pick<KeyboardEvent, "key" | 
 // With other keys held, a key belongs to the browser; but many keyboards type brackets with AltGr (Ctrl and Alt to some systems) or Alt.
 const isFree = ({ ctrlKey, metaKey, altKey, key }: KeyboardEvent): boolean => (!ctrlKey && !metaKey && !altKey) || (altKey && !metaKey && /^[[\]{}]$/.test(key));
 
-export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo: () => void): void {
+export function listenToKeys(groups: () => readonly KeyGroup[], undo: () => void, redo: () => void): void {
   // The picture has the focus from the start; its ring shows once keys are used.
   document.addEventListener("keydown", () => put(document.body, "data-keys", "used"), true);
   document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
@@ -40,7 +42,7 @@ export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo
       return step === "y" || event.shiftKey ? redo() : undo();
     }
     if (!isFree(event) || !actsOn(event.target, event.key)) return;
-    const all = groups.flatMap(group => group.keys), meant = meanings.find(each => all.some(({ keys }) => keys.includes(each)));
+    const all = groups().flatMap(group => group.keys), meant = meanings.find(each => all.some(({ keys }) => keys.includes(each)));
     const key = all.find(({ keys }) => meant !== undefined && keys.includes(meant));
     if (!key) return;
     event.preventDefault();

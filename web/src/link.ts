@@ -1,5 +1,7 @@
 // The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
+import { NAMES } from "./api";
+import { GAMMAS } from "./channels";
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import { limitsOf, parametersIn } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST_KEY_FRAMES, type SlopePoint, type State, type Surface } from "./state";
@@ -20,9 +22,10 @@ const list = <T>(text: string | null, separator: string, read: (item: string) =>
 };
 const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
 const oneOf = <T extends string>(name: string, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
-const real = (name: string): Field<number> => ({
-  name, write: String, read: value => { const n = number(value), [low, high] = limitsOf(name); return n !== undefined && n >= low && n <= high ? n : undefined; },
+const within = (name: string, limits: () => readonly [number, number]): Field<number> => ({
+  name, write: String, read: value => { const n = number(value), [low, high] = limits(); return n !== undefined && n >= low && n <= high ? n : undefined; },
 });
+const real = (name: string): Field<number> => within(name, () => limitsOf(name));
 const flag = (name: string): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
 const nullable = <T>(field: Field<T>): Field<T | null> => ({ name: field.name, write: value => (value === null ? "" : field.write(value)), read: field.read });
 const point = (name: string): Field<Vec3> => ({ name, write: value => value.join(","), read: value => numbers(value, 3) as Vec3 | undefined });
@@ -96,12 +99,19 @@ const map: Field<ColorMap> = {
     return { ...map, material: Object.fromEntries(MATERIAL.flatMap((each, i) => { const n = texts[i] ? number(texts[i] as string) : undefined; return n === undefined ? [] : [[each, n]]; })) };
   },
 };
-const opacities: Field<Readonly<Record<string, number>>> = {
-  name: "label-opacity", write: value => Object.entries(value).map(([label, o]) => `${label}=${o}`).join(","),
+// "0=100:4000,1=5:7": a value each.
+const each = <T>(name: string, key: RegExp, { write, read }: Pick<Field<T>, "write" | "read">): Field<Readonly<Record<string, T>>> => ({
+  name, write: value => Object.entries(value).map(([of, one]) => `${of}=${write(one)}`).join(","),
   read: value => {
-    const pairs = list(value, ",", item => { const [label, o] = item.split("="), n = number(o); return label && /^\d+$/.test(label) && n !== undefined ? ([label, n] as const) : undefined; });
+    const pairs = list(value, ",", item => { const [of, text] = item.split("="), one = text === undefined ? undefined : read(text); return of && key.test(of) && one !== undefined ? ([of, one] as const) : undefined; });
     return pairs && Object.fromEntries(pairs);
   },
+});
+const share = within("", () => [0, 1]);
+const CHANNEL = /^[^,=]+$/, NO_CHANNEL = "none";
+const channels: Field<readonly string[]> = {
+  name: NAMES.channels, write: value => value.join(",") || NO_CHANNEL,
+  read: value => (value === NO_CHANNEL ? [] : value.split(",").every(channel => CHANNEL.test(channel)) ? value.split(",") : undefined),
 };
 
 const measures: Field<readonly Measure[]> = {
@@ -137,8 +147,11 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
-  labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: opacities,
+  labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: each("label-opacity", /^\d+$/, share),
   overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
+  channels: nullable(channels), channelColors: each(NAMES.channelColors, CHANNEL, text("", COLOR)), channelRanges: each(NAMES.channelRanges, CHANNEL, range("")),
+  channelGammas: each(NAMES.channelGammas, CHANNEL, within("", () => GAMMAS)), channelOpacities: each(NAMES.channelOpacities, CHANNEL, share), blend: oneOf(NAMES.blend, "auto", "add", "over", "max"),
+  time: text(NAMES.time, /^(last|\d{1,9}|[\d.]+[a-zµ]{1,3})$/),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
   measures, path, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), colorBar: flag("color-bar"), machine: flag("machine"),
 };

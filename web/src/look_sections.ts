@@ -1,5 +1,6 @@
 // Sections of the panel: renderer, isosurfaces, light and background.
 import { axesOf } from "./camera";
+import { takesFunction } from "./channels";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
@@ -108,8 +109,10 @@ export function surfacesSection(context: Context): HTMLElement {
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Value"), h("span", {}, "Colour"), h("span", {}, "Opacity"));
   const alone = toggle("Surfaces alone", on => store.update({ surfacesAlone: on }, "alone"));
   const hint = h("p", { class: "hint" }, `Shown by: ${titlesThatCan("isosurfaces")}.`);
+  const element = section("Isosurfaces", false, head, list.element, hint, alone.element, addButton);
   const update = (): void => {
     const { surfaces, surfacesAlone, renderer } = store.state;
+    element.hidden = !takesFunction(store.state);
     list.set(surfaces);
     alone.set(surfacesAlone);
     head.hidden = alone.element.hidden = surfaces.length === 0;
@@ -117,8 +120,9 @@ export function surfacesSection(context: Context): HTMLElement {
     addButton.disabled = surfaces.length >= MOST_SURFACES;
   };
   store.subscribe(update, LOOK);
+  context.onVolume(update);
   update();
-  return section("Isosurfaces", false, head, list.element, hint, alone.element, addButton);
+  return element;
 }
 
 const DEGREE = Math.PI / 180;

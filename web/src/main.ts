@@ -3,6 +3,9 @@ import { Api, type Dataset } from "./api";
 import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
 import { carried } from "./carry";
 import { wholeBox } from "./clip_handles";
+import { ChannelRanges } from "./channel_ranges";
+import { takesFunction } from "./channels";
+import { channelsSection } from "./channels_section";
 import { clipSection } from "./clip_section";
 import type { Context } from "./context";
 import { openSection, section, toggle } from "./controls";
@@ -10,6 +13,7 @@ import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dial
 import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
 import { GradientEditor } from "./gradient_editor";
+import { Histograms } from "./histograms";
 import { keepView, keyFramesSection } from "./key_frames";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
@@ -22,13 +26,15 @@ import { measureSection } from "./measure_section";
 import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { automaticRenderer, can, loadOffers, noteDataset } from "./offers";
+import { automaticRenderer, can, loadOffers, noteDataset, shownDataset } from "./offers";
+import { Player } from "./player";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Sending } from "./sending";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
-import { INITIAL, type State, Store } from "./state";
+import { INITIAL, LOOK, type State, Store } from "./state";
+import { timesOf, timeText } from "./times";
 import { TransferEditor } from "./transfer_editor";
 import { Viewer } from "./viewer";
 import { centreOf, type Volume, volumeOf } from "./volume";
@@ -46,6 +52,7 @@ class Page {
   private readonly shell: Shell;
   private readonly sending: Sending;
   private readonly machine = new Machine(() => this.store.update({ machine: false }));
+  private readonly player: Player;
   private readonly pointed: Pointed;
   private readonly viewer: Viewer;
   private readonly slices: Slices;
@@ -68,29 +75,32 @@ class Page {
     const context: Context = this.context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
     const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
     const labels = new Labels(context), layers = layersSection(context, labels);
+    const histograms = new Histograms(context), ranges = new ChannelRanges(context, histograms);
+    this.player = new Player(context);
     this.measuring = new Measuring(context);
     this.measures = measureSection(context, this.measuring);
     this.pointed = new Pointed(context, label => labels.note(label));
     this.sending = new Sending(api, context.say, name => this.showDataset(name));
-    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element, this.sending.element);
-    const editor = new TransferEditor(context, source);
+    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.player.element, this.machine.element, this.sending.element);
+    const editor = new TransferEditor(context, source, histograms);
     this.clipping = clipSection(context);
     const bar = toggle("Colour bar", on => store.update({ colorBar: on }));
     store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
     bar.set(store.state.colorBar);
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
-    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
-    this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
-      drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
-      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; notices.onError(message); },
+    this.shell.panel.append(channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
+    this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
+      drawn: ({ frame: { header, view } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
+      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); },
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
-    this.slices = new Slices(context, this.shell.panes, this.measuring, at => this.pointed.atPoint(at));
-    const showFunctions = (): void => { functions.hidden = !can("transfer", store.state.renderer); };
-    store.subscribe(showFunctions, ["renderer"]);
+    this.slices = new Slices(context, this.shell.panes, this.measuring, ranges, at => this.pointed.atPoint(at));
+    const showFunctions = (): void => { functions.hidden = !can("transfer", store.state.renderer) || !takesFunction(store.state); };
+    store.subscribe(showFunctions, LOOK);
+    context.onVolume(showFunctions);
     showFunctions();
-    listenToKeys(this.keyGroups(), () => store.undo(), () => store.redo());
+    listenToKeys(() => this.keyGroups(), () => store.undo(), () => store.redo());
     store.subscribe((state, before) => {
       if (state.dataset !== before.dataset) this.forgetVolume();
       else if (state.azimuth !== before.azimuth || state.elevation !== before.elevation) this.starts = false;
@@ -128,6 +138,12 @@ class Page {
     const { dataset } = this.store.state, first = status.datasets[0];
     if (!dataset && first) this.store.update({ dataset: first.name });
     this.listed = status.datasets;
+    const shown = this.volume && this.listed.find(each => each.name === dataset), count = timesOf(shown ?? null).count;
+    if (shown && shown.times && count !== timesOf(shownDataset()).count) { // it has grown
+      noteDataset(shown, false);
+      this.store.update({});
+      this.player.refresh();
+    }
     this.shell.showDatasets(status.datasets, this.store.state.dataset);
     this.know();
   }
@@ -175,8 +191,9 @@ class Page {
       if (!volume) return;
       const fact = (name: string, value: string): HTMLElement => h("div", {}, h("dt", {}, name), h("dd", {}, value));
       const coarsest = volume.levels.length > 1 ? volume.levels[volume.levels.length - 1] : undefined;
+      const times = timesOf(shownDataset());
       const unit = volume.unit === "voxel" || volume.unit === "unknown" ? "" : ` ${volume.unit}`;
-      list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), ...(coarsest ? [fact("Levels", `${volume.levels.length}, down to ${coarsest.size.join(" × ")}`)] : []), ...(volume.cells > 0 ? [fact("Cells", `${volume.cells}`)] : []), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`),
+      list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), ...(coarsest ? [fact("Levels", `${volume.levels.length}, down to ${coarsest.size.join(" × ")}`)] : []), ...(volume.cells > 0 ? [fact("Cells", `${volume.cells}`)] : []), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`), ...(volume.channels.length > 0 ? [fact("Channels", volume.channels.map(({ name }) => name).join(", "))] : []), ...(times.count > 1 ? [fact("Times", `${times.count}${times.step ? `, every ${timeText(1, times)}` : ""}`)] : []),
         fact("World", volume.world === "patient" ? "a patient’s (R, A, S)" : volume.world === "scene" ? "a scene’s" : "the voxels’"), fact("Memory", `${(volume.memoryBytes / 1e6).toFixed(1)} MB`));
     };
     this.volumeListeners.push(update);
@@ -245,7 +262,7 @@ class Page {
   }
 
   private keyGroups(): KeyGroup[] {
-    const { store, viewer } = this, actions = this.actions();
+    const { store, viewer, player } = this, actions = this.actions(), timed = player.present;
     const turn = (right: number, up: number) => (far: boolean, at: number): void => {
       const step = far ? TURN.far : TURN.near, pixels = MOVE_PIXELS.near;
       viewer.move(far ? panned(store.state, right * pixels, -up * pixels, viewer.pixelSize()) : orbited(store.state, right * step, up * step), at);
@@ -257,7 +274,7 @@ class Page {
         { keys: ["ArrowLeft"], label: "←", does: "Turn left (Shift: move)", run: turn(-1, 0) }, { keys: ["ArrowRight"], label: "→", does: "Turn right (Shift: move)", run: turn(1, 0) },
         { keys: ["ArrowUp"], label: "↑", does: "Turn up (Shift: move)", run: turn(0, 1) }, { keys: ["ArrowDown"], label: "↓", does: "Turn down (Shift: move)", run: turn(0, -1) },
         { keys: ["+", "="], label: "+", does: "Zoom in", run: zoom(ZOOM_STEP) }, { keys: ["-", "_"], label: "−", does: "Zoom out", run: zoom(1 / ZOOM_STEP) },
-        { keys: [",", "<"], label: ",", does: "Roll left", run: roll(-ROLL_STEP) }, { keys: [".", ">"], label: ".", does: "Roll right", run: roll(ROLL_STEP) },
+        { keys: timed ? ["<"] : [",", "<"], label: timed ? "<" : ",", does: "Roll left", run: roll(-ROLL_STEP) }, { keys: timed ? [">"] : [".", ">"], label: timed ? ">" : ".", does: "Roll right", run: roll(ROLL_STEP) },
         ...[0, 1, 2, 3, 4, 5].map(i => ({ keys: [String(i + 1)], label: String(i + 1), does: this.sides()[i]?.name ?? "", run: () => this.view(i) })),
         { keys: ["r"], label: "R", does: "Reset the view", run: actions.reset }, { keys: ["o"], label: "O", does: "Parallel or perspective", run: actions.projection },
       ] },
@@ -265,6 +282,9 @@ class Page {
         { keys: ["["], label: "[", does: "Narrower window", run: (_, at) => viewer.window(-0.1, 0, at) }, { keys: ["]"], label: "]", does: "Wider window", run: (_, at) => viewer.window(0.1, 0, at) },
         { keys: ["{"], label: "{", does: "Darker", run: (_, at) => viewer.window(0, -0.04, at) }, { keys: ["}"], label: "}", does: "Brighter", run: (_, at) => viewer.window(0, 0.04, at) },
       ] },
+      ...(timed ? [{ title: "Time", keys: [
+        { keys: [" "], label: "Space", does: "Play or pause", run: () => player.toggle() }, { keys: [","], label: ",", does: "Time before", run: () => player.step(-1) }, { keys: ["."], label: ".", does: "Next time", run: () => player.step(1) },
+      ] }] : []),
       { title: "Measure", keys: [
         ...MEASURE_KINDS.map(({ kind, name, key }) => ({ keys: [key], label: key.toUpperCase(), does: name, run: () => this.measure(kind) })),
         { keys: [], label: "Enter", does: "Point at the cross-hair, in a slice", run: () => undefined },

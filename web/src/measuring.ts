@@ -1,8 +1,10 @@
 // Measuring: the tool that is in hand, its points so far, and what the service says of profiles and boxes.
+import { sourceOf } from "./channels";
 import type { Context } from "./context";
 import { shown as text } from "./dom";
 import { angleOf, boxOf, type BoxStatistics, boxRange, distanceOf, type Measure, type MeasureKind, MOST_MEASURES, nameOf, pointsOf, type Profile } from "./measure";
 import { roundedPoint, type Vec3 } from "./vec";
+import { whenTimeRests } from "./times";
 import { unitName } from "./volume";
 
 export interface DrawnMeasure { measure: Measure; label: string }
@@ -12,11 +14,14 @@ export class Measuring {
   tool: MeasureKind | null = null;
   points: readonly Vec3[] = []; // points of the measurement that has begun
   private ahead: Vec3 | null = null; // below the pointer: where the next point would be
+  private time: string; // that has stood still
   private readonly answers = new Map<string, Answer | null>(); // null: it is asked
   private readonly listeners: (() => void)[] = [];
 
   constructor(private readonly context: Context) {
-    context.store.subscribe(() => this.changed(), ["measures", "dataset"]);
+    context.store.subscribe(() => this.changed(), ["measures", "dataset", "channels"]);
+    this.time = context.store.state.time;
+    whenTimeRests(context.store, () => { this.time = context.store.state.time; this.changed(); });
     context.onVolume(() => this.changed());
   }
 
@@ -103,14 +108,14 @@ export class Measuring {
 
   private answerTo(measure: Measure): Answer | null {
     const volume = this.context.volume(), { kind, points } = measure;
-    if (!volume) return null;
-    const key = JSON.stringify([volume.name, kind, points]), known = this.answers.get(key);
+    if (!volume || this.context.store.state.time !== this.time) return null;
+    const source = { ...sourceOf(this.context.store.state), dataset: volume.name }, key = JSON.stringify([source, kind, points]), known = this.answers.get(key);
     if (known !== undefined) return known;
     this.answers.set(key, null);
     const { api } = this.context;
     const asked: Promise<Answer> = kind === "profile"
-      ? api.profile(volume.name, points[0] as Vec3, points[1] as Vec3).then(profile => (profile ? { profile } : { error: "This gateway makes no profiles." }))
-      : api.statistics(volume.name, boxRange(measure)).then(statistics => (statistics ? { statistics } : { error: "This gateway makes no statistics." }));
+      ? api.profile(source, points[0] as Vec3, points[1] as Vec3).then(profile => (profile ? { profile } : { error: "This gateway makes no profiles." }))
+      : api.statistics(source, boxRange(measure)).then(statistics => (statistics ? { statistics } : { error: "This gateway makes no statistics." }));
     asked.catch((error: unknown): Answer => ({ error: error instanceof Error ? error.message : String(error) })).then(answer => { this.answers.set(key, answer); this.changed(); });
     return null;
   }

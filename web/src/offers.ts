@@ -50,20 +50,18 @@ const has = (what: string, { abilities, parameters }: Renderer): boolean => abil
 
 // The renderer unless the user chooses one: the service takes one that can do what is asked, and says which.
 export const automaticRenderer = (): string => offers.get("renderer")?.default ?? "";
-// The dataset that is shown: whether it is a grid, and which layers it has. `cautious`: what is not known yet counts as missing.
-let ofGrids: boolean | null = null; // null: not known
-let layers = { labels: true, overlay: true };
+// The dataset that is shown; null: nothing is known of it. `cautious`: what is not known yet counts as missing.
+let shown: Dataset | null = null;
 export function noteDataset(dataset: Dataset | undefined, cautious: boolean): void {
-  const known = dataset?.state === "ready";
-  ofGrids = known ? (dataset.cells ?? 0) > 0 : cautious ? false : null;
-  layers = known ? { labels: (dataset.layers?.labels ?? 0) > 0, overlay: dataset.layers?.overlay ?? false } : { labels: !cautious, overlay: !cautious };
+  shown = dataset?.state === "ready" ? dataset : cautious ? { name: "", state: "unloaded" } : null;
 }
-export const hasLayer = (name: "labels" | "overlay"): boolean => layers[name];
+export const shownDataset = (): Dataset | null => shown;
+export const hasLayer = (name: "labels" | "overlay"): boolean => shown === null || Number(shown.layers?.[name] ?? 0) > 0;
 
 // The renderer, or the automatic one if it draws cells and the dataset has none.
 export function fitting(renderer: string): string {
   const chosen = renderers().find(({ name }) => name === renderer);
-  return ofGrids === false && chosen?.abilities.includes("cells") ? automaticRenderer() : renderer;
+  return shown !== null && !shown.cells && chosen?.abilities.includes("cells") ? automaticRenderer() : renderer;
 }
 
 // An ability ("isosurfaces") or a parameter ("sampling-rate") of a renderer; the service refuses the rest.

@@ -1,8 +1,10 @@
 // The state as options of the gateway, which are those of the command line.
 import type { Options } from "./api";
+import { channelOptions } from "./channels";
 import { boxText, slopeText } from "./link";
 import { can, fitting, hasLayer, hasRegions, parametersOf } from "./offers";
 import { ONE_COLOR, type State } from "./state";
+import { timeOptions } from "./times";
 import { rampTo, toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
 
@@ -58,9 +60,10 @@ export function renderOptions(state: State): Options {
     if (state.ambientOcclusion > 0) options["ambient-occlusion"] = state.ambientOcclusion;
   }
   if (state.lights.length > 0 && (can("lights", renderer) || can("shadows", renderer))) options["light"] = state.lights.map(light => light.join(","));
-  const surfaces = can("isosurfaces", renderer) ? state.surfaces : [];
-  if (surfaces.length > 0) options["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
-  if (can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(options, transferOptions(state));
+  const surfaces = can("isosurfaces", renderer) ? state.surfaces : [], look: Options = {};
+  if (surfaces.length > 0) look["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
+  if (can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(look, transferOptions(state));
+  Object.assign(options, channelOptions(state, look), timeOptions(state));
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
@@ -70,8 +73,8 @@ export function renderOptions(state: State): Options {
 }
 
 export function sliceOptions(state: State, plane: string, at: Vec3): Options {
-  const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background };
-  if (state.window !== null && state.level !== null) Object.assign(options, { window: state.window, level: state.level });
+  const window: Options = state.window !== null && state.level !== null ? { window: state.window, level: state.level } : {};
+  const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background, ...channelOptions(state, window), ...timeOptions(state) };
   if (state.labels !== "off" && hasLayer("labels")) Object.assign(options, labelOptions(state, false));
   if (state.overlay && hasLayer("overlay")) Object.assign(options, overlayOptions(state));
   return options;

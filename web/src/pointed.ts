@@ -1,5 +1,6 @@
 // What lies below the pointer: position, value and label, asked for once the pointer rests.
 import { ApiError, type LabelName, type Value } from "./api";
+import { shownChannels, sourceOf } from "./channels";
 import type { Context } from "./context";
 import { h, shown } from "./dom";
 import { renderOptions } from "./options";
@@ -21,7 +22,7 @@ export class Pointed {
     this.cancel();
     if (!at) return this.say("");
     this.say(this.position(at));
-    this.later(signal => this.context.api.value(this.context.store.state.dataset, at, signal));
+    this.later(signal => this.context.api.value(sourceOf(this.context.store.state), at, signal));
   }
 
   // In the 3-D picture it is picked, at a point of the page's pixels.
@@ -61,7 +62,7 @@ export class Pointed {
     if (value.hit === false || !value.at) return this.say("");
     const label = value.label ?? null;
     if (label && label.value > 0) this.onLabel(label);
-    this.say(this.position(value.at), typeof value.value !== "number" || value.inside === false ? "" : `value ${shown(value.value)}`, label && label.value > 0 ? label.name || `label ${label.value}` : "");
+    this.say(this.position(value.at), typeof value.value !== "number" || value.inside === false ? "" : `${shownChannels(this.context.store.state)[0]?.name ?? "value"} ${shown(value.value)}`, label && label.value > 0 ? label.name || `label ${label.value}` : "");
   }
 
   private position(at: Vec3): string {

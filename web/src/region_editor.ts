@@ -80,11 +80,11 @@ export class RegionEditor {
   }
 
   private ask(): void {
-    const name = this.context.volume()?.name;
-    if (!name || this.asked === name) return;
-    this.asked = name;
-    this.context.api.jointHistogram(name).then(of => {
-      if (!of || this.asked !== name) return;
+    const source = this.source.of(), key = JSON.stringify(source);
+    if (!source || this.asked === key) return;
+    this.asked = key;
+    this.context.api.jointHistogram(source).then(of => {
+      if (!of || this.asked !== key) return;
       this.joint = { of, image: jointImage(of) };
       this.refresh(this.source.current());
     }).catch(() => undefined);

@@ -24,7 +24,7 @@ export class Shell {
   private readonly panelButton: HTMLButtonElement;
   private names = "";
 
-  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
+  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, player: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
     const views = iconButton("Views", "views", () => undefined);
     const share = button("Share", "link", () => undefined, "share");
     this.layoutButtons = [iconButton("One picture", "single", () => actions.layout(false), "L"), iconButton("With slices", "quad", () => actions.layout(true), "L")];
@@ -43,7 +43,7 @@ export class Shell {
         menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie), menuItem("Help", "?", actions.help)]),
         iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
     this.datasets.element.classList.add("dataset");
-    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, sending, messages), machine);
+    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, sending, messages), player, machine);
     document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
   }
 

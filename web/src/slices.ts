@@ -1,5 +1,7 @@
 // Three slices beside the 3-D picture. Their cross-hair is one point of the world.
 import { unproject } from "./camera";
+import type { ChannelRanges } from "./channel_ranges";
+import { takesFunction } from "./channels";
 import type { Context } from "./context";
 import { h } from "./dom";
 import type { Measuring } from "./measuring";
@@ -17,7 +19,7 @@ interface Slice { pane: Pane; plane: string; name: string }
 export class Slices {
   private slices: Slice[] = [];
 
-  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly measuring: Measuring, private readonly hover: (at: Vec3 | null) => void) {
+  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly measuring: Measuring, private readonly ranges: ChannelRanges, private readonly hover: (at: Vec3 | null) => void) {
     measuring.onChange(() => this.slices.forEach(slice => this.annotate(slice)));
     context.store.subscribe(() => this.slices.forEach(slice => this.annotate(slice)), ["crosshair", "scaleBar"]);
   }
@@ -140,6 +142,7 @@ export class Slices {
   // Window and level of the slices: dragging to the right widens, upwards brightens.
   private window(widen: number, raise: number): void {
     const { store } = this.context, volume = this.context.volume() as Volume, [low, high] = volume.range;
+    if (!takesFunction(store.state)) return this.ranges.window(widen, raise);
     const window = store.state.window ?? (high - low) * 0.8, level = store.state.level ?? (low + high) / 2;
     store.update({ window: rounded(Math.max(window * Math.exp(2 * widen), (high - low) * 1e-3), 4), level: rounded(level - raise * window, 4) }, "slice window");
   }

@@ -1,4 +1,5 @@
 // Section of the panel: the cross-hair and the window of the slices, by numbers and by names.
+import { takesFunction } from "./channels";
 import type { Context } from "./context";
 import { choice, numberField, optionalField, section } from "./controls";
 import { h } from "./dom";
@@ -22,11 +23,13 @@ export function slicesSection(context: Context): HTMLElement {
   });
   preset.element.title = "Hounsfield units, of CT";
   const field = (name: string, input: HTMLElement): HTMLElement => h("label", {}, h("span", {}, name), input);
+  const windowFields = h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input));
   const element = section("Slices", true, h("div", { class: "fields thirds" }, ...at.map((each, axis) => field(AXIS_NAMES[axis] as string, each.input))),
-    preset.element, h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input)));
+    preset.element, windowFields);
   const update = (): void => {
     const { state } = store, volume = context.volume();
     element.hidden = state.layout !== "quad" || !volume;
+    preset.element.hidden = windowFields.hidden = !takesFunction(state);
     if (!volume) return;
     const named = namedWindows().find(each => each.width === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
     preset.fill([AUTOMATIC, ...namedWindows().map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
@@ -35,7 +38,7 @@ export function slicesSection(context: Context): HTMLElement {
     window.set(state.window);
     level.set(state.level);
   };
-  store.subscribe(update, ["layout", "crosshair", "window", "level"]);
+  store.subscribe(update, ["layout", "crosshair", "window", "level", "channels"]);
   context.onVolume(update);
   update();
   return element;

@@ -46,6 +46,14 @@ export interface State extends Viewpoint {
   overlayColor: string;
   overlayRange: readonly [number, number] | null;
   overlayWeight: number;
+  // Channels, by number or name. Those that a record does not name look as the dataset says.
+  channels: readonly string[] | null; // which show; null: as the dataset says
+  channelColors: Readonly<Record<string, string>>;
+  channelRanges: Readonly<Record<string, readonly [number, number]>>;
+  channelGammas: Readonly<Record<string, number>>;
+  channelOpacities: Readonly<Record<string, number>>;
+  blend: "auto" | "add" | "over" | "max";
+  time: string; // a number, one with a unit, or "last"; empty: as the dataset says
   // Slices
   layout: "single" | "quad";
   crosshair: Vec3 | null; // null: the volume's centre
@@ -70,6 +78,7 @@ export const INITIAL: State = {
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
   overlay: false, overlayPreset: "auto", overlayColor: "#ff4fd8", overlayRange: null, overlayWeight: 1,
+  channels: null, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
   layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
   marker: true, scaleBar: true, colorBar: false, machine: false,
 };
@@ -77,7 +86,7 @@ export const INITIAL: State = {
 // What undo brings back: the look, not the place from which one looks.
 export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
-  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "window", "level", "measures", "path"] as const;
+  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "channels", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "measures", "path"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
 

@@ -1,9 +1,11 @@
 // The editor of the transfer function: points of opacity in the plot, points of colour in the strip below; or regions in their place.
 import type { Histogram } from "./api";
+import { channels, sourceOf, takesFunction } from "./channels";
 import type { Context } from "./context";
-import { button, choice, colorField, iconButton, numberField, slider } from "./controls";
+import { button, choice, colorField, iconButton, numberField, slider, undoButtons } from "./controls";
 import { copyText, download, h, put, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
+import type { Histograms } from "./histograms";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
 import { hasRegions, presetChoices, turnTo } from "./offers";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
@@ -35,8 +37,7 @@ export class TransferEditor {
   private readonly high = numberField("Stretch to", value => this.stretch(this.source.range()[0], value));
   private readonly density = slider("Density", -2, 2, 0.05, v => `× ${shown(Math.pow(10, v), 2)}`, v => this.context.store.update({ opacityDistance: rounded(Math.pow(10, -v), 4) }, "density"));
   private readonly note = h("p", { class: "hint" });
-  private readonly undoButton = iconButton("Undo", "undo", () => this.context.store.undo(), "Ctrl+Z");
-  private readonly redoButton = iconButton("Redo", "redo", () => this.context.store.redo(), "Ctrl+Y");
+  private readonly undo = undoButtons(this.context.store);
   private readonly addButton = iconButton("Add a point of opacity", "add", () => this.add(), "Insert");
   private readonly removeButton = iconButton("Remove the point", "remove", () => this.remove(), "Delete");
   private readonly frame = h("div", { class: "plot-frame" }, this.plot);
@@ -44,10 +45,9 @@ export class TransferEditor {
   private readonly pointFields: HTMLElement;
   private readonly stretchFields: HTMLElement;
   private selected: Selected = { kind: "opacity", index: 0 };
-  private histogram: Histogram | null = null;
   private width = 280;
 
-  constructor(private readonly context: Context, private readonly source: FunctionSource) {
+  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly histograms: Histograms) {
     this.plot.append(svg("defs", {}, this.gradient), this.bars, this.area, this.curve, this.ticks, this.strip, this.points);
     const file = h("input", { type: "file", accept: ".json,application/json", class: "offscreen", tabindex: -1, "aria-label": "Colour map", onchange: () => { const chosen = file.files?.[0]; if (chosen) void this.open(chosen); file.value = ""; } });
     this.pointFields = h("div", { class: "fields" },
@@ -55,7 +55,7 @@ export class TransferEditor {
     this.stretchFields = h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet"));
     this.regions = new RegionEditor(context, source);
     this.element = h("div", { class: "editor" }, this.presets.element, this.frame, this.note, this.pointFields, this.regions.element,
-      h("div", { class: "tools-row" }, this.undoButton, this.redoButton, this.addButton, this.removeButton, h("span", { class: "space" }),
+      h("div", { class: "tools-row" }, ...this.undo.elements, this.addButton, this.removeButton, h("span", { class: "space" }),
         iconButton("Open a colour map", "open", () => file.click()), iconButton("Save as a file", "save", () => this.save()), iconButton("Copy for --transfer", "copy", () => void this.copy()), file),
       this.stretchFields, this.density.element, this.regions.switch);
     onWidth(this.frame, width => { this.width = width; this.refresh(); });
@@ -63,11 +63,8 @@ export class TransferEditor {
       choose: circle => this.focusOn(circle), insertAt: event => this.insertAt(event), dragTo: event => this.drag(event),
       step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
     });
-    context.onVolume(volume => {
-      this.histogram = null;
-      this.refresh();
-      if (volume) context.api.histogram(volume.name).then(histogram => { this.histogram = histogram; this.refresh(); }).catch(() => undefined);
-    });
+    context.onVolume(() => this.refresh());
+    histograms.onChange(() => this.refresh());
     context.store.subscribe(() => this.refresh(), LOOK);
   }
 
@@ -92,14 +89,13 @@ export class TransferEditor {
     else if (!map.regions) this.drawCurves(map);
     this.regions.refresh(map);
     this.regions.switch.hidden = pending;
-    this.note.textContent = pending ? "The function shows once the dataset is read." : this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : "";
+    this.note.textContent = pending ? "The function shows once the dataset is read." : this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : takesFunction(state) && !this.source.shows && channels()?.length ? "The channel has its colour. A function that you choose or change here takes its place." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
     this.low.set(low);
     this.high.set(high);
     this.density.set(-Math.log10(state.opacityDistance));
-    this.undoButton.disabled = !this.context.store.canUndo;
-    this.redoButton.disabled = !this.context.store.canRedo;
+    this.undo.refresh();
   }
 
   // ---- drawing
@@ -114,7 +110,8 @@ export class TransferEditor {
     const scale = this.scale(map), height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
     this.plot.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
     this.plot.setAttribute("height", String(height));
-    this.bars.setAttribute("d", this.histogram ? histogramPath(this.histogram, scale) : "");
+    const { histogram } = this;
+    this.bars.setAttribute("d", histogram ? histogramPath(histogram, scale) : "");
     const path = curvePath(map, scale);
     this.curve.setAttribute("d", path);
     this.area.setAttribute("d", `${path}L${scale.x(scale.domain[1])} ${scale.y(0)}L${scale.x(scale.domain[0])} ${scale.y(0)}Z`);
@@ -125,6 +122,8 @@ export class TransferEditor {
       svg("text", { x: scale.x(value), y: stripY + PLOT.strip + 20, "text-anchor": anchor }, shown(value))));
     this.drawPoints(map, scale, stripY);
   }
+
+  private get histogram(): Histogram | null { return this.histograms.of(sourceOf(this.context.store.state)); }
 
   private scale(map: ColorMap): Scale {
     const volume = this.context.volume(), [low, high] = rangeOf(map);

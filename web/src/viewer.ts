@@ -1,5 +1,8 @@
 // The 3-D picture: its view follows the state, gestures move it, the page's drawing lies over it.
+import type { LegendEntry } from "./annotations";
 import { zoomOf } from "./camera";
+import type { ChannelRanges } from "./channel_ranges";
+import { channels } from "./channels";
 import { ClipHandles } from "./clip_handles";
 import type { Context } from "./context";
 import type { FunctionSource } from "./function_source";
@@ -25,7 +28,7 @@ export class Viewer {
   private frameAsked = 0;
   private changed = false; // since the last view was sent
 
-  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, private readonly measuring: Measuring, private readonly labels: Labels, events: PaneEvents) {
+  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, private readonly measuring: Measuring, private readonly labels: Labels, private readonly ranges: ChannelRanges, events: PaneEvents) {
     this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
       ...events, drawn: shown => { this.resolveFit(shown); this.annotate(); events.drawn?.(shown); }, resized: () => this.send(),
     });
@@ -75,6 +78,10 @@ export class Viewer {
   // function, such as clear air, moves with it.
   window(widen: number, raise: number, inputAt: number): void {
     const volume = this.context.volume();
+    if (volume && channels()?.length && !this.source.shows) {
+      this.inputAt ??= inputAt;
+      return this.ranges.window(widen, raise);
+    }
     if (!volume || this.source.pending || !can("transfer", this.context.store.state.renderer)) return;
     const [low, high] = this.source.range(), [from, to] = visibleRangeOf(this.source.current());
     const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], Number.MIN_VALUE);
@@ -118,16 +125,18 @@ export class Viewer {
     const { shown } = this.pane, { state } = this.context.store;
     if (!shown) return;
     const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
-    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.labels.legend(), bar: state.colorBar ? this.source.bar() : null });
+    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.legend(), bar: state.colorBar ? this.source.bar() : null });
     this.handles.update(shown, state.clipBox, this.context.volume());
     this.pane.level.show(shown.frame.header, this.context.volume()?.levels.length ?? 0);
   }
+
+  private legend(): readonly LegendEntry[] { return [...this.ranges.legend(), ...this.labels.legend()]; }
 
   // What the pane shows, for a file.
   part(): Part {
     return {
       name: "3d", title: "3-D picture", view: { picture: "render", timeline: false, options: renderOptions(this.context.store.state) },
-      marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.labels.legend(), bar: this.context.store.state.colorBar ? this.source.bar() : null },
+      marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.legend(), bar: this.context.store.state.colorBar ? this.source.bar() : null },
     };
   }
 

@@ -156,7 +156,7 @@ void BoxFetcher::SetBytes(Generation padded, std::uint64_t bytes) {
   cached_bytes_ += of_box.bytes;
 }
 
-void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker,
+void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_client, std::size_t at_any_rate, Epoch epoch, WorkerId worker,
                                Time now, WorkerActions& actions) {
   const auto waits = [this](const std::vector<Generation>& boxes) {
     return std::ranges::any_of(boxes,
@@ -165,7 +165,6 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
   const auto clients = std::ranges::count_if(by_client, waits);
   if (clients == 0) return;
   std::uint64_t begun_bytes = BegunBytes();
-  bool first = true;
   for (const std::vector<Generation>& boxes : by_client) {
     std::uint64_t in_flight_bytes = 0, in_flight = 0;  // of this client
     for (const auto& [name, request] : in_flight_) {
@@ -177,8 +176,9 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
     for (const Generation generation : boxes) {
       if (!has_credit) break;
       HeldBox& padded = boxes_.at(generation);
-      const bool at_any_rate = std::exchange(first, false) && next_at_any_rate;
-      if (!padded.begun && !at_any_rate && begun_bytes + padded.bytes > room_) return;
+      const bool now_or_never = at_any_rate > 0;
+      at_any_rate -= now_or_never ? 1 : 0;
+      if (!padded.begun && !now_or_never && begun_bytes + padded.bytes > room_) return;
       if (!padded.begun) begun_bytes += padded.bytes;
       padded.begun = true;
       while (!padded.retired && !padded.missing.empty()) {

@@ -73,8 +73,8 @@ class BoxFetcher {
   bool HasRoomBeside(Generation padded) const { return boxes_.at(padded).RawBytes() <= room_ - std::min(room_, cached_bytes_); }
 
   // Requests missing chunks of these padded boxes, which each client needs in this order, within the credit (one chunk is always allowed)
-  // and the room. `next_at_any_rate`: the first of all begins to take memory even if there is no room.
-  void RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker, Time now,
+  // and the room. So many of the first client's begin to take memory `at_any_rate`, even if there is no room.
+  void RequestChunks(std::span<const std::vector<Generation>> by_client, std::size_t at_any_rate, Epoch epoch, WorkerId worker, Time now,
                      WorkerActions& actions);
   void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
   void OnRefused(const ChunkRefused& refused);

@@ -19,23 +19,40 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     }
     turns_.Join(client);
   }
-  const Box voxels = PaddedBox(placement.at(), *setup);
   const std::uint8_t level = placement.level;
-  const BoxFetcher::Use use{client, key.frame};
-  BoxFetcher::Generation light = 0;
-  if (setup->light) {
-    const auto& [dataset, description, stored] = *setup->light;
-    light = boxes_.Acquire(use, dataset, description.geometry.bounds(), {description.type, {}}, stored, {}, actions);
+  Job& job = waiting_[{client, key, rank}];
+  job.render = {.client = client, .key = key, .rank = rank, .placement = placement, .setup = setup, .hidden = hidden};
+  const auto acquire = [&](DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
+                           const std::vector<FilledBox>& filled) {
+    return boxes_.key(job.boxes.emplace_back(boxes_.Acquire({client, key.frame}, dataset, box, types, stored, filled, actions)));
+  };
+  const auto acquire_other = [&](const CoarserLevel& volume, const Box& box) {
+    return acquire(volume.dataset, box, {volume.description.type, {}}, volume.stored, {});
+  };
+  if (setup->light) job.render.light = acquire_other(*setup->light, setup->light->description.geometry.bounds());
+  for (const FieldSetup& field : setup->fields) {
+    const Box box = PaddedBox(placement.at(), *setup, field);
+    std::optional<BoxKey>& of_field = job.render.fields.emplace_back();
+    if (!box.empty()) of_field = acquire_other(LevelOf(field, level), box);
   }
-  const BoxFetcher::Generation padded =
-      boxes_.Acquire(use, DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
-  Job& job = waiting_[{client, key, rank}] = {placement, setup, hidden, padded, light};
+  job.render.padded =
+      acquire(DatasetOf(*setup, level), PaddedBox(placement.at(), *setup), TypesOf(*setup), StoredOf(*setup, level), placement.filled);
   job.waited = !Complete(job);
 }
 
+bool RenderQueue::Complete(const Job& job) const {
+  return std::ranges::all_of(job.boxes, [this](BoxFetcher::Generation box) { return boxes_.complete(box); });
+}
+
+bool RenderQueue::HasRoom(const Job& job) const {
+  return std::ranges::all_of(job.boxes, [this](BoxFetcher::Generation box) {
+    const auto uses = [box](const auto& begun) { return std::ranges::find(begun.second.job.boxes, box) != begun.second.job.boxes.end(); };
+    return boxes_.HasRoomBeside(box) || std::ranges::none_of(begun_, uses);
+  });
+}
+
 void RenderQueue::Release(const Job& job) {
-  boxes_.Release(job.padded);
-  if (job.light != 0) boxes_.Release(job.light);
+  for (const BoxFetcher::Generation box : job.boxes) boxes_.Release(box);
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
@@ -45,18 +62,16 @@ void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& action
     return true;
   });
   for (auto& [client, begun] : begun_) {
-    if (begun.key != key || begun.dropped) continue;
+    if (begun.job.render.key != key || begun.dropped) continue;
     begun.dropped = true;
-    actions.push_back(CancelRender{begun.image});
+    actions.push_back(CancelRender{begun.job.render.image});
     if (turn_ && turn_->client == client) EndTurn(now);
   }
 }
 
 RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
   for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
-    const BoxFetcher::Generation padded = job->second.padded;
-    const auto uses = [&](const auto& begun) { return begun.second.job.padded == padded; };
-    if (Complete(job->second) && (boxes_.HasRoomBeside(padded) || std::ranges::none_of(begun_, uses))) return job;
+    if (Complete(job->second) && HasRoom(job->second)) return job;
   }
   return waiting_.end();
 }
@@ -112,7 +127,7 @@ void RenderQueue::StartNext(Time now, WorkerActions& actions) {
       turn_->begin = now;
       return turns_.Take(turn_->client);
     }
-    actions.push_back(PauseRender{begun_.at(turn_->client).image});
+    actions.push_back(PauseRender{begun_.at(turn_->client).job.render.image});
   }
   Begin(*next, now, actions);
 }
@@ -121,48 +136,47 @@ void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
   turns_.Take(client);
   turn_ = TurnNow{client, now, now};
   if (const auto paused = begun_.find(client); paused != begun_.end()) {
-    actions.push_back(ResumeRender{paused->second.image});
+    actions.push_back(ResumeRender{paused->second.job.render.image});
     return;
   }
   const auto next = NextOf(client);
-  const auto& [of_client, key, rank] = next->first;
-  const Begun& begun = begun_.emplace(client, Begun{key, rank, next->second, names_.Next()}).first->second;
+  Begun& begun = begun_.emplace(client, Begun{next->second}).first->second;
   waiting_.erase(next);
-  actions.push_back(StartRender{client, begun.key, begun.rank, boxes_.key(begun.job.padded), begun.job.placement, begun.job.setup,
-                                begun.job.hidden, begun.image});
-  if (begun.job.light != 0) std::get<StartRender>(actions.back()).light = boxes_.key(begun.job.light);
+  begun.job.render.image = names_.Next();
+  actions.push_back(begun.job.render);
 }
 
 Time RenderQueue::NextTurn() const { return turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max(); }
 
 std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions) {
-  const auto ended = std::ranges::find_if(begun_, [&](const auto& begun) { return begun.second.image == done.image; });
+  const auto ended = std::ranges::find_if(begun_, [&](const auto& begun) { return begun.second.job.render.image == done.image; });
   if (ended == begun_.end()) return std::nullopt;
   const ClientId client = ended->first;
   if (turn_ && turn_->client == client) EndTurn(now);
-  const Begun job = std::move(ended->second);
+  const auto [job, dropped] = std::move(ended->second);
   begun_.erase(ended);
-  const BoxFetcher::Generation padded = job.job.padded;
+  const StartRender& render = job.render;
   if (done.status.ok()) {
-    boxes_.Rendered(padded);
-    if (job.job.light != 0) boxes_.Rendered(job.job.light);
+    for (const BoxFetcher::Generation box : job.boxes) boxes_.Rendered(box);
   }
-  boxes_.SetBytes(padded, done.box_bytes);  // a cancelled frame derives data too
+  boxes_.SetBytes(render.padded.generation, done.box_bytes);  // a cancelled frame derives data too
+  for (std::size_t i = 0; i < done.field_bytes.size(); ++i) {
+    if (render.fields[i]) boxes_.SetBytes(render.fields[i]->generation, done.field_bytes[i]);
+  }
   if (waiting_.empty() && begun_.empty()) turns_.ForgetAll();
   turns_.ForgetIdle([this](ClientId each) { return Busy(each); });
-  if (job.dropped) {
-    Release(job.job);
+  if (dropped) {
+    Release(job);
     actions.push_back(ReleaseImage{done.image});
     return std::nullopt;
   }
   RankReport report = done.report;
   report.worker = worker;
-  report.group = job.key.group;
-  report.rank = job.rank;
-  report.box = job.job.placement.id;
-  if (job.job.waited) {
-    for (const BoxFetcher::Generation box : {padded, job.job.light}) {
-      if (box == 0) continue;
+  report.group = render.key.group;
+  report.rank = render.rank;
+  report.box = render.placement.id;
+  if (job.waited) {
+    for (const BoxFetcher::Generation box : job.boxes) {
       const BoxFetcher::FetchReport fetched = boxes_.TakeReport(box);
       report.voxel_bytes += fetched.voxel_bytes;
       report.stored_bytes += fetched.stored_bytes;
@@ -171,30 +185,38 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
       }
     }
   }
-  Release(job.job);
+  Release(job);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
   return report;
 }
 
-std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::BoxesInTurn() const {
+RenderQueue::WantedBoxes RenderQueue::BoxesInTurn() const {
+  struct OfClient {
+    std::vector<BoxFetcher::Generation> boxes;
+    std::set<BoxFetcher::Generation> listed;
+    std::size_t of_first = 0;
+  };
   std::vector<ClientId> clients;
-  std::map<ClientId, std::vector<BoxFetcher::Generation>> boxes;
+  std::map<ClientId, OfClient> wanted;
   for (const auto& [name, job] : waiting_) {
-    std::vector<BoxFetcher::Generation>& of_client = boxes[std::get<ClientId>(name)];
-    if (job.light != 0 && std::ranges::find(of_client, job.light) == of_client.end()) of_client.push_back(job.light);
-    of_client.push_back(job.padded);
+    auto& [boxes, listed, of_first] = wanted[std::get<ClientId>(name)];
+    for (const BoxFetcher::Generation box : job.boxes) {
+      if (listed.insert(box).second) boxes.push_back(box);
+    }
+    if (of_first == 0) of_first = boxes.size();
   }
-  for (const auto& [client, of_client] : boxes) clients.push_back(client);
+  for (const auto& [client, of_client] : wanted) clients.push_back(client);
   std::ranges::sort(clients, {}, [this](ClientId client) { return turns_.TurnOf(client); });
-  std::vector<std::vector<BoxFetcher::Generation>> in_turn;
-  for (const ClientId client : clients) in_turn.push_back(std::move(boxes[client]));
+  WantedBoxes in_turn;
+  for (const ClientId client : clients) in_turn.by_client.push_back(std::move(wanted[client].boxes));
+  if (!clients.empty()) in_turn.of_next = wanted[clients.front()].of_first;
   return in_turn;
 }
 
-std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation padded) const {
+std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation box) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.padded == padded || job.light == padded) groups.insert(std::get<GroupKey>(name));
+    if (std::ranges::find(job.boxes, box) != job.boxes.end()) groups.insert(std::get<GroupKey>(name));
   }
   return groups;
 }

@@ -1,11 +1,12 @@
 // RenderQueue: the ranks that this worker has yet to render, and those that it is rendering. The ranks of a client are rendered one after
-// the other, in order of frame, group and rank. The next one is the first whose padded box is complete. The clients take turns of at least
+// the other, in order of frame, group and rank. The next one is the first whose boxes are complete: its padded box, and those of the light
+// volume and of the other fields that the frame shows. The clients take turns of at least
 // kTurn. The next turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a
 // client's turn is over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
 //
 // A render that is told to pause stops only between two of its pieces. A render that is cancelled ends soon, but not at once. So other
 // renders run beside it for a moment. Renders of several clients, paused ones included, use the same padded box at the same time, as long
-// as there is room for what each of them derives. Each job pins its padded box.
+// as there is room for what each of them derives. Each job pins its boxes.
 #pragma once
 
 #include <map>
@@ -42,26 +43,24 @@ class RenderQueue {
   // (the image is then released).
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions);
 
-  // The padded boxes of waiting jobs, a list for each client. The client that is next in turn comes first.
-  std::vector<std::vector<BoxFetcher::Generation>> BoxesInTurn() const;
-  std::set<GroupKey> GroupsOn(BoxFetcher::Generation padded) const;
+  // The boxes of waiting jobs, a list for each client, none twice. The client that is next in turn comes first.
+  struct WantedBoxes {
+    std::vector<std::vector<BoxFetcher::Generation>> by_client;
+    std::size_t of_next = 0;  // so many at the front are those of the first job: it needs all of them at a time
+  };
+  WantedBoxes BoxesInTurn() const;
+  std::set<GroupKey> GroupsOn(BoxFetcher::Generation box) const;
   bool AnyPaused() const { return begun_.size() > (turn_ ? 1U : 0U); }
   std::size_t size() const { return waiting_.size() + begun_.size(); }
 
  private:
   struct Job {
-    Placement placement;
-    std::shared_ptr<const FrameSetup> setup;
-    std::shared_ptr<const OcclusionMask> hidden;
-    BoxFetcher::Generation padded = 0;
-    BoxFetcher::Generation light = 0;  // the light volume; 0: the frame has none
-    bool waited = false;               // for voxels: its report tells of their fetch
+    StartRender render;                         // without its image
+    std::vector<BoxFetcher::Generation> boxes;  // of `render`, each acquired; the padded box is the last
+    bool waited = false;                        // for voxels: its report tells of their fetch
   };
   struct Begun {
-    GroupKey key;
-    Rank rank = 0;
     Job job;
-    ImageHandle image = 0;
     bool dropped = false;
   };
   struct TurnNow {
@@ -71,7 +70,8 @@ class RenderQueue {
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;
 
-  bool Complete(const Job& job) const { return boxes_.complete(job.padded) && (job.light == 0 || boxes_.complete(job.light)); }
+  bool Complete(const Job& job) const;
+  bool HasRoom(const Job& job) const;  // for what it derives, if others that have begun use its boxes
   void Release(const Job& job);
   bool Busy(ClientId client) const;
   bool OnlyTurns() const;                                 // nobody but the client whose turn it is has any job

@@ -479,7 +479,8 @@ void WorkerMachine::State::Tend() {
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
-    boxes.RequestChunks(renders.BoxesInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
+    const auto [by_client, of_next] = renders.BoxesInTurn();
+    boxes.RequestChunks(by_client, renders.AnyPaused() ? 0 : of_next, epoch, worker, now, actions);
     renders.StartNext(now, actions);
   }
   boxes.Trim(actions);

@@ -130,6 +130,7 @@ struct RenderDone {
   Status status;
   RankReport report;
   std::uint64_t box_bytes = 0;
+  std::vector<std::uint64_t> field_bytes = {};  // by StartRender::fields; those of none mean nothing
 };
 struct CombineDone {
   GroupKey key;
@@ -211,7 +212,8 @@ struct StartRender {
   std::shared_ptr<const FrameSetup> setup;
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
-  std::optional<BoxKey> light = {};  // the light volume (FrameSetup::light), whole
+  std::optional<BoxKey> light = {};                // the light volume (FrameSetup::light), whole
+  std::vector<std::optional<BoxKey>> fields = {};  // by FrameSetup::fields; none: it does not reach there
 };
 // These name a started render by its image. RenderDone has not come for it. PauseRender: it stops soon, between two of
 // its pieces, and keeps what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.

@@ -82,6 +82,21 @@ HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
   return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
 }
 
+// The rays among the voxels, and their samples that lie there.
+struct RaysThere {
+  RayPacket among;
+  SampleInterval owned;
+};
+HWY_INLINE RaysThere RaysAmongVoxels(const ProjectWork& work, const RayPacket& packet) {
+  const RayBox& box = *work.box;
+  const SampleInterval owned = OwnedSamples(packet, box);
+  if (work.field == nullptr) return {AmongVoxels(packet, box), owned};
+  const RayPacket among = AmongVoxels(packet, *work.field);
+  if (work.field->everywhere) return {among, owned};
+  const SampleInterval shown = SamplesInside(among, work.field->low, work.field->high, box.reach.begin, box.reach.end);
+  return {among, {hn::Max(owned.begin, shown.begin), hn::Min(owned.end, shown.end)}};
+}
+
 // What a packet's rays have found: the largest sign * sample so far, and which sample it was.
 struct Findings {
   Floats best, at;
@@ -162,8 +177,7 @@ HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, 
 template <class T, bool kNearest>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
-  const SampleInterval owned = OwnedSamples(packet, *work.box);
-  const RayPacket among = AmongVoxels(packet, *work.box);
+  const auto [among, owned] = RaysAmongVoxels(work, packet);
   const auto one = Set(1);
   Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   if (work.rays->clip.empty()) {
@@ -189,8 +203,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
-  const SampleInterval whole = OwnedSamples(packet, box);
-  const RayPacket among = AmongVoxels(packet, box);
+  const auto [among, whole] = RaysAmongVoxels(work, packet);
   Ints high = hn::Zero(di), middle = high, low = high, count = high;
   const auto byte = SetInt(0xFF), one = SetInt(1);
   const auto sum = [&](const SampleInterval& owned) HWY_ATTR {

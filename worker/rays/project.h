@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "worker/rays/field_map.h"
 #include "worker/rays/ray_box.h"
 
 namespace slabstream {
@@ -43,6 +44,7 @@ inline ValueScale MakeValueScale(double least, double largest, const ValueMappin
 struct ProjectWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
+  const FieldMap* field = nullptr;       // the box's voxels are those of another field of the frame, which lies so; null: the volume's
   const SampleBounds* bounds = nullptr;  // for the same sign; null for a sum
   float sign = 1;                        // 1: the largest sample; -1: the least
   ValueScale values;

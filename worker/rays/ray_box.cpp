@@ -4,8 +4,7 @@
 
 namespace slabstream {
 
-RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const SampledRegion& owned, const SampledRegion& sampled,
-                  const ViewRays& rays, const Camera& camera, const GridMap& map) {
+RayBox BoxOfVoxels(const PaddedVoxels& voxels, const Index3& cells) {
   RayBox result;
   result.type = voxels.type;
   result.samples = voxels.samples.get();
@@ -14,6 +13,12 @@ RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Sampled
   result.row = voxels.row;
   result.slice = std::int32_t(voxels.slice);
   result.cells = cells;
+  return result;
+}
+
+RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const SampledRegion& owned, const SampledRegion& sampled,
+                  const ViewRays& rays, const Camera& camera, const GridMap& map) {
+  RayBox result = BoxOfVoxels(voxels, cells);
   result.scale = ToFloat3(map.scale);
   result.offset = ToFloat3(map.offset);
   Vec3 low, high;

@@ -35,6 +35,9 @@ inline SampledRegion WholeBox(const Box& box) {
 }
 inline constexpr SampledRegion kEverywhere = {{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
 
+// What kernels read of voxels. Positions and reach are left out.
+RayBox BoxOfVoxels(const PaddedVoxels& voxels, const Index3& cells);
+
 // `owned`: positions of the frame, which lie in the box of the voxels. `map`: from them to positions among the voxels. Samples outside
 // `sampled`, of positions among the voxels, need not be visited.
 RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const SampledRegion& owned, const SampledRegion& sampled,

@@ -38,7 +38,7 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   look.scale = float(table.bin_from_stored_scale * fine);
   look.rounding = exact ? 0.5F : 0.5F - 0x1p-9F;
   look.last = float(entries - 1);
-  const double exponent = 1 / (steps_per_voxel * table.opacity_distance);
+  const double exponent = 1 / (steps_per_voxel * table.opacity_distance);  // 0: nothing shows
   // A power of two, so that it moves no bit of a light.
   const double unit = std::exp2(std::clamp(std::round(std::log2(table.stored_extent)), -126.0, 126.0));
   look.gradient_unit = float(unit);
@@ -50,7 +50,8 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
     const float t = float(entry % fine) / float(fine);
     const Rgb &a = table.color[bin], &b = table.color[next];
     const double opacity = double(table.opacity[bin]) + double(t) * (double(table.opacity[next]) - double(table.opacity[bin]));
-    const double of_entry = look.gradient_factors.empty() ? -std::expm1(exponent * std::log1p(-opacity)) : opacity;
+    const double of_step = look.gradient_factors.empty() ? -std::expm1(exponent * std::log1p(-opacity)) : opacity;
+    const double of_entry = exponent > 0 ? of_step : 0;
     look.entries.insert(look.entries.end(), {a.r + t * (b.r - a.r), a.g + t * (b.g - a.g), a.b + t * (b.b - a.b), float(of_entry)});
     look.volume_shows = look.volume_shows || look.entries.back() > 0;
   }

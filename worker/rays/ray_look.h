@@ -49,7 +49,7 @@ struct RayLook {
   int whole_shininess = 0;  // shininess if it is a whole number up to 128, otherwise 0
 };
 
-// `steps_per_voxel`: samples in a voxel length along a ray.
+// `steps_per_voxel`: samples in a voxel length along a ray; infinite: nothing but isosurfaces shows.
 //
 // If each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as fit into
 // kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if a bin

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "worker/rays/field_map.h"
 #include "worker/rays/ray_box.h"
 
 #if defined(SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -254,6 +255,19 @@ HWY_INLINE RayPacket AmongVoxels(const RayPacket& packet, const RayBox& box) {
   for (std::size_t i = 0; i < 3; ++i) {
     among.first[i] = hn::Add(hn::Mul(packet.first[i], Set(box.scale[i])), Set(box.offset[i]));
     among.move[i] = hn::Mul(packet.move[i], Set(box.scale[i]));
+  }
+  return among;
+}
+
+HWY_INLINE Floats Combined(const std::array<Float3, 3>& by, const Floats (&v)[3], std::size_t i) {
+  return hn::Add(hn::Add(hn::Mul(v[0], Set(by[0][i])), hn::Mul(v[1], Set(by[1][i]))), hn::Mul(v[2], Set(by[2][i])));
+}
+// The packet among the voxels of another field.
+HWY_INLINE RayPacket AmongVoxels(const RayPacket& packet, const FieldMap& map) {
+  RayPacket among = packet;
+  for (std::size_t i = 0; i < 3; ++i) {
+    among.first[i] = hn::Add(Combined(map.steps, packet.first, i), Set(map.offset[i]));
+    among.move[i] = Combined(map.steps, packet.move, i);
   }
   return among;
 }

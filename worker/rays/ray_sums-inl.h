@@ -62,6 +62,10 @@ struct Sums {
     blue = hn::MulAdd(weight, color(2), blue);
     alpha = hn::Add(alpha, weight);
   }
+  // Where light adds, colours may have more than a picture can show.
+  HWY_INLINE void LimitColors() {
+    for (Floats* color : {&red, &green, &blue}) *color = hn::Min(*color, Set(1));
+  }
   static HWY_INLINE Floats Lit(Floats color, const Light& light) {
     return hn::Min(hn::Max(hn::MulAdd(color, light.diffuse, light.specular), hn::Zero(FloatTag())), Set(1));
   }

@@ -1,10 +1,17 @@
 #include "worker/rays/ray_volume.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 namespace slabstream {
+
+Status TooLargeForRays(std::size_t field) {
+  return Status::ResourceExhausted(fmt::format("field {} has more than {} MiB of voxels beside one box; more workers have smaller boxes",
+                                               field + 1, kMostRayBytes >> 20));
+}
 
 std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes) {
   const Index3 size = box.size();

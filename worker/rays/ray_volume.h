@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/status.h"
 #include "common/view/camera.h"
 #include "worker/rays/ray_box.h"
 #include "worker/renderers/box_data.h"
@@ -28,6 +29,9 @@ class RayVolume : public BoxCache {
  private:
   std::vector<RayPiece> pieces_;  // lowest z first
 };
+
+// The voxels that field i of FrameSetup::fields has beside one box were cut into pieces.
+Status TooLargeForRays(std::size_t field);
 
 // Cuts `box` into layers along z. The padded samples of each take at most `most_bytes`, but each has at least one slice.
 std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes);

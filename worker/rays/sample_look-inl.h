@@ -163,6 +163,11 @@ HWY_INLINE Light LightAt(const RayLook& look, const Gradient& g, const FrameLigh
   return LightFrom(look, g, first.open, reached);
 }
 
+// The light on samples with this gradient, if there is any. `light`: null: no shadows and no occlusion.
+HWY_INLINE Light LightOn(const RayLook& look, const FrameLight::View* light, const Gradient& g, const SamplePlace& place) {
+  return light != nullptr ? LightAt(look, g, *light, place) : LightOf(look, g);
+}
+
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

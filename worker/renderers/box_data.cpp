@@ -14,9 +14,8 @@ const VoxelBlock& BoxData::voxels() const {
 
 ScalarType BoxData::widest_type() const {
   ScalarType widest = bricks().type();
-  for (const auto* layer : {&layers().labels, &layers().overlay}) {
-    if (*layer && BytesPerSample((*layer)->type()) > BytesPerSample(widest)) widest = (*layer)->type();
-  }
+  const auto& labels = layers().labels;
+  if (labels && BytesPerSample(labels->type()) > BytesPerSample(widest)) widest = labels->type();
   return widest;
 }
 

@@ -7,9 +7,11 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <typeindex>
 #include <utility>
+#include <vector>
 
 #include "common/classification/classification_table.h"
 #include "common/frame/frame_setup.h"
@@ -47,6 +49,11 @@ class BoxData {
   void SetLight(std::shared_ptr<const FrameLight> light) { light_ = std::move(light); }
   const FrameLight* light() const { return light_.get(); }
 
+  // The other fields that the frame shows, in the order of FrameSetup::fields: their voxels around the box (PaddedBox). Null: the field
+  // does not reach there. They must stay until the render ends.
+  void SetFields(std::vector<BoxData*> fields) { fields_ = std::move(fields); }
+  std::span<BoxData* const> fields() const { return fields_; }
+
   const BoxLayers& layers() const { return voxels_->layers(); }
   // The types of volume and layers: the one whose samples take most bytes.
   ScalarType widest_type() const;
@@ -76,6 +83,7 @@ class BoxData {
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<BoxCache>> caches_;
   std::shared_ptr<const FrameLight> light_;
+  std::vector<BoxData*> fields_;
 };
 
 }  // namespace slabstream

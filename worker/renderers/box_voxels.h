@@ -16,7 +16,7 @@ namespace slabstream {
 
 // nullopt, null: the dataset has no such layer.
 struct BoxLayers {
-  std::optional<BrickedVoxels> labels, overlay;
+  std::optional<BrickedVoxels> labels;
   std::shared_ptr<const Mesh> cells;  // those that touch the box, and perhaps others, in the order of the whole grid
 };
 

@@ -191,28 +191,38 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  std::shared_ptr<StoredBox> padded = BoxOf(action.padded);
-  std::shared_ptr<StoredBox> light = action.light ? BoxOf(*action.light) : nullptr;
+  RenderedBoxes boxes = {BoxOf(action.padded), action.light ? BoxOf(*action.light) : nullptr, {}};
+  for (const std::optional<BoxKey>& field : action.fields) boxes.fields.push_back(field ? BoxOf(*field) : nullptr);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
   std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
   renders_[action.image] = control;
   ClientLane& lane = render_.Of(action.client);
-  lane.thread.Post([this, &lane, padded = std::move(padded), light = std::move(light), image = std::move(image),
-                    control = std::move(control), render = std::move(action)] {
-    outbox_.Post(WorkerEvent(lane.arena.Run([&] { return Render(render, *padded, light.get(), *control, lane, *image); })));
-  });
+  lane.thread.Post(
+      [this, &lane, boxes = std::move(boxes), image = std::move(image), control = std::move(control), render = std::move(action)] {
+        outbox_.Post(WorkerEvent(lane.arena.Run([&] { return Render(render, boxes, *control, lane, *image); })));
+      });
 }
 
-RenderDone Executor::Render(const StartRender& action, StoredBox& padded, StoredBox* light, const RenderControl& control, ClientLane& lane,
+RenderDone Executor::Render(const StartRender& action, const RenderedBoxes& boxes, const RenderControl& control, ClientLane& lane,
                             LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guard("render", [&] {
-    if (padded.Assemble()) AddStage(report, Stage::kFetch, begin, NowNs());
-    const StoredBox::Lease lease = padded.Lend(action.client);
-    lease.data().SetLight(light == nullptr ? nullptr : LightFrom(*light, action));
+    bool copied = boxes.padded->Assemble();
+    for (const auto& field : boxes.fields) copied = (field != nullptr && field->Assemble()) || copied;
+    if (copied) AddStage(report, Stage::kFetch, begin, NowNs());
+    const StoredBox::Lease lease = boxes.padded->Lend(action.client);
+    lease.data().SetLight(boxes.light == nullptr ? nullptr : LightFrom(*boxes.light, action));
+    // Fields that share a box have a lease each: renderers derive other data for each.
+    std::vector<std::unique_ptr<const StoredBox::Lease>> field_leases;
+    std::vector<BoxData*> fields;
+    for (const auto& field : boxes.fields) {
+      if (field != nullptr) field_leases.emplace_back(new StoredBox::Lease(field->Lend(action.client)));
+      fields.push_back(field == nullptr ? nullptr : &field_leases.back()->data());
+    }
+    lease.data().SetFields(std::move(fields));
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
@@ -224,7 +234,8 @@ RenderDone Executor::Render(const StartRender& action, StoredBox& padded, Stored
     return Status::Ok();
   });
   if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
-  done.box_bytes = padded.bytes();
+  done.box_bytes = boxes.padded->bytes();
+  for (const auto& field : boxes.fields) done.field_bytes.push_back(field == nullptr ? 0 : field->bytes());
   return done;
 }
 

@@ -101,8 +101,13 @@ class Executor {
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
   std::shared_ptr<RenderControl> ControlOf(ImageHandle image) const;   // null: the render has ended
-  // `light`: the frame's light volume; null: it has none.
-  RenderDone Render(const StartRender& action, StoredBox& padded, StoredBox* light, const RenderControl& control, ClientLane& lane,
+  // The boxes that a render reads.
+  struct RenderedBoxes {
+    std::shared_ptr<StoredBox> padded;
+    std::shared_ptr<StoredBox> light;                // null: the frame has none
+    std::vector<std::shared_ptr<StoredBox>> fields;  // as StartRender::fields
+  };
+  RenderDone Render(const StartRender& action, const RenderedBoxes& boxes, const RenderControl& control, ClientLane& lane,
                     LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;

@@ -68,8 +68,7 @@ void StoredBox::Write(Layer layer, const Box& box, std::uint64_t begin, std::spa
 
 void StoredBox::CopyFrom(const BoxVoxels& from, Layer layer, const Box& box) {
   const BoxVoxels::Samples samples = from.samples();  // holds them
-  const VoxelBricks source =
-      layer == Layer::kVolume ? samples.view() : VoxelBricks(*(layer == Layer::kLabels ? from.layers().labels : from.layers().overlay));
+  const VoxelBricks source = layer == Layer::kVolume ? samples.view() : VoxelBricks(*from.layers().labels);
   const Index3 size = box.size();
   std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
   for (std::int32_t z = 0; z < size.z; ++z) {
@@ -87,7 +86,7 @@ bool StoredBox::Assemble() {
     if (!stored_ || layer != Layer::kVolume) Arriving(layer);
     for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), layer, copy.box);
   }
-  BoxLayers layers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()};
+  BoxLayers layers{std::move(arriving_[1]), cells_.cells()};
   if (stored_) {
     for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
     FillPadding(ArrivingStored());

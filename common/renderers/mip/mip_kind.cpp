@@ -14,9 +14,9 @@ namespace {
 // Premultiplied colours of values in [0, 1], interpolated between kMaxBins places among the data values that the function tells apart.
 class ColorTable {
  public:
-  explicit ColorTable(const FrameSetup& setup) : entries_(std::size_t{kMaxBins} + 1) {
-    const auto [least, largest] = ProjectedValuesOf(setup);
-    const auto [first, last] = NodesOf(setup.transfer);
+  ColorTable(const TransferFunction& transfer, const ValueRange& range, double weight) : entries_(std::size_t{kMaxBins} + 1) {
+    const auto [least, largest] = ProjectedValuesOf(transfer, range);
+    const auto [first, last] = NodesOf(transfer);
     const double place = (last - first) / (kMaxBins - 3);  // one more beyond each end
     const double low = std::clamp(first - place, least, largest), high = std::clamp(last + place, low, largest);
     const double extent = high - low;
@@ -27,8 +27,9 @@ class ColorTable {
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       const double t = std::min(double(i) / (kMaxBins - 1), 1.0);
       const double data = low + t * extent;
-      const auto opacity = float(setup.transfer.Opacity(data));
-      const Rgb color = setup.transfer.Color(data);
+      const auto whole = transfer.Opacity(data);
+      const auto opacity = float(weight == 1 ? whole : 1 - std::pow(1 - whole, weight));
+      const Rgb color = transfer.Color(data);
       entries_[i] = {opacity * color.r, opacity * color.g, opacity * color.b, opacity};
     }
   }
@@ -63,7 +64,7 @@ class MipKind : public ProjectionKind {
                         .format = PixelFormat::kMaximum,
                         .reach = kRayReach,
                         .derived_from_stored = kRayDerived,
-                        .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels},
+                        .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels, Ability::kFields},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",
                                         .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
@@ -88,10 +89,30 @@ class MipKind : public ProjectionKind {
   }
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
-    const ColorTable table(setup);
     const ProjectionMode mode = ModeOf(setup);
+    const ColorTable table(setup.transfer, setup.range, setup.weight);
+    if (!setup.fields.empty()) return FinishFields(frame, setup, table, mode);
     return ColorPixels(frame, setup, [&](const float* pixel, float* rgba) {
       if (pixel[3] > 0) table.Look(ValueOf(pixel, mode), rgba);
+    });
+  }
+
+ private:
+  // Colours of fields add.
+  static LocalImage FinishFields(const LocalImage& frame, const FrameSetup& setup, const ColorTable& volume, ProjectionMode mode) {
+    std::vector<ColorTable> tables = {volume};
+    for (const auto& [levels, of_volume, look] : setup.fields) tables.emplace_back(look.transfer, look.range, look.weight);
+    return ColorPixels(frame, setup, [&](const float* pixel, float* rgba) {
+      float transmittance = 1;
+      for (std::size_t i = 0; i < std::min(tables.size(), kMostFields); ++i) {
+        if (pixel[i] < 0.5F) continue;
+        const double value = 2 * double(pixel[i]) - 1;
+        std::array<float, 4> of{};
+        tables[i].Look(mode == ProjectionMode::kMinimum ? 1 - value : value, of.data());
+        for (std::size_t c = 0; c < 3; ++c) rgba[c] = std::min(rgba[c] + of[c], 1.0F);
+        transmittance *= 1 - of[3];
+      }
+      rgba[3] = 1 - transmittance;
     });
   }
 };

@@ -23,10 +23,10 @@ struct ProjectedValues {
 };
 // The volume's least and largest value, or values far beyond all that the transfer function tells apart: so one voxel far away from the
 // others (a hot pixel, a fill value) leaves them their precision, and means their values.
-inline ProjectedValues ProjectedValuesOf(const FrameSetup& setup) {
+inline ProjectedValues ProjectedValuesOf(const TransferFunction& transfer, const ValueRange& range) {
   constexpr double kFar = 1024;  // times what it tells apart
-  const NodeRange nodes = NodesOf(setup.transfer);
-  const ProjectedValues all = {double(setup.range.min), double(setup.range.max)};
+  const NodeRange nodes = NodesOf(transfer);
+  const ProjectedValues all = {double(range.min), double(range.max)};
   const double reach = kFar * std::max(nodes.last - nodes.first, 0x1p-20 * std::max(std::abs(nodes.first), std::abs(nodes.last)));
   if (!(reach > 0)) return all;  // one value, 0, or no function
   const ProjectedValues near = {std::max(all.least, nodes.first - reach), std::min(all.largest, nodes.last + reach)};
@@ -37,5 +37,10 @@ inline ProjectedValues ProjectedValuesOf(const FrameSetup& setup) {
 //   maximum  kMaximum  (value, 0, 0, 1)
 //   minimum  kMaximum  (1 - value, 0, 0, 1)
 //   mean     kSum      the sum of all values and their number (SumOfValues, common/renderers/projection_kind.h)
+// With other fields (FrameSetup::fields) a channel holds what one field has: the volume the first one, and the others those after it.
+//   field            kMaximum  (1 + value) / 2, or (1 + (1 - value)) / 2; below 1/2: there is no value
+//   the last channel           at least kOfOthers, since a pixel with 0 there is empty
+inline constexpr std::size_t kMostFields = 4;
+inline constexpr float kOfOthers = 0.25F;
 
 }  // namespace slabstream::mip

@@ -72,7 +72,7 @@ class RaycastKind : public RendererKind {
              .derived_from_stored = kRayDerived,
              .opacity_by_value = true,
              .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels, Ability::kOverlay,
-                           Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions},
+                           Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions, Ability::kFields},
              .parameters = {SamplingRate(kSamplesAVoxel),
                             {.name = "jitter",
                              .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "

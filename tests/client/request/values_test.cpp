@@ -24,6 +24,18 @@ TEST(ParseScalarRange, TakesTwoValuesThatRise) {
   }
 }
 
+TEST(ParseTimeSteps, TakesOneTimeARangeAndAStep) {
+  const auto count = [](const char* text) { return ParseTimeSteps("--time", text)->count(); };
+  EXPECT_EQ(count("7"), 1);
+  EXPECT_EQ(count("0:9"), 10);
+  EXPECT_EQ(count("0:9:2"), 5);
+  EXPECT_EQ(count("0:10:2"), 6);
+  EXPECT_EQ(count("3:4:9"), 1);
+  for (const char* text : {"", ":", "1:", "2:1", "0:9:0", "0:9:-1", "0:9:x", "0:9:2:3", "-1:2", "1.5"}) {
+    EXPECT_THAT(ParseTimeSteps("--time", text).status().message(), HasSubstr("--time")) << text;
+  }
+}
+
 TEST(ParseIsosurfaces, TakesValuesWithColorsAndOpacities) {
   const auto parse = [](const char* text) { return ParseIsosurfaces("--isovalue", text); };
   const std::vector<Isosurface> plain = *parse("120,-3.5e2");
@@ -160,7 +172,7 @@ TEST(Values, DirectionsAndColors) {
     EXPECT_EQ(ParseDirection("--light", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
   for (const char* text :
-       {"", "1,1", "1,1,1.5", "-0.1,0,0", "0,0,0,0,0", "rouge", "White", "#fff", "#12345g", "#1234567", "#+12345", "#"}) {
+       {"", "1,1", "1,1,1.5", "-0.1,0,0", "0,0,0,0,0", "rouge", "White", "#ffff", "#12345g", "#1234567", "#+12345", "#"}) {
     EXPECT_EQ(ParseColor("--background", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
 }

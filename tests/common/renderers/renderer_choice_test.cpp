@@ -59,7 +59,7 @@ std::vector<Wish> Wishes() {
 
 VolumeSummary LayeredSummary(bool grid) {
   VolumeSummary summary = grid ? FullGridSummary({20, 20, 20}) : FullSummary({20, 20, 20});
-  summary.labels = summary.overlay = std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20}));
+  summary.labels = std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20}));
   summary.label_table = std::make_shared<const LabelTable>(LabelTable{.labels = {{.value = 1}}});
   return summary;
 }

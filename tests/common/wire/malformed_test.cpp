@@ -222,9 +222,13 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"parameters", kMaxParameters},
       {"renderers", 256},
       {"abilities", 64},
+      {"channels", kMaxShownFields},
+      {"fields", kMaxFields},
+      {"of_volume", kMaxLevels},
       {"roots", kMaxShares},
       {"shares", kMaxShares},
       {"web", kMaxWebServers},
+      {"looks", kMaxFields},
   };
   std::map<std::string, bool> seen;
   AlterEachField(
@@ -257,9 +261,9 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 14)
-      << "reports are in four messages, parameters and labels in three; datasets, keys, isosurfaces, "
-         "gradients, opacities, levels and traffic in two";
+  EXPECT_EQ(seen.size(), limits.size() + 17)
+      << "reports and levels are in four messages, parameters, labels and fields in three; datasets, keys, isosurfaces, "
+         "gradients, opacities and traffic in two";
 }
 
 TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {

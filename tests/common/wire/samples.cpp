@@ -127,9 +127,23 @@ std::vector<Isosurface> ManySurfaces() {
 
 GroupAssignment WithLayers() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
-  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32, .cells = true};
+  message.setup.layers = {.labels = ScalarType::kUint16, .cells = true};
   message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
-  message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
+  return message;
+}
+
+GroupAssignment OfFields() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  VolumeDescription other = message.setup.description;
+  other.type = ScalarType::kFloat32;
+  other.geometry.size = {7, 1, 65535};
+  other.geometry.orientation.axes = {Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}};
+  message.setup.weight = 0.5;
+  message.setup.flat = true;
+  message.setup.fields = {{.levels = {{77, message.setup.description, StoredAt{kUmlaut, 3, kMax64, {{0, 0, 0}, {1, 2, 3}}}}},
+                           .of_volume = {0},
+                           .look = {.transfer = Curve(), .range = {-2, 3}, .weight = 0.125, .blend = Blend::kOver}},
+                          {.levels = {{kMax64, other}}, .of_volume = {0}, .look = {.transfer = Curve(), .range = {0, 1}}}};
   return message;
 }
 
@@ -234,6 +248,7 @@ std::vector<GroupAssignment> SamplesOf() {
           Clipped(),
           WithSurfaces(),
           WithLayers(),
+          OfFields(),
           OfLevels()};
 }
 
@@ -368,6 +383,13 @@ std::vector<SubmitFrame> SamplesOf() {
                               .opacities = {{1, 0}, {kMaxLabelValue, 0.25}},
                               .shown = {{1, kMaxLabelValue}, {7, 7}, {.name = kUmlaut}}};
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
+  FrameRequest channels = Request();
+  channels.channels = {"0", kUmlaut};
+  channels.fields = {
+      {.field = kUmlaut, .shown = true, .color = Rgb{1, 0.5F, 0}, .scalar_range = ScalarRange{2, 98, true}, .gamma = 0.01, .weight = 0},
+      {.field = "7", .shown = false, .choice = Curve()}};
+  channels.blend = Blend::kMax;
+  channels.time = "3.5s";
   FrameRequest unstated = Request();
   unstated.view = kUnstatedView;
   FrameRequest highlights = layers;
@@ -375,7 +397,7 @@ std::vector<SubmitFrame> SamplesOf() {
   return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}},
           {1, 2, sliced},    {1, 2, surfaces},
           {1, 2, layers},    {1, 2, highlights},
-          {1, 2, unstated}};
+          {1, 2, unstated},  {1, 2, channels}};
 }
 
 template <>
@@ -448,6 +470,12 @@ std::vector<StatusReply> SamplesOf() {
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
   full.datasets[2].levels = {Description(), Description()};
+  full.datasets[2].fields = DatasetFields{.fields = {{.name = kUmlaut, .color = std::array{1.0F, 0.5F, 0.0F}, .window = ValueRange{-1, 2}},
+                                                     {.shown = false},
+                                                     {.channel = false}},
+                                          .times = {.count = 50, .step = 0.25, .unit = "min"},
+                                          .field = 2,
+                                          .time = 49};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
   full.web = SampleTraffic();
   full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};
@@ -504,7 +532,9 @@ std::vector<DataReply> SamplesOf() {
 
 template <>
 std::vector<SummaryQuery> SamplesOf() {
-  return {{.dataset = "a", .transfer = {}}, {kMax64, kLongName, {Curve(), 1e-6, ScalarRange{0, 100, true}}}};
+  return {{.dataset = "a", .transfer = {}},
+          {kMax64, kLongName, {Curve(), 1e-6, ScalarRange{0, 100, true}}},
+          {.dataset = "a", .transfer = {}, .field = kUmlaut, .time = "last", .looks = {{.field = "0", .gamma = 100}}, .flat = true}};
 }
 
 template <>

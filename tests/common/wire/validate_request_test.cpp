@@ -64,6 +64,19 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
          r.overlay.emplace();
        },
        "renderer is 'zbuffer', but overlay needs one of: raycast"},
+      {[](auto& r) {
+         r.channels = {"a", ""};
+       },
+       "channels[1] has 0 bytes, but must have 1 to 256"},
+      {[](auto& r) { r.channels.assign(17, "0"); }, "channels has 17 items, at most 16 are possible"},
+      {[](auto& r) { r.fields = {{.field = "0", .gamma = 0}}; }, "fields[0].gamma is 0, but must lie in [0.01, 100]"},
+      {[](auto& r) {
+         r.fields = {{.field = "a"}, {.field = "a"}};
+       },
+       "fields names field 'a' twice"},
+      {[](auto& r) { r.fields = {{.field = "a", .choice = "viridis", .gamma = 2}}; },
+       "fields['a'] has both a transfer function and a gamma"},
+      {[&](auto& r) { r.time = long_name; }, "time has 257 bytes"},
       {[](auto& r) { r.termination = 0.6; }, "termination is 0.6, but must lie in [0, 0.5]"},
       {[](auto& r) { r.termination = kNan; }, "termination is nan"},
       {[](auto& r) { r.policy.decomposition = ""; }, "policy.decomposition has 0 bytes"},

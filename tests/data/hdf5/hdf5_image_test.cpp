@@ -230,6 +230,43 @@ TEST_F(Hdf5ImageTest, CoordinatesPlaceTheAxesAndCfScalesTheValues) {
   EXPECT_THAT(source->info().notes, Contains(HasSubstr("scale_factor")));
 }
 
+TEST_F(Hdf5ImageTest, TimesHaveAStep) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4 * 5);
+  const Hdf5Writer::Layout layout{.size = {2, 3, 4, 5}, .type = SampleType::kInt16};
+  const auto netcdf = [&](const std::vector<double>& times, const std::string& units) {
+    {
+      Hdf5Writer writer(path_);
+      writer.Write("/data", layout, samples.data());
+      writer.Doubles("/time", {2}, times);
+      writer.Text("/time", "units", units);
+      writer.Scales("/data", {"/time", "", "", ""});
+    }
+    const SourceInfo info = Open({.time = TimeRange{1, 1}})->info();
+    EXPECT_EQ(info.levels[0].description.geometry.orientation.world, World::kVoxels) << "a time is no place";
+    return info.times;
+  };
+  EXPECT_EQ(netcdf({6, 12}, "hours since 1900-01-01 00:00:00"), (TimeAxis{2, 6, "h"}));
+  EXPECT_EQ(netcdf({6, 12}, "beats"), (TimeAxis{2, 6, ""}));
+  EXPECT_EQ(netcdf({12, 6}, "hours since 1900-01-01"), (TimeAxis{2}));
+  EXPECT_EQ(netcdf({6, NAN}, ""), (TimeAxis{2}));
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/minc-2.0/image/0/image", layout, samples.data());
+    writer.Text("/minc-2.0/image/0/image", "dimorder", "time,zspace,yspace,xspace");
+    writer.Doubles("/minc-2.0/dimensions/time", {1}, {0});
+    writer.Numbers("/minc-2.0/dimensions/time", "step", {2.5});
+  }
+  EXPECT_EQ(Open({.time = TimeRange{}})->info().times, (TimeAxis{2, 2.5, "s"}));
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/VTKHDF/PointData/density", layout, samples.data());
+    writer.Text("/VTKHDF", "Type", "ImageData");
+    writer.Numbers("/VTKHDF", "WholeExtent", {0, 4, 0, 3, 0, 2});
+    writer.Doubles("/VTKHDF/Steps/Values", {2}, {0, 0.25});
+  }
+  EXPECT_EQ(Open({.time = TimeRange{}})->info().times, (TimeAxis{2, 0.25, ""}));
+}
+
 TEST_F(Hdf5ImageTest, LengthsOfSeveralUnitsAreThoseOfX) {
   const std::vector<std::int16_t> samples = Ascending(24);
   Hdf5Writer(path_).Write("/data", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());

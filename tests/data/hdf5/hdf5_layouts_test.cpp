@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "common/files/files.h"
@@ -97,9 +99,8 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesHaveLevelsWithoutTheirPadding) {
   ASSERT_TRUE(source.ok()) << source.status().message();
   const SourceInfo& info = (*source)->info();
   EXPECT_EQ(info.format, "Imaris");
-  EXPECT_EQ(info.times, 2);
-  EXPECT_THAT(info.channels, ElementsAre("DAPI", "GFP"));
-  EXPECT_EQ(info.window, (ValueRange{100, 4000}));
+  EXPECT_EQ(info.times.count, 2);
+  EXPECT_THAT(info.channels, ElementsAre(FieldInfo{.name = "DAPI"}, FieldInfo{.name = "GFP", .window = ValueRange{100, 4000}}));
   ASSERT_EQ(info.levels.size(), 2U);
   const VolumeGeometry& fine = info.levels[0].description.geometry;
   const VolumeGeometry& coarse = info.levels[1].description.geometry;
@@ -116,6 +117,46 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesHaveLevelsWithoutTheirPadding) {
   EXPECT_EQ(samples[9 + 10 * (5 + 6 * 3)], 6000 + 300 + 50 + 9);
   EXPECT_EQ(of_coarse[4 + 5 * (2 + 3 * 3)], 16000 + 300 + 20 + 4);
   EXPECT_THAT(samples, testing::Each(testing::Lt(10000)));
+}
+
+TEST_F(Hdf5LayoutsTest, ImarisFilesSayHowChannelsAreShownAndWhenTimesAre) {
+  const std::string path = WriteImaris(directory_ / "cells.ims");
+  using Attributes = std::vector<std::pair<const char*, const char*>>;
+  const auto info = [&](const Attributes& of_channel, const Attributes& of_times) {
+    const std::string other = directory_ / "other.ims";
+    std::filesystem::copy_file(path, other, std::filesystem::copy_options::overwrite_existing);
+    const hid_t file = H5Fopen(other.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    H5Gclose(H5Gcreate2(file, "/DataSetInfo/TimeInfo", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    const auto write = [&](const char* object, const Attributes& attributes) {
+      for (const auto& [name, text] : attributes) {
+        const hsize_t size = std::string_view(text).size();
+        const hid_t space = H5Screate_simple(1, &size, nullptr);
+        const hid_t attribute = H5Acreate_by_name(file, object, name, H5T_C_S1, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+        H5Awrite(attribute, H5T_C_S1, text);
+        H5Aclose(attribute);
+        H5Sclose(space);
+      }
+    };
+    write("/DataSetInfo/Channel 0", of_channel);
+    write("/DataSetInfo/TimeInfo", of_times);
+    H5Fclose(file);
+    return Opened(Open(other, {.time = TimeRange{}}))->info();
+  };
+  const FieldInfo plain{.name = "DAPI"};
+  const SourceInfo read = info({{"Color", "0.000 0.500 1.000"}, {"ColorMode", "BaseColor"}, {"ColorRange", "0.000 255.000"}},
+                               {{"TimePoint1", "2008-02-29 23:59:50.250"}, {"TimePoint2", "2008-03-01 00:00:20.250"}});
+  EXPECT_EQ(read.channels[0], (FieldInfo{.name = "DAPI", .color = std::array{0.0F, 0.5F, 1.0F}, .window = ValueRange{0, 255}}));
+  EXPECT_EQ(read.times, (TimeAxis{2, 30, "s"}));
+  EXPECT_EQ(info({{"Color", "1 0 0"}, {"ColorMode", "TableColor"}}, {}).channels[0], plain);
+  for (const Attributes& damaged :
+       {Attributes{{"Color", "1 0"}, {"ColorRange", "9 3"}}, Attributes{{"Color", "1 0 red"}, {"ColorRange", "nan 3"}},
+        Attributes{{"Color", "2 0 0"}, {"ColorRange", "1"}}, Attributes{{"Color", " "}, {"ColorRange", "1 2 3"}}}) {
+    EXPECT_EQ(info(damaged, {}).channels[0], plain);
+  }
+  for (const char* stamp : {"2008-02-29 23:59:50.250", "2007-02-29 00:00:00", "2008-13-01 00:00:00", "2008-03-01 24:00:00", "2008-03-01",
+                            "2008-03-01 00:00:xx", "20080301T0000000000", "9999999999999999999"}) {
+    EXPECT_EQ(info({}, {{"TimePoint1", "2008-02-29 23:59:50.250"}, {"TimePoint2", stamp}}).times, (TimeAxis{2})) << stamp;
+  }
 }
 
 TEST_F(Hdf5LayoutsTest, ImarisFilesShowTheFirstChannelAndAskForATime) {
@@ -173,6 +214,28 @@ TEST_F(Hdf5LayoutsTest, BigDataViewerFilesHaveSetupsAndUnsignedSamples) {
   EXPECT_EQ(samples[1], 20000 + 208);
   EXPECT_EQ(samples.back(), 20000 + 191 * 208) << "above 32767";
 
+  const auto channels = [&](const std::string& settings) {
+    CHECK(WriteTextFile(directory_ / "embryo.settings.xml", settings).ok());
+    const auto with_settings = Opened(Open(path));
+    EXPECT_EQ(with_settings->info().files.size(), 3U);
+    return with_settings->info().channels;
+  };
+  const FieldInfo first{.name = "first"}, green{.name = "green"};
+  EXPECT_THAT(info.channels, ElementsAre(first, green));
+  EXPECT_THAT(channels(R"(<Settings><ViewerState><Sources><Source><active>false</active></Source><Source><active>true</active></Source>
+        <Source><active>false</active></Source></Sources></ViewerState><SetupAssignments><ConverterSetups>
+        <ConverterSetup><id>1</id><min>10.0</min><max>4000.5</max><color>-16711936</color><groupId>0</groupId></ConverterSetup>
+        <ConverterSetup><id>7</id><min>1</min><max>2</max><color>-1</color></ConverterSetup>
+        </ConverterSetups>
+        <MinMaxGroups><MinMaxGroup><id>0</id><currentMin>3</currentMin></MinMaxGroup></MinMaxGroups></SetupAssignments></Settings>)"),
+              ElementsAre(FieldInfo{.name = "first", .shown = false},
+                          FieldInfo{.name = "green", .color = std::array{0.0F, 1.0F, 0.0F}, .window = ValueRange{10, 4000.5F}}));
+  EXPECT_THAT(channels("<S><ConverterSetup><id>0</id><min>9</min><max>3</max><color>red</color></ConverterSetup>"
+                       "<ConverterSetup><min>1</min><max>3</max></ConverterSetup><ConverterSetup/></S>"),
+              ElementsAre(first, green));
+  EXPECT_THAT(channels("<S><ConverterSetup><id>0</id><min>1</min><max>3</max></ConverterSetup><oops></S>"), ElementsAre(first, green))
+      << "damaged settings say nothing";
+
   ASSERT_TRUE(WriteTextFile(directory_ / "embryo.xml", "<SpimData><oops></SpimData>").ok());
   ExpectRefused(path, {.channel = 1}, "embryo.xml: ");
   std::filesystem::remove(directory_ / "embryo.xml");
@@ -222,11 +285,11 @@ TEST_F(Hdf5LayoutsTest, BigDataViewerTimesAreCountedFromTheFirstOneThatIsThere) 
     writer.Group("/t00005");
   }
   const auto source = Opened(Open(path, {.time = TimeRange{1, 1}}));
-  EXPECT_EQ(source->info().times, 3);
+  EXPECT_EQ(source->info().times.count, 3);
   EXPECT_EQ(source->info().time, 1);
   EXPECT_EQ(SamplesOf<std::uint16_t>(*source).value()[0], 4);
   EXPECT_THAT(source->info().notes, testing::Contains("time 1 is t00004 of the file"));
-  EXPECT_EQ(Opened(Open(path, {.describe = true}))->info().times, 3);
+  EXPECT_EQ(Opened(Open(path, {.describe = true}))->info().times.count, 3);
   ExpectRefused(path, {.time = TimeRange{2, 2}}, "setup s00 has no samples of level 0 at time 2");
 }
 
@@ -296,9 +359,9 @@ TEST_F(Hdf5LayoutsTest, AnAxisBeforeTheLastThreeIsTime) {
   ExpectRefused(path, {}, "holds 2 volumes, of which --time takes one: 0 to 1");
   const auto source = Open(path, {.time = TimeRange{1, 1}});
   ASSERT_TRUE(source.ok()) << source.status().message();
-  EXPECT_EQ((*source)->info().times, 2);
+  EXPECT_EQ((*source)->info().times.count, 2);
   EXPECT_EQ(SamplesOf<std::uint16_t>(**source).value()[0], 60);
-  EXPECT_EQ((*Open(path, {.describe = true}))->info().times, 2);
+  EXPECT_EQ((*Open(path, {.describe = true}))->info().times.count, 2);
   Hdf5Writer(path).Write("/data", {.size = {2, 2, 3, 5, 2}}, samples.data());
   const auto both = Open(path, {.time = TimeRange{1, 1}, .channel = 1});
   ASSERT_TRUE(both.ok()) << both.status().message();

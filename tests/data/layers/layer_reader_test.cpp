@@ -61,7 +61,6 @@ TEST_F(LayerReader, LabelsAreNumberedByTheirValues) {
   ASSERT_EQ(layers.table->labels.size(), 3U);
   EXPECT_EQ(layers.table->labels[2].value, 70000U);
   EXPECT_EQ(layers.table->labels[0].color, StandardColor(3));
-  EXPECT_EQ(layers.overlay, nullptr);
 }
 
 TEST_F(LayerReader, ColoursComeFromTheTableThatIsNamed) {
@@ -145,12 +144,10 @@ TEST_F(LayerReader, SlantedLabelsKeepTheirNumbers) {
   for (int i = 0; i < 64; ++i) samples += i % 3 == 0 ? char(9) : char(200);
   ASSERT_TRUE(WriteTextFile(path, header + samples).ok());
   const VolumeGeometry grid{{4, 4, 4}, {1, 1, 1}, {.world = World::kPatient, .origin = {}}};
-  const Layers layers = ReadLayers({.labels = path, .overlay = path}, grid).value();
+  const Layers layers = ReadLayers({.labels = path}, grid).value();
   ASSERT_EQ(layers.table->labels.size(), 2U);
   EXPECT_EQ(layers.table->labels[0].value, 9U);
   EXPECT_EQ(layers.table->labels[1].value, 200U);
-  const std::span overlay(layers.overlay->block.samples<float>(), 64);
-  EXPECT_TRUE(std::ranges::any_of(overlay, [](float value) { return value > 10 && value < 199; })) << "an overlay is interpolated";
 }
 
 TEST_F(LayerReader, LayersLieInTheSameWorld) {
@@ -159,7 +156,6 @@ TEST_F(LayerReader, LayersLieInTheSameWorld) {
   ASSERT_TRUE(read.ok());
   const World other = read->info.finest().geometry.orientation.world == World::kPatient ? World::kVoxels : World::kPatient;
   EXPECT_THAT(ErrorOf({.labels = path}, Grid(2, other)), HasSubstr("cannot be laid over each other"));
-  EXPECT_THAT(ErrorOf({.overlay = path}, Grid(2, other)), HasSubstr("overlay "));
 }
 
 TEST_F(LayerReader, MissingFilesAreNamed) {

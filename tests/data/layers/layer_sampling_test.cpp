@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/random_volume.h"
@@ -58,41 +59,6 @@ TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
       }
     }
   }
-}
-
-TEST(InterpolatedOn, IsExactForLinearValuesAndNothingOutside) {
-  const VolumeGeometry layer = Placed({6, 6, 6}, {2, 2, 2}, {0, 0, 0});
-  Volume ramp = MakeVolume(layer, ScalarType::kUint8, [](const Index3& v) { return v.x + 6 * v.y + 36 * v.z; });
-  ramp.description.mapping = {.scale = 0.5, .offset = -3};
-  const VolumeGeometry grid = Placed({9, 9, 9}, {1.5, 1.5, 1.5}, {-2, 0.25, 0.5});
-  const VoxelBlock found = InterpolatedOn(grid, ramp);
-  for (Index3 v; v.z < 9; ++v.z) {
-    for (v.y = 0; v.y < 9; ++v.y) {
-      for (v.x = 0; v.x < 9; ++v.x) {
-        const float value = found.samples<float>()[found.Offset(v)];
-        const Vec3 p = WorldOf(grid, v) / Vec3{2, 2, 2};
-        const auto inside = [](double q) { return q >= -0.5 && q < 5.5; };
-        if (!inside(p.x) || !inside(p.y) || !inside(p.z)) {
-          EXPECT_TRUE(std::isnan(value));
-          continue;
-        }
-        const auto within = [](double q) { return std::clamp(q, 0.0, 5.0); };
-        EXPECT_NEAR(value, 0.5 * (within(p.x) + 6 * within(p.y) + 36 * within(p.z)) - 3, 1e-4);
-      }
-    }
-  }
-}
-
-TEST(InterpolatedOn, AVoxelWithoutAValueCountsOnlyWhereItHasAPart) {
-  const VolumeGeometry layer = Placed({3, 1, 1}, {1, 1, 1}, {0, 0, 0});
-  const Volume values = MakeVolume(layer, ScalarType::kFloat32, [](const Index3& v) { return v.x == 2 ? NAN : 4 + v.x; });
-  const VoxelBlock found = InterpolatedOn(Placed({5, 1, 1}, {0.5, 1, 1}, {0, 0, 0}), values);
-  const float* const samples = found.samples<float>();
-  EXPECT_EQ(samples[0], 4);
-  EXPECT_EQ(samples[1], 4.5F);
-  EXPECT_EQ(samples[2], 5) << "the next voxel has no part in it";
-  EXPECT_TRUE(std::isnan(samples[3]));
-  EXPECT_TRUE(std::isnan(samples[4]));
 }
 
 }  // namespace

@@ -207,6 +207,7 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   WriteFile(directory_ / "scan.xml",
             "<SpimData><SequenceDescription><ViewSetups><ViewSetup><id>2</id><name>green</name>"
             "<voxelSize><unit>um</unit><size>0.5 0.5 2</size></voxelSize></ViewSetup></ViewSetups></SequenceDescription></SpimData>");
+  WriteFile(directory_ / "scan.settings.xml", "<S><ConverterSetup><id>2</id><min>1</min><max>3</max></ConverterSetup></S>");
   ExpectRefused({.channel = 2}, "scan.n5: has 2 channels, so channel must be 0 to 1 (0, 1: green)");
   ExpectRefused({}, "setup0: holds 2 volumes, of which --time takes one");  // of the first channel
   ExpectRefused({.channel = 1}, "setup2: holds 2 volumes, of which --time takes one");
@@ -214,7 +215,8 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   ASSERT_TRUE(source.ok()) << source.status().message();
   const SourceInfo& info = (*source)->info();
   EXPECT_EQ(info.format, "BigDataViewer N5");
-  EXPECT_EQ(info.times, 2);
+  EXPECT_THAT(info.channels, testing::ElementsAre(FieldInfo{}, FieldInfo{.name = "green", .window = ValueRange{1, 3}}));
+  EXPECT_EQ(info.times.count, 2);
   ASSERT_EQ(info.levels.size(), 2U);
   const VolumeGeometry& geometry = info.levels[1].description.geometry;
   EXPECT_EQ(info.levels[0].description.geometry.size, (Index3{9, 8, 5}));
@@ -307,7 +309,7 @@ TEST_F(N5Test, HyperstacksOfFiji) {
     std::filesystem::remove_all(root_);
     return WriteDataset(root_, {.size = size, .block = Sizes(size.size(), 8)}, random,
                         fmt::format(R"(, "pixelWidth": 0.5, "pixelHeight": 0.25, "pixelDepth": 2, "pixelUnit": "um", "xOrigin": 4,
-      "numChannels": {}, "numSlices": {}, "numFrames": {})",
+      "frameInterval": 2.5, "numChannels": {}, "numSlices": {}, "numFrames": {})",
                                     channels, slices, frames));
   };
   const std::vector<std::byte> elements = write({5, 4, 2, 3}, 2, 3, 1);
@@ -316,7 +318,7 @@ TEST_F(N5Test, HyperstacksOfFiji) {
   const SourceInfo& info = (*source)->info();
   const VolumeGeometry& geometry = info.levels[0].description.geometry;
   EXPECT_EQ(info.channels.size(), 2U);
-  EXPECT_EQ(info.times, 1);
+  EXPECT_EQ(info.times.count, 1);
   EXPECT_EQ(geometry.size, (Index3{5, 4, 3}));
   EXPECT_EQ(geometry.spacing, (Vec3{0.5, 0.25, 2}));
   EXPECT_EQ(geometry.orientation.origin, (Vec3{-2, 0, 0}));
@@ -329,7 +331,7 @@ TEST_F(N5Test, HyperstacksOfFiji) {
   EXPECT_EQ(SamplesOf<std::byte>(**source).value(), expected);
 
   write({5, 4, 3, 6}, 1, 3, 6);
-  EXPECT_EQ((*Open({.time = TimeRange{5, 5}}))->info().times, 6);
+  EXPECT_EQ((*Open({.time = TimeRange{5, 5}}))->info().times, (TimeAxis{6, 2.5, ""}));
   EXPECT_EQ((*Open({.describe = true}))->info().time, 0);
   write({5, 4, 2, 3, 6}, 2, 3, 6);
   EXPECT_EQ((*Open({.time = TimeRange{5, 5}, .channel = 1}))->info().time, 5);
@@ -416,7 +418,7 @@ TEST_F(N5Test, WhatCannotBeListedOpensLikeAFolder) {
   }
   const Result<Pyramid> views = open({.time = TimeRange{20, 20}, .channel = 2});
   ASSERT_TRUE(views.ok()) << views.status().message();
-  EXPECT_EQ(views->info.times, 21);
+  EXPECT_EQ(views->info.times.count, 21);
   EXPECT_EQ(views->info.channels.size(), 3U);
   EXPECT_EQ(views->levels.size(), 2U);
 }

@@ -180,7 +180,7 @@ TEST(Positional, TakesOneOfSeveralTimesAndComponents) {
   WriteFile(directory / "v.nii", NiftiHeader(spec) + EncodeSamples(spec.type, RandomValues(random, spec.type, 120)));
   for (int time = 0; time < 5; ++time) {
     ExpectLikeWhole(directory / "v.nii", {.time = TimeRange{time, time}}, random);
-    EXPECT_EQ(Opened(directory / "v.nii", {.time = TimeRange{time, time}})->info().times, 5);
+    EXPECT_EQ(Opened(directory / "v.nii", {.time = TimeRange{time, time}})->info().times.count, 5);
   }
   EXPECT_THAT(Open(directory / "v.nii").status().message(), HasSubstr("holds 5 volumes"));
   EXPECT_THAT(Open(directory / "v.nii", {.time = TimeRange{5, 5}}).status().message(), HasSubstr("time is 5, must be in [0, 4]"));

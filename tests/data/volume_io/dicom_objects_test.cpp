@@ -74,11 +74,26 @@ TEST(DicomObjects, TimesOfASeriesAreTakenByNumber) {
     const LoadedVolume loaded = MustRead(directory.path(), AtTimeOf(time));
     EXPECT_EQ(DataValues(*loaded.volume).front(), 10 * in_order[time]);
     EXPECT_EQ(DataValues(*loaded.volume).back(), 10 * in_order[time] + 1);
-    EXPECT_EQ(loaded.info.times, 3);
+    EXPECT_EQ(loaded.info.times, (TimeAxis{3})) << "echoes are no times";
     EXPECT_EQ(loaded.info.time, time);
     EXPECT_THAT(loaded.info.notes, Contains(HasSubstr("EchoTime 4.6, 9.2, 100")));
   }
   EXPECT_THAT(WhyNot(directory.path(), AtTimeOf(3)), HasSubstr("time is 3, must be in [0, 2]"));
+}
+
+TEST(DicomObjects, TimesOfTheHeartAreMilliseconds) {
+  constexpr DicomTag kTriggerTime = 0x00181060;
+  const auto times = [&](const std::vector<std::string>& triggers) {
+    const TemporaryDirectory directory;
+    for (std::size_t time = 0; time < triggers.size(); ++time) {
+      for (int z = 0; z < 2; ++z) {
+        WriteDicom(fmt::format("{}/{}{}", directory.path(), time, z), Slice(2 * z, z, {{kTriggerTime, triggers[time]}}));
+      }
+    }
+    return MustRead(directory.path(), AtTimeOf(0)).info.times;
+  };
+  EXPECT_EQ(times({"0", "62.5", "31.25"}), (TimeAxis{3, 31.25, "ms"}));
+  EXPECT_EQ(times({"0", "10", "31"}), (TimeAxis{3}));
 }
 
 // As an enhanced image of a heart or of diffusion has it: frames in the order of their dimensions, two of which are no places.
@@ -273,7 +288,7 @@ TEST(DicomObjects, SharesOfASegmentAreValues) {
   WriteDicom(directory / "seg", spec);
   const LoadedVolume loaded = MustRead(directory / "seg");
   EXPECT_FALSE(loaded.info.labels);
-  EXPECT_THAT(loaded.info.channels, ElementsAre("1 'Liver'", "2 'Lesion'"));
+  EXPECT_THAT(loaded.info.channels, ElementsAre(FieldInfo{.name = "1 'Liver'"}, FieldInfo{.name = "2 'Lesion'"}));
   EXPECT_NEAR(DataValues(*loaded.volume).front(), 0.5, 1e-6);
   EXPECT_NEAR(DataValues(*loaded.volume).back(), 1, 1e-6);
   EXPECT_NEAR(DataValues(*MustRead(directory / "seg", {.channel = 1}).volume).front(), 0.25, 1e-6);

@@ -272,7 +272,7 @@ TEST_F(NiftiTest, TheFifthDimensionCountsChannels) {
       EXPECT_EQ(loaded.volume->block.samples<std::uint8_t>()[0], 2 * channel + time);
       EXPECT_EQ(loaded.info.channels.size(), 3U);
       EXPECT_EQ(loaded.info.channel, channel);
-      EXPECT_EQ(loaded.info.times, 2);
+      EXPECT_EQ(loaded.info.times.count, 2);
       EXPECT_EQ(loaded.info.time, time);
     }
   }
@@ -283,6 +283,26 @@ TEST_F(NiftiTest, TheFifthDimensionCountsChannels) {
               HasSubstr("2 channels of 3 components"));
   EXPECT_THAT(WhyNot("v.nii", Header({.type = 1792}) + samples), HasSubstr("NIfTI-1 data type 1792 (complex128) is not supported"));
   EXPECT_THAT(WhyNot("v.nii", Header({.slope = 2, .intercept = NAN}) + samples), HasSubstr("scl_inter is nan"));
+}
+
+TEST_F(NiftiTest, TimesHaveAStep) {
+  const auto times = [&](int version, double step, int unit) {
+    FileBytes header = Header({.version = version, .dim = {4, 5, 6, 7, 2}});
+    if (version == 1) Put(header, 76 + 4 * 4, float(step), false);
+    if (version == 2) Put(header, 104 + 8 * 4, step, false);
+    header[version == 1 ? 123 : 500] = char(unit);
+    return ReadWell("v.nii", header + Numbered() + Numbered(), {.time = TimeRange{}}).info.times;
+  };
+  constexpr int kMillimetres = 2, kSeconds = 8, kMilliseconds = 16, kMicroseconds = 24, kHertz = 32;
+  for (const int version : {1, 2}) {
+    EXPECT_EQ(times(version, 2.5, kMillimetres + kSeconds), (TimeAxis{2, 2.5, "s"}));
+    EXPECT_EQ(times(version, 750, kMilliseconds), (TimeAxis{2, 750, "ms"}));
+    EXPECT_EQ(times(version, 750, kMicroseconds), (TimeAxis{2, 750, "us"}));
+    EXPECT_EQ(times(version, 2.5, kMillimetres), (TimeAxis{2, 2.5, ""}));
+    EXPECT_EQ(times(version, 1, kMillimetres), (TimeAxis{2}));
+    EXPECT_EQ(times(version, 2.5, kHertz), (TimeAxis{2}));
+    for (const double step : {0.0, -2.0, double(NAN), double(INFINITY)}) EXPECT_EQ(times(version, step, kSeconds), (TimeAxis{2}));
+  }
 }
 
 TEST_F(NiftiTest, MghIsPlacedByItsCentreInTheScannersSpace) {

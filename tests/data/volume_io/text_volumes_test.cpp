@@ -131,6 +131,31 @@ TEST_F(TextVolumes, NrrdsOfFourDimensionsByItkAreAPatientsSpaceWithTime) {
              0);
 }
 
+TEST_F(TextVolumes, NrrdTimesHaveAStep) {
+  const auto times = [&](const std::string& fields) {
+    return Read("v.nrrd", Nrrd("dimension: 4\nsizes: 4 3 2 2\n" + fields, Numbers(48)), {.time = TimeRange{}}).info.times;
+  };
+  const std::string with_time = "kinds: domain domain domain time\n", directions = "space directions: (1,0,0) (0,2,0) (0,0,3) none\n";
+  EXPECT_EQ(times(with_time + "spacings: 1 1 1 0.5\nunits: \"mm\" \"mm\" \"mm\" \"ms\"\n"), (TimeAxis{2, 0.5, "ms"}));
+  EXPECT_EQ(times(with_time + "spacings: 1 1 1 0.5\n"), (TimeAxis{2, 0.5, ""}));
+  EXPECT_EQ(times(with_time + "spacings: 1 1 1 nan\n"), (TimeAxis{2}));
+  EXPECT_EQ(times(with_time), (TimeAxis{2}));
+  EXPECT_EQ(times("space: RAS\nspace units: \"mm\" \"mm\" \"mm\"\n" + with_time + directions), (TimeAxis{2}));
+  EXPECT_EQ(times("space: RAST\nspace units: \"mm\" \"mm\" \"mm\" \"s\"\nspace directions: (1,0,0,0) (0,2,0,0) (0,0,3,0) (0,0,0,4)\n"),
+            (TimeAxis{2, 4, "s"}));
+  EXPECT_EQ(times("kinds: domain domain domain list\nspacings: 1 1 1 0.5\n"), (TimeAxis{2})) << "no times";
+}
+
+TEST_F(TextVolumes, MetaImageTimesHaveAStep) {
+  const auto times = [&](const char* step) {
+    return Read("v.mha", Meta(fmt::format("NDims = 4\nDimSize = 4 3 2 2\nElementSpacing = 1 2 3 {}\n", step), 48), {.time = TimeRange{}})
+        .info.times;
+  };
+  EXPECT_EQ(times("2.5"), (TimeAxis{2, 2.5, ""}));
+  EXPECT_EQ(times("1"), (TimeAxis{2}));
+  EXPECT_EQ(times("-2"), (TimeAxis{2}));
+}
+
 TEST_F(TextVolumes, NrrdAxesThatAreNoneOfSpaceAreComponentsOrVolumes) {
   const std::string space = "dimension: 4\nspace: RAS\n", in_front = space + "sizes: 3 4 3 2\n", behind = space + "sizes: 4 3 2 3\n";
   for (const char* none : {"none", "NONE", "(nan,nan,nan)", "( NaN, nan, nan )"}) {

@@ -3,6 +3,7 @@
 #include <tiffio.h>
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 #include <vector>
 
@@ -92,11 +93,16 @@ void WriteTiffKind(const std::string& path, const Index3& size, const TiffKind& 
   TIFFClose(tiff);
 }
 
-FileBytes OneDirectoryTiff(const Index3& size, int bits, bool big_endian, const std::string& description, const FileBytes& samples) {
+FileBytes OneDirectoryTiff(const Index3& size, int bits, bool big_endian, const std::string& description, const FileBytes& samples,
+                           const ImageJEntries& of_imagej) {
   const auto number = [&](std::uint64_t value, int bytes) { return Number(value, bytes, big_endian); };
-  const std::uint64_t directory = 8, count = 9, text = directory + 2 + 12 * count + 4, first = text + description.size() + 1;
+  const std::uint64_t directory = 8, count = 11, text = directory + 2 + 12 * count + 4;
+  // ImageJ has at least two entries, so that sizes do not lie in the directory.
+  const std::uint64_t sizes = text + description.size() + 1, beside = sizes + 4 * of_imagej.sizes.size(),
+                      first = beside + of_imagej.bytes.size();
+  const unsigned sizes_tag = of_imagej.sizes.empty() ? 60001 : 50838, bytes_tag = of_imagej.sizes.empty() ? 60002 : 50839;
   struct Entry {
-    unsigned tag, type;  // 2: text, 4: a number
+    unsigned tag, type;  // 1: bytes, 2: text, 4: a number
     std::uint64_t count, value;
   };
   const auto side = [](std::int32_t voxels) { return std::uint64_t(voxels); };
@@ -108,10 +114,31 @@ FileBytes OneDirectoryTiff(const Index3& size, int bits, bool big_endian, const 
                                 {270, 2, description.size() + 1, text},
                                 {273, 4, 1, first},
                                 {278, 4, 1, side(size.y)},
-                                {279, 4, 1, (side(size.x) * std::uint64_t(bits) + 7) / 8 * side(size.y)}};
+                                {279, 4, 1, (side(size.x) * std::uint64_t(bits) + 7) / 8 * side(size.y)},
+                                {sizes_tag, 4, std::max<std::uint64_t>(of_imagej.sizes.size(), 1), sizes},
+                                {bytes_tag, 1, std::max<std::uint64_t>(of_imagej.bytes.size(), 1), beside}};
   FileBytes bytes = (big_endian ? "MM" : "II") + number(42, 2) + number(directory, 4) + number(count, 2);
   for (const auto& [tag, type, length, value] : entries) bytes += number(tag, 2) + number(type, 2) + number(length, 4) + number(value, 4);
-  return bytes + number(0, 4) + description + '\0' + samples;
+  bytes += number(0, 4) + description + '\0';
+  for (const std::uint32_t entry : of_imagej.sizes) bytes += number(entry, 4);
+  return bytes + of_imagej.bytes + samples;
+}
+
+ImageJEntries LooksOfImageJ(bool big_endian, const std::vector<double>& windows, const std::vector<std::array<int, 3>>& tables) {
+  const auto number = [&](std::uint64_t value, int bytes) { return Number(value, bytes, big_endian); };
+  ImageJEntries entries{{28}, number(0x494a494a, 4)};     // "IJIJ"
+  entries.bytes += number(0x696e666f, 4) + number(1, 4);  // "info"
+  entries.bytes += number(0x72616e67, 4) + number(1, 4);  // "rang"
+  entries.bytes += number(0x6c757473, 4) + number(tables.size(), 4);
+  entries.bytes += "about";
+  entries.sizes.push_back(5);
+  for (const double limit : windows) entries.bytes += number(std::bit_cast<std::uint64_t>(limit), 8);
+  entries.sizes.push_back(std::uint32_t(8 * windows.size()));
+  for (const std::array<int, 3>& table : tables) {
+    for (const int component : table) entries.bytes += FileBytes(255, '\0') + char(component);
+    entries.sizes.push_back(768);
+  }
+  return entries;
 }
 
 std::string OmeXml(const std::string& pixels, const std::string& inside, const std::string& uuid) {

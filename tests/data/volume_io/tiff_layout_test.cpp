@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <filesystem>
 
 #include "data/open/read_volume.h"
@@ -16,8 +18,10 @@ namespace {
 
 using testing::AllOf;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using Values = std::vector<double>;
+using Color = std::array<float, 3>;
 
 ReadOptions At(int time, int channel) { return {.time = TimeRange{time, time}, .channel = channel}; }
 
@@ -112,9 +116,33 @@ TEST_F(TiffLayoutTest, OmePagesAreInTheDimensionOrderWhereTiffDataLeaveItOpen) {
   EXPECT_EQ(Slices(path, {.time = TimeRange{0, 0}}), (Values{0, 1})) << "the first channel";
   EXPECT_THAT(WhyNot(path, At(0, 3)), HasSubstr("has 3 channels, so channel must be 0 to 2 (0: DAPI, 1: GFP, 2)"));
   const LoadedVolume loaded = Read(path, At(1, 1));
-  EXPECT_EQ(loaded.info.times, 2);
+  EXPECT_EQ(loaded.info.times.count, 2);
   EXPECT_EQ(loaded.info.time, 1);
   EXPECT_THAT(loaded.info.notes, Contains(HasSubstr("from page to page Z runs fastest, then C, then T")));
+}
+
+TEST_F(TiffLayoutTest, OmeSaysHowChannelsAreShownAndWhenTimesAre) {
+  const std::string sizes = "SizeZ=\"2\" SizeC=\"3\" SizeT=\"2\" DimensionOrder=\"XYZCT\" ";
+  const auto info = [&](const std::string& pixels, const std::string& channels) {
+    return Read(Write(Ome(sizes + pixels, channels), 12), At(0, 0)).info;
+  };
+  const SourceInfo read = info("TimeIncrement=\"250\" TimeIncrementUnit=\"ms\"",
+                               "<Channel Name=\"DAPI\" Color=\"65535\"/><Channel Color=\"-16776961\"/><Channel Name=\"x\" Color=\"-1\"/>");
+  EXPECT_THAT(read.channels, ElementsAre(FieldInfo{.name = "DAPI", .color = Color{0, 0, 1}}, FieldInfo{.color = Color{1, 0, 0}},
+                                         FieldInfo{.name = "x", .color = Color{1, 1, 1}}));
+  EXPECT_EQ(read.times, (TimeAxis{2, 250, "ms"}));
+  EXPECT_EQ(info("TimeIncrement=\"3\"", "").times, (TimeAxis{2, 3, "s"}));
+  for (const char* color : {"", "red", "4294967295", "1.5", "255", "99999999999999999999"}) {
+    const SourceInfo damaged = info("TimeIncrement=\"NaN\"", fmt::format("<Channel Color=\"{}\"/>", color));
+    EXPECT_THAT(damaged.channels, ElementsAre(FieldInfo{}, FieldInfo{}, FieldInfo{})) << color;
+    EXPECT_EQ(damaged.times, (TimeAxis{2}));
+  }
+  // One channel that is described; more descriptions than channels.
+  const std::string one = Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\"",
+                                    "<Channel Name=\"GFP\" Color=\"16711935\"/><Channel Name=\"none\"/>"),
+                                2);
+  EXPECT_THAT(Read(one).info.channels, ElementsAre(FieldInfo{.name = "GFP", .color = Color{0, 1, 0}}));
+  EXPECT_THAT(WhyNot(one, {.channel = 1}), HasSubstr("has 1 channel, so channel must be 0"));
 }
 
 TEST_F(TiffLayoutTest, TiffDataSayWhichPageAPlaneIs) {
@@ -316,7 +344,74 @@ TEST_F(TiffLayoutTest, ImageJCalibratesValues) {
             {.description = "ImageJ=1.54f\nimages=2\nslices=2\ncf=0\nc0=-32768.0\nc1=1.0\nvunit=Gray Value\nmin=-5\nmax=7\n"});
   const LoadedVolume loaded = Read(directory_ / "s.tif");
   EXPECT_EQ(DataValues(*loaded.volume), (Values{-32768, 0, -1, 32767}));
-  EXPECT_THAT(loaded.info.notes, Contains(HasSubstr("shows values from -5 to 7")));
+  EXPECT_THAT(loaded.info.channels, ElementsAre(FieldInfo{.window = ValueRange{-5, 7}})) << "calibrated";
+  EXPECT_EQ(WhyNot(directory_ / "s.tif", {.channel = 1}), (directory_ / "s.tif") + ": has 1 channel, so channel must be 0");
+}
+
+TEST_F(TiffLayoutTest, ImageJSaysHowChannelsAreShown) {
+  const std::string path = directory_ / "v.tif";
+  const Color red{1, 0, 0}, teal{0, 1, 0.2F};
+  const auto channels = [&](const std::string& lines, const ImageJEntries& entries, bool big_endian = true) {
+    const FileBytes samples(12 * 4, '\1');
+    WriteFile(path, OneDirectoryTiff({4, 3, 4}, 8, big_endian, "ImageJ=1.54f\nimages=4\nchannels=2\nslices=2\n" + lines, samples, entries));
+    return Read(path).info.channels;
+  };
+  for (const bool big_endian : {false, true}) {
+    const ImageJEntries looks = LooksOfImageJ(big_endian, {10, 200, -5, 7.5}, {{255, 0, 0}, {0, 255, 51}});
+    EXPECT_THAT(channels("mode=composite\n", looks, big_endian), ElementsAre(FieldInfo{.color = red, .window = ValueRange{10, 200}},
+                                                                             FieldInfo{.color = teal, .window = ValueRange{-5, 7.5F}}));
+    EXPECT_THAT(channels("mode=grayscale\n", looks, big_endian),
+                ElementsAre(FieldInfo{.window = ValueRange{10, 200}}, FieldInfo{.window = ValueRange{-5, 7.5F}}));
+    EXPECT_EQ(channels("cf=0\nc0=-10\nc1=2\n", looks, big_endian)[0].window, (ValueRange{10, 390}));
+  }
+  // What makes no sense is not stated; what lies behind it still counts.
+  EXPECT_THAT(channels("mode=composite\n", LooksOfImageJ(true, {10, 10, NAN, 7}, {{0, 0, 0}, {255, 0, 0}, {0, 255, 0}})),
+              ElementsAre(FieldInfo{}, FieldInfo{.color = red}));
+  EXPECT_THAT(channels("min=3\nmax=9\n", {}), ElementsAre(FieldInfo{}, FieldInfo{})) << "those of the channel that was shown last";
+}
+
+TEST_F(TiffLayoutTest, DamagedEntriesOfImageJAreIgnored) {
+  const std::string path = directory_ / "v.tif";
+  const ImageJEntries right = LooksOfImageJ(true, {10, 200, 5, 7}, {{255, 0, 0}, {0, 255, 0}});
+  const auto expect_read = [&](const ImageJEntries& entries) {
+    WriteFile(path, OneDirectoryTiff({4, 3, 4}, 8, true, "ImageJ=1.54f\nimages=4\nchannels=2\nslices=2\nmode=composite\n",
+                                     FileBytes(12 * 4, '\1'), entries));
+    const LoadedVolume loaded = Read(path);
+    EXPECT_EQ(loaded.info.channels.size(), 2U);
+    return loaded.info.channels;
+  };
+  for (const std::uint32_t size : {0U, 3U, 8U, 12U, 27U, 29U, 100000U, 0xffffffffU}) {
+    for (std::size_t entry = 0; entry < right.sizes.size(); ++entry) {
+      SCOPED_TRACE(fmt::format("entry {} of {} bytes", entry, size));
+      ImageJEntries damaged = right;
+      damaged.sizes[entry] = size;
+      expect_read(damaged);
+    }
+  }
+  for (std::size_t at = 0; at < 28; ++at) {  // kinds, and how many there are
+    ImageJEntries damaged = right;
+    damaged.bytes[at] = '\xff';
+    expect_read(damaged);
+  }
+  ImageJEntries few = right;
+  few.sizes.resize(3);
+  EXPECT_EQ(expect_read(few)[1], (FieldInfo{.window = ValueRange{5, 7}}));
+  ImageJEntries none = right;
+  none.bytes.resize(20);
+  EXPECT_EQ(expect_read(none)[1], FieldInfo{});
+}
+
+TEST_F(TiffLayoutTest, ImageJTimesHaveAStep) {
+  const auto times = [&](const std::string& lines) {
+    return Read(Write("ImageJ=1.54f\nimages=6\nslices=2\nframes=3\n" + lines, 6), At(0, 0)).info.times;
+  };
+  EXPECT_EQ(times("finterval=2.5\n"), (TimeAxis{3, 2.5, "s"}));
+  EXPECT_EQ(times("finterval=2.5\ntunit=min\nfps=7\n"), (TimeAxis{3, 2.5, "min"}));
+  EXPECT_EQ(times("finterval=2.5\ntunit=\\u00B5s\n"), (TimeAxis{3, 2.5, "us"}));
+  EXPECT_EQ(times("fps=4\ntunit=min\n"), (TimeAxis{3, 0.25, "s"}));
+  for (const char* lines : {"", "finterval=0\n", "finterval=-1\n", "finterval=nan\n", "finterval=soon\n", "fps=0\n"}) {
+    EXPECT_EQ(times(lines), (TimeAxis{3})) << lines;
+  }
 }
 
 TEST_F(TiffLayoutTest, ImageJStacksMayHaveOneDirectory) {

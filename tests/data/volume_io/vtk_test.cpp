@@ -184,7 +184,9 @@ TEST_F(VtkTest, ATimeIsTakenWithItsArrays) {
     EXPECT_EQ(ValuesOf("v.vti", file, {.time = TimeRange{time, time}, .array = "p"}), Counted(2, time == 0 ? 0 : 10));
   }
   EXPECT_EQ(ValuesOf("v.vti", file, {.time = TimeRange{1, 1}, .array = "always"}), (Values{7, 8}));
-  EXPECT_EQ(Read("v.vti", file, {.time = TimeRange{1, 1}, .array = "p"})->info.times, 3);
+  EXPECT_EQ(Read("v.vti", file, {.time = TimeRange{1, 1}, .array = "p"})->info.times, (TimeAxis{3, 0.5, ""}));
+  EXPECT_EQ(Read("v.vti", Replaced(file, "0 0.5 1", "0 0.5 7"), {.time = TimeRange{}, .array = "p"})->info.times, (TimeAxis{3}));
+  EXPECT_EQ(Read("v.vti", Replaced(file, "0 0.5 1", "0 or 1"), {.time = TimeRange{}, .array = "p"})->info.times, (TimeAxis{3}));
   EXPECT_EQ(Read("v.vti", file, {.time = TimeRange{1, 1}, .array = "p"})->info.time, 1);
 }
 

@@ -131,8 +131,12 @@ TEST(PlainArrayTest, NotesTellWhichAxesWereTaken) {
   EXPECT_THAT(notes({"x", "x", "x"}), ElementsAre("the axes x, x, x are taken for z, y, x"));
   WriteXarray(folder.path(), 3, {"time", "y", "x"});
   const auto series = Opened(Open(folder.path(), {.describe = true}));
-  EXPECT_EQ(series->info().times, 2);
+  EXPECT_EQ(series->info().times.count, 2);
   EXPECT_EQ(series->info().time, 0);
+  WriteCoordinates(folder.path(), 3, "time", {6, 12}, "hours since 1900-01-01");
+  EXPECT_EQ(Opened(Open(folder.path(), {.describe = true}))->info().times, (TimeAxis{2, 6, "h"}));
+  WriteCoordinates(folder.path(), 3, "time", {6, NAN}, "hours since 1900-01-01");
+  EXPECT_EQ(Opened(Open(folder.path(), {.describe = true}))->info().times, (TimeAxis{2}));
   EXPECT_EQ(Opened(Open(folder.path(), {.time = TimeRange{1, 1}}))->info().time, 1);
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 
@@ -121,7 +122,7 @@ TEST(ZarrSourceTest, ImagesShowTheTimeAndChannelThatAreAskedForInAnyOrderOfAxes)
       const SourceInfo& info = (*source)->info();
       EXPECT_EQ(info.format, version == 2 ? "OME-Zarr 0.4" : "OME-Zarr 0.5");
       EXPECT_EQ(info.file_type, "uint16");
-      EXPECT_EQ(info.times, times ? 2 : 1);
+      EXPECT_EQ(info.times.count, times ? 2 : 1);
       EXPECT_EQ(info.channels.size(), channels ? 3U : 0U);
       EXPECT_FALSE(info.labels);
       EXPECT_EQ(info.levels[0].description.geometry.orientation.unit, LengthUnit::kMicrometre);
@@ -136,6 +137,55 @@ TEST(ZarrSourceTest, ImagesShowTheTimeAndChannelThatAreAskedForInAnyOrderOfAxes)
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?channel=luminance").status().message(), HasSubstr("has 1 channel, so channel must be 0"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?spacing=1,1,1").status().message(), HasSubstr("states its spacing"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("lattice is no option of Zarr"));
+}
+
+TEST(ZarrSourceTest, ImagesSayHowChannelsAreShownAndWhenTimesAre) {
+  const TemporaryDirectory folder;
+  using Color = std::array<float, 3>;
+  const auto info = [&](const std::string& axes, const Json& channels, const Json& unit, double step, const Json& own = nullptr) {
+    const std::string path = folder / (axes + ".ome.zarr");
+    Json attributes = ImageAttributes(axes, 2, {std::vector<double>(axes.size(), 1)});
+    Json& image = OmePart(attributes)["multiscales"][0];
+    if (const std::size_t time = axes.find('t'); time != std::string::npos) {
+      image["axes"][time]["unit"] = unit;
+      image["datasets"][0]["coordinateTransformations"][0]["scale"][time] = step;
+    }
+    OmePart(attributes)["omero"] = {{"channels", channels}};
+    attributes["slabstream"] = own;
+    WriteZarrGroup(path, 2, attributes);
+    WriteZarrArray(path + "/0", SpecOf(axes, 2), ElementsOf(axes));
+    return (*OpenText(path + "?time=0"))->info();
+  };
+  const Json right = Json::Parse(R"([{"label": "DAPI", "color": "0000FF", "window": {"min": 0, "max": 65535, "start": 5, "end": 200},
+      "active": true}, {"color": "#ff0000", "active": false}])")
+                         .value();
+  const SourceInfo read = info("tczyx", right, "millisecond", 2.5);
+  EXPECT_THAT(read.channels, ElementsAre(FieldInfo{.name = "DAPI", .color = Color{0, 0, 1}, .window = ValueRange{5, 200}},
+                                         FieldInfo{.color = Color{1, 0, 0}, .shown = false}, FieldInfo{}));
+  EXPECT_EQ(read.times, (TimeAxis{2, 2.5, "ms"}));
+  EXPECT_EQ(info("tczyx", right, nullptr, 1).times, (TimeAxis{2}));
+  EXPECT_EQ(info("tczyx", right, 7, -3).times, (TimeAxis{2}));
+  EXPECT_EQ(info("tczyx", right, "hour", 1).times, (TimeAxis{2, 1, "h"}));
+  EXPECT_THAT(info("zyx", right, nullptr, 1).channels, ElementsAre(read.channels[0])) << "of the only channel";
+  // Windows are of samples.
+  EXPECT_EQ(info("zyx", right, nullptr, 1, {{"values", {{"scale", 2}, {"offset", -10}}}}).channels[0].window, (ValueRange{0, 390}));
+
+  for (const char* damaged : {
+           R"([{"label": 5, "color": 255, "window": {"start": "0", "end": 9}, "active": "no"}])",
+           R"([{"label": null, "color": "mauve", "window": {"start": 9, "end": 3}, "active": 0}])",
+           R"([{"color": "0000FFG", "window": [1, 2], "active": null}])",
+           R"([{"color": "000000", "window": {"start": "NaN", "end": "Infinity"}}])",
+           R"([{"color": ["00FF00"], "window": {"start": 1e300, "end": 1e301}}])",
+           R"([5, null, [], "DAPI"])",
+           R"({"0": {"label": "DAPI"}})",
+           R"("channels")",
+       }) {
+    EXPECT_THAT(info("tczyx", Json::Parse(damaged).value(), "s", 1).channels, ElementsAre(FieldInfo{}, FieldInfo{}, FieldInfo{}))
+        << damaged;
+  }
+  Json many = Json::array();
+  for (int i = 0; i < 5000; ++i) many.push_back({{"label", "DAPI"}});
+  EXPECT_EQ(info("tczyx", many, "s", 1).channels.size(), 3U);
 }
 
 TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
@@ -164,8 +214,7 @@ TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
       ASSERT_TRUE(source.ok()) << source.status().message();
       const SourceInfo& info = (*source)->info();
       ASSERT_EQ(info.levels.size(), 3U);
-      EXPECT_EQ(info.window, (ValueRange{3, 99}));
-      EXPECT_THAT(info.channels, ElementsAre("DAPI"));
+      EXPECT_THAT(info.channels, ElementsAre(FieldInfo{.name = "DAPI", .window = ValueRange{3, 99}}));
       for (std::size_t level = 0; level < 3; ++level) {
         const VolumeGeometry& geometry = info.levels[level].description.geometry;
         EXPECT_EQ(geometry.size, (Index3{8 >> level, 8 >> level, 8}));

@@ -272,9 +272,8 @@ HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
 }
 
 template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const SamplePlace& place) {
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const CornerWeights& weights) {
   const Ints at = SetInt(index[0]);
-  const CornerWeights weights = WeightsAt(place);
   std::int32_t value = 0, x = 0, y = 0, z = 0;
   const auto add = [&](const GradientCorner& corner, std::int32_t weight) {
     value += corner.value * weight;
@@ -343,11 +342,10 @@ HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
 
 // `index`: BrickPlace::corner.
 template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const SamplePlace& place) {
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const CornerWeights& weights) {
   const FloatTag df;
   const IntTag di;
   const hn::RepartitionToNarrow<IntTag> ds;
-  const CornerWeights weights = WeightsAt(place);
   // Neighbours along x side by side, for each of the four numbers.
   HWY_ALIGN static constexpr std::uint8_t kPairs[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
   const auto pairs = hn::BitCast(ds, hn::LoadDup128(hn::Repartition<std::uint8_t, IntTag>(), kPairs));

@@ -1,7 +1,5 @@
 // Samples of layers along rays, and how they change the sample of the volume. Included once for each instruction set, hence the unusual
 // include guard.
-#include <limits>
-
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/sample_look-inl.h"
 #include "worker/renderers/raycast/ray_layers.h"
@@ -96,17 +94,13 @@ HWY_INLINE Gradient IndicatorGradientAt(const RayLayers& layers, const RayBox& b
 
 // Samples after the layers have had their say. Lanes that are not `sampled` mean nothing.
 struct LayeredSample {
-  Floats opacity;  // the opacity of volume and overlay together
+  Floats opacity;
   // The share of a label's colour in the volume's part: that part has (1 - tint) times the volume's colour and tint
   // times the colour of `label_entry`. A label that is matter has a tint of 1.
   Floats tint;
   Ints label;        // number
   Ints label_entry;  // index into LabelTables::entries
   Mask matter;       // the label is the material
-  // The overlay's part.
-  Floats overlay_share;  // the overlay's share of the colour, [0, 1]
-  Ints overlay_entry;
-  Neighbours<float> overlay;  // only if the overlay is shown
 };
 
 // `at` as in Neighbours. `opacity`: of the volume's sample, 0 where it has none.
@@ -117,9 +111,8 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
   LayeredSample sample;
   sample.opacity = opacity;
   sample.tint = zero;
-  sample.label = sample.label_entry = sample.overlay_entry = hn::Zero(di);
+  sample.label = sample.label_entry = hn::Zero(di);
   sample.matter = hn::Lt(one, zero);
-  sample.overlay_share = zero;
   if (layers.labels != nullptr) {
     const LabelTables& tables = *layers.labels;
     sample.label = NearestLabel(layers, box, place, at);
@@ -141,20 +134,6 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
         sample.opacity = hn::IfThenElse(thinned, of_step, sample.opacity);
       }
     }
-  }
-  if (layers.overlay != nullptr) {
-    const RayLook& look = *layers.overlay;
-    sample.overlay = NeighboursAt(box, layers.overlay_samples, at);
-    const auto value = Interpolate(sample.overlay, place);
-    const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    sample.overlay_entry = EntryOf(look, value, finite);
-    const auto over = hn::IfThenElseZero(finite, hn::GatherIndex(df, look.entries.data() + 3, sample.overlay_entry));
-    const auto sum = hn::Add(sample.opacity, over);
-    const auto any = hn::Gt(sum, zero);
-    sample.overlay_share = hn::IfThenElseZero(any, hn::Div(over, hn::IfThenElse(any, sum, one)));
-    // Opaque material keeps exactly 1; material without an overlay stays as it was.
-    const auto together = hn::Sub(one, hn::Mul(hn::Sub(one, sample.opacity), hn::Sub(one, over)));
-    sample.opacity = hn::IfThenElse(hn::Gt(over, zero), together, sample.opacity);
   }
   return sample;
 }

@@ -13,8 +13,8 @@ namespace slabstream {
 
 // Empty: the layer was not needed so far.
 struct LayerPiece {
-  PaddedVoxels labels, overlay;
-  MacrocellRanges label_cells, overlay_cells;
+  PaddedVoxels labels;
+  MacrocellRanges label_cells;
 };
 
 class LayerVolume : public BoxCache {

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
+#include "worker/renderers/raycast/field_samples-inl.h"
 #include "worker/renderers/raycast/gradient_bricks-inl.h"
 #include "worker/renderers/raycast/layer_samples-inl.h"
 #include "worker/renderers/raycast/surface_walk-inl.h"
@@ -18,9 +19,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
-// The light on samples with this gradient, if the frame has any light.
 HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, const SamplePlace& place) {
-  return work.light != nullptr ? LightAt(*work.look, gradient, *work.light, place) : LightOf(*work.look, gradient);
+  return LightOn(*work.look, work.light, gradient, place);
 }
 HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.light != nullptr; }
 
@@ -71,42 +71,34 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Floats before, Sur
   }
 }
 
-// The light on both parts of samples with layers.
-struct LayeredLight {
-  Light volume, overlay;
-};
-// `gradient`: of the volume, or a face's normal if `on_face`.
-HWY_INLINE LayeredLight LightOfLayers(const MarchWork& work, const SamplePlace& place, Ints at, const LayeredSample& sample, Mask visible,
-                                      Gradient gradient, Mask on_face) {
+// The light on samples with labels. `gradient`: of the volume, or a face's normal if `on_face`.
+HWY_INLINE Light LightOfLayers(const MarchWork& work, const SamplePlace& place, Ints at, const LayeredSample& sample, Mask visible,
+                               Gradient gradient, Mask on_face) {
   const FloatTag df;
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
     gradient = Choose(matter, IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label), gradient);
   }
-  const Light volume = LightOn(work, gradient, place);
-  if (hn::AllFalse(df, hn::And(visible, hn::Gt(sample.overlay_share, hn::Zero(df))))) return {volume, volume};
-  return {volume, LightOn(work, Choose(on_face, gradient, GradientAt(sample.overlay, place)), place)};
+  return LightOn(work, gradient, place);
 }
 
-// Adds samples with layers.
-HWY_INLINE void AddLayered(const MarchWork& work, Mask rays, Floats opacity, const Entries& entries, const LayeredSample& sample,
-                           const LayeredLight& light, Sums& sums) {
+// The colours of samples with layers.
+HWY_INLINE Floats LayeredColor(const MarchWork& work, const Entries& entries, const LayeredSample& sample, const Light& light,
+                               std::size_t channel) {
   const FloatTag df;
   const RayLayers& layers = *work.layers;
-  sums.AddChannels(rays, opacity, [&](std::size_t channel) HWY_ATTR {
-    auto color = entries.part[channel];
-    if (layers.labels != nullptr) {
-      color = Lerp(sample.tint, color, hn::GatherIndex(df, layers.labels->entries.data() + channel, sample.label_entry));
-    }
-    color = Sums::Lit(color, light.volume);
-    if (layers.overlay == nullptr) return color;
-    const auto over = hn::GatherIndex(df, layers.overlay->entries.data() + channel, sample.overlay_entry);
-    return Lerp(sample.overlay_share, color, Sums::Lit(over, light.overlay));
-  });
+  auto color = entries.part[channel];
+  if (layers.labels != nullptr) {
+    color = Lerp(sample.tint, color, hn::GatherIndex(df, layers.labels->entries.data() + channel, sample.label_entry));
+  }
+  return Sums::Lit(color, light);
 }
 
-// What a frame may ask for: only a transfer function; cuts, isosurfaces and gradient opacity, too; and layers on top. Each is compiled by
-// itself, so that a frame does not pay for what it does not use.
+// `shown`: Step::shown.
+HWY_INLINE Mask ShowsVolume(Ints shown) { return hn::RebindMask(FloatTag(), hn::TestBit(shown, SetInt(RayFields::kVolume))); }
+
+// What a frame may ask for: only a transfer function; cuts, isosurfaces and gradient opacity, too; and layers and other fields on top. Each
+// is compiled by itself, so that a frame does not pay for what it does not use.
 enum class Samples { kPlain, kAll, kLayered };
 
 // How far the rays of a packet go on: the rays that take their next sample, and the samples from it to the one after.
@@ -157,7 +149,7 @@ struct LitSamples {
     FindInBricks<T>(*work.box, place, inside, *bricks, found, before);
   }
   HWY_INLINE void Read(const MarchWork& /*work*/, const SamplePlace& place, const Found& found, GradientBricks* bricks) {
-    const LitSample sample = InterpolateCorners<T>(bricks->corners(), found.corner, place);
+    const LitSample sample = InterpolateCorners<T>(bricks->corners(), found.corner, WeightsAt(place));
     value = sample.value;
     gradient = sample.gradient;
   }
@@ -174,6 +166,9 @@ struct Step {
   typename Voxels::Found found;  // where the voxels are
   Voxels voxels;
   LaneNumbers entry;  // EntryOf
+  // Of kLayered.
+  Ints shown;         // as in RayFields, if there are any; 0 where there is no sample
+  bool shows_volume;  // the volume may show there
 };
 
 template <class T>
@@ -193,13 +188,12 @@ struct Classified {
 };
 // `at`: as in Neighbours, of kLayered.
 template <class T, Samples kSamples, class Voxels>
-HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Ints at) {
+HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Ints at, Classified<kSamples>& of) {
   const FloatTag df;
   const RayLook& look = *work.look;
   const SamplePlace& place = step.place;
   const Voxels& voxels = step.voxels;
   const auto zero = hn::Zero(df);
-  Classified<kSamples> of;
   const auto finite = FiniteOf<T>(voxels.value);
   of.entries = EntriesAt(look.entries.data(), step.entry);
   of.opacity = of.entries.part[3];
@@ -222,7 +216,6 @@ HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const Ste
     of.opacity = of.layered.opacity;
     of.visible = hn::And(step.sampled, hn::Gt(of.opacity, zero));
   }
-  return of;
 }
 
 // The opacity of samples k if the first and the last one of a ray stand for more or less than a step.
@@ -235,14 +228,13 @@ HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, 
   return hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
 }
 
-// Lights samples and adds those that are visible.
-template <Samples kSamples, class Voxels>
+// Lights samples and adds those that are visible to Sums or to a Mixture: add(mask, opacity, color(channel)).
+template <Samples kSamples, class Voxels, class Add>
 HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, const PacketPart* part, Ints at,
-                           const Classified<kSamples>& samples, Floats opacity, Sums& sums) {
+                           const Classified<kSamples>& samples, Floats opacity, Add&& add) {
   const RayLook& look = *work.look;
   const SamplePlace& place = step.place;
   Light light = {Set(1), hn::Zero(FloatTag())};
-  [[maybe_unused]] LayeredLight lights = {light, light};
   if (IsLit(work)) {
     const bool has_gradient = kSamples != Samples::kPlain && look.by_gradient();
     Gradient gradient = has_gradient ? samples.gradient : step.voxels.GradientOf(place);
@@ -252,16 +244,16 @@ HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, cons
       gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
     }
     if constexpr (kSamples == Samples::kLayered) {
-      lights = LightOfLayers(work, place, at, samples.layered, samples.visible, gradient, on_face);
+      light = LightOfLayers(work, place, at, samples.layered, samples.visible, gradient, on_face);
     } else {
       light = LightOn(work, gradient, place);
     }
   }
   if constexpr (kSamples == Samples::kLayered) {
-    AddLayered(work, samples.visible, opacity, samples.entries, samples.layered, lights, sums);
+    add(samples.visible, opacity,
+        [&](std::size_t channel) HWY_ATTR { return LayeredColor(work, samples.entries, samples.layered, light, channel); });
   } else {
-    sums.AddChannels(samples.visible, opacity,
-                     [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.part[channel], light); });
+    add(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.part[channel], light); });
   }
 }
 
@@ -270,7 +262,8 @@ struct MarchingPacket {
   const RayPacket& of_frame;
   const RayPacket& among;
   const LeapScales& leaps;
-  GradientBricks* bricks;
+  GradientBricks* bricks;                   // the volume's, then those of other fields
+  const RayPacket* among_fields = nullptr;  // AmongVoxels, by field
 };
 
 // Samples `owned` of the rays, which lie in `part`; of kPlain it is null. Returns how many samples were shaded.
@@ -290,6 +283,8 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   auto inside = hn::Lt(k, owned.end), alive = inside;
   std::uint64_t shaded = 0;
   const bool has_surfaces = kAll && work.to_surfaces != nullptr;
+  [[maybe_unused]] const RayFields* fields = nullptr;
+  if constexpr (kSamples == Samples::kLayered) fields = work.layers->fields;
   SurfaceWalk<T> surfaces(work, packet.among, has_surfaces ? OctantStart(*work.to_surfaces, packet.among) : hn::Zero(IntTag()));
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
@@ -318,12 +313,24 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       alive = hn::And(alive, inside);
       if (hn::AllFalse(df, step.sampled)) continue;
       step.any = true;
-      Voxels::Find(work, step.place, stride.sampled, packet.bricks, step.found, before.found);
+      auto read = stride.sampled;
+      if constexpr (kSamples == Samples::kLayered) {
+        step.shows_volume = true;
+        if (fields != nullptr) {
+          const auto cell = CellOf<kCellShift>(step.place, work.box->cells, read);
+          const auto shown = hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(fields->shown), hn::Add(cell, cell));
+          step.shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), step.sampled), hn::And(shown, SetInt(0xFFFF)));
+          read = ShowsVolume(step.shown);
+          step.shows_volume = !hn::AllFalse(df, read);
+        }
+      }
+      Voxels::Find(work, step.place, read, packet.bricks, step.found, before.found);
       return;
     }
   };
   // Their values.
   const auto read = [&](Step<Voxels>& step) SLABSTREAM_INLINED {
+    if (kSamples == Samples::kLayered && !step.shows_volume) return;
     step.voxels.Read(work, step.place, step.found, packet.bricks);
     if constexpr (std::is_same_v<T, float>) {
       step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
@@ -335,8 +342,26 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   const auto add = [&](const Step<Voxels>& step) SLABSTREAM_INLINED {
     Ints at = hn::Zero(IntTag());
     if constexpr (kSamples == Samples::kLayered) at = IndexBefore(*work.box, step.place, step.sampled);
-    Classified<kSamples> samples = ClassifySamples<T, kSamples>(work, step, at);
+    Classified<kSamples> samples;
+    samples.visible = hn::Lt(one, zero);
+    if (kSamples != Samples::kLayered || step.shows_volume) ClassifySamples<T, kSamples>(work, step, at, samples);
     samples.visible = hn::And(samples.visible, hn::Lt(sums.alpha, opaque));
+    if (kSamples == Samples::kLayered && fields != nullptr) samples.visible = hn::And(samples.visible, ShowsVolume(step.shown));
+    [[maybe_unused]] Mixture mixture;
+    if constexpr (kSamples == Samples::kLayered) {
+      if (fields != nullptr) {
+        mixture = Mixture::Empty();
+        if (!hn::AllFalse(df, samples.visible)) {
+          AddSamples<kSamples>(work, step, part, at, samples, samples.opacity,
+                               [&](Mask visible, Floats opacity, auto&& color) HWY_ATTR { mixture.Add(visible, opacity, color); });
+        }
+        const auto shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), hn::Lt(sums.alpha, opaque)), step.shown);
+        MixFields(*fields, {step.k, step.place, WeightsAt(step.place), work.light, hn::Lt(step.k, part->face_end), part->face}, shown,
+                  packet.among_fields, packet.bricks + 1, mixture);
+        samples.opacity = mixture.alpha;
+        samples.visible = hn::Gt(mixture.alpha, zero);
+      }
+    }
     const std::size_t count = hn::CountTrue(df, samples.visible);
     in_matter = count > kLanes / 2;
     if (count == 0) return;
@@ -345,7 +370,18 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       if (has_surfaces) shaded += AddSurfaces<T>(work, step.k, surfaces, sums);
     }
     const auto opacity = has_ends ? OpacityAtEnds(ends, step.k, samples.visible, samples.opacity) : samples.opacity;
-    AddSamples<kSamples>(work, step, part, at, samples, opacity, sums);
+    const auto add_to_sums = [&](Mask visible, Floats of, auto&& color) SLABSTREAM_INLINED { sums.AddChannels(visible, of, color); };
+    if constexpr (kSamples == Samples::kLayered) {
+      if (fields != nullptr) {
+        const auto straight = mixture.Straight(fields->flat);
+        add_to_sums(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return hn::Mul(mixture.color[channel], straight); });
+        if (fields->flat) sums.LimitColors();
+      } else {
+        AddSamples<kSamples>(work, step, part, at, samples, opacity, add_to_sums);
+      }
+    } else {
+      AddSamples<kSamples>(work, step, part, at, samples, opacity, add_to_sums);
+    }
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   };
   // Three steps are under way at a time: while one waits for its voxels, the next one is placed and the one before is lit.
@@ -371,7 +407,17 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
 
 // Apart from plain frames, so that these have the registers for themselves.
 template <class T, Samples kSamples, class Voxels>
-HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned, Sums& sums) {
+HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket packet, const SampleInterval& owned, Sums& sums) {
+  RayPacket among_fields[kSamples == Samples::kLayered ? kMaxShownFields : 1];
+  if constexpr (kSamples == Samples::kLayered) {
+    packet.among_fields = among_fields;
+    if (work.layers->fields != nullptr) {
+      const std::span<const RayField> fields = work.layers->fields->fields;
+      for (std::size_t i = 0; i < fields.size(); ++i) {
+        if (!fields[i].among_same_voxels) among_fields[i] = AmongVoxels(packet.of_frame, fields[i].map);
+      }
+    }
+  }
   PacketPart parts[2];
   PartsOf(work.rays->clip, packet.of_frame, parts);
   std::uint64_t shaded = 0;
@@ -418,18 +464,25 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
 }
 
 template <class T>
-std::uint64_t March(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* HWY_RESTRICT rgba,
+std::uint64_t March(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* HWY_RESTRICT rgba,
                     std::size_t floats_a_row) {
-  if constexpr (!std::is_same_v<T, float>) {
-    if (work.look->phong || work.look->by_gradient()) {
-      bricks.Enter(*work.box);
-      return MarchPackets<T, LitSamples<T>>(work, tile, &bricks, rgba, floats_a_row);
+  if (work.layers != nullptr && work.layers->fields != nullptr) {
+    const std::span<const RayField> fields = work.layers->fields->fields;
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      if (fields[i].look->phong && fields[i].voxels.type != ScalarType::kFloat32) bricks[1 + i].Enter(fields[i].voxels);
     }
   }
-  return MarchPackets<T, StoredSamples<T>>(work, tile, nullptr, rgba, floats_a_row);
+  if constexpr (!std::is_same_v<T, float>) {
+    if (work.look->phong || work.look->by_gradient()) {
+      bricks[0].Enter(*work.box);
+      return MarchPackets<T, LitSamples<T>>(work, tile, bricks.data(), rgba, floats_a_row);
+    }
+  }
+  return MarchPackets<T, StoredSamples<T>>(work, tile, bricks.data(), rgba, floats_a_row);
 }
 
-std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row) {
+std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
+                       std::size_t floats_a_row) {
   if (work.box->type == ScalarType::kUint8) return March<std::uint8_t>(work, tile, bricks, rgba, floats_a_row);
   if (work.box->type == ScalarType::kUint16) return March<std::uint16_t>(work, tile, bricks, rgba, floats_a_row);
   return March<float>(work, tile, bricks, rgba, floats_a_row);
@@ -442,7 +495,8 @@ HWY_AFTER_NAMESPACE();
 namespace slabstream {
 HWY_EXPORT(MarchAny);
 
-std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row) {
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
+                        std::size_t floats_a_row) {
   return HWY_DYNAMIC_DISPATCH(MarchAny)(work, tile, bricks, rgba, floats_a_row);
 }
 

@@ -7,8 +7,8 @@
 //   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
 //   light       shadows and ambient occlusion at the sample (LightAt), if there are any
-//   layers      the label of the nearest voxel, and the overlay interpolated and classified like the volume (RayLayers); mixed with the
-//               volume's sample as docs/rendering.md says
+//   layers      the label of the nearest voxel changes the volume's sample as docs/rendering.md says (RayLayers)
+//   fields      sampled like the volume, and blended with it (RayFields)
 //
 // Isosurfaces of the interpolated volume are composited among the samples, each crossing of a ray with its surface's opacity
 // (surface_walk-inl.h). A crossing between two samples comes after the first of them.
@@ -16,6 +16,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "worker/light/frame_light.h"
 #include "worker/rays/ray_box.h"
@@ -41,7 +42,9 @@ struct MarchWork {
 };
 
 // Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without
-// a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded. `bricks`: the calling thread's.
-std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row);
+// a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded. `bricks`: the calling thread's,
+// of the volume and of each other field.
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
+                        std::size_t floats_a_row);
 
 }  // namespace slabstream

@@ -8,6 +8,7 @@
 #include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "worker/rays/ray_look.h"
+#include "worker/renderers/raycast/ray_fields.h"
 
 namespace slabstream {
 
@@ -32,9 +33,8 @@ struct RayLayers {
   const LabelTables* labels = nullptr;
   ScalarType label_type = ScalarType::kUint8;  // or kUint16
   const std::byte* label_samples = nullptr;
-  // Null: the overlay is not shown. Opacities are those of one step with the weight of the overlay.
-  const RayLook* overlay = nullptr;
-  const float* overlay_samples = nullptr;
+  // Null: no other field is shown.
+  const RayFields* fields = nullptr;
 };
 
 }  // namespace slabstream

@@ -17,6 +17,7 @@
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
+#include "worker/renderers/raycast/shown_fields.h"
 #include "worker/renderers/raycast/surface_cells.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
@@ -30,18 +31,19 @@ struct Visibility {
   std::optional<EmptyDistances> to_surfaces;  // none: no isosurface is shown
   std::vector<std::int32_t> surface_cells;    // FindSurfaceCells
   SampledRegion region;                       // positions in visible cells; empty if low.x > high.x
+  std::vector<std::uint16_t> shown;           // RayFields::shown; empty: there are no other fields
 };
 
 // What is visible of a padded box: samples of the volume, and what layers add.
 struct VisibleValues {
   VisibleSamples volume;
   std::optional<MatterLabels> labels = {};
-  std::optional<VisibleSamples> overlay = {};
+  ShownFields::Visible fields = {};
   friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
 // `layers`: of the piece; null if none is shown.
-Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers) {
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers, const ShownFields& fields) {
   const bool has_surfaces = !visible.volume.isovalues().empty();
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint8_t> with_samples =
@@ -52,7 +54,15 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
     }
   };
   if (visible.labels) add(layers->label_cells, *visible.labels);
-  if (visible.overlay) add(layers->overlay_cells, *visible.overlay);
+  std::vector<std::uint16_t> shown;
+  if (!fields.empty()) {
+    shown = fields.ShownIn(piece);
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      if (with_samples[i] == 0) shown[i] |= RayFields::kVolume;
+      if (shown[i] != 0) with_samples[i] = 0;
+    }
+    shown.push_back(0);  // kernels read two bytes more
+  }
   std::vector<std::int32_t> surface_cells;
   std::vector<std::uint8_t> with_surfaces;
   if (has_surfaces) {
@@ -69,7 +79,8 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
       }
     }
   }
-  Visibility result{EmptyDistances(counts, std::move(with_samples)), std::nullopt, std::move(surface_cells), {{1, 0, 0}, {0, 0, 0}}};
+  Visibility result{
+      EmptyDistances(counts, std::move(with_samples)), std::nullopt, std::move(surface_cells), {{1, 0, 0}, {0, 0, 0}}, std::move(shown)};
   if (has_surfaces) result.to_surfaces.emplace(counts, std::move(with_surfaces));
   if (cells.empty()) return result;
   const Vec3 origin = ToVec3(piece.voxels.box.begin) - Vec3{1, 1, 1};
@@ -81,7 +92,6 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
 struct ShownLayers {
   const std::vector<LayerPiece>* pieces = nullptr;  // null: none
   std::optional<LabelTables> labels;
-  std::optional<RayLook> overlay;
 
   // Of a piece. nullopt: none is shown.
   std::optional<RayLayers> Of(std::size_t number) const {
@@ -93,10 +103,6 @@ struct ShownLayers {
       layers.label_type = piece.labels.type;
       layers.label_samples = piece.labels.samples.get();
     }
-    if (overlay) {
-      layers.overlay = &*overlay;
-      layers.overlay_samples = reinterpret_cast<const float*>(piece.overlay.samples.get());
-    }
     return layers;
   }
 };
@@ -107,13 +113,6 @@ ShownLayers LayersOf(BoxData& data, std::span<const RayPiece> pieces, const Fram
   if (!looks.any()) return shown;
   shown.pieces = &data.CacheOf<LayerVolume>().PiecesOf(data, pieces, looks);
   if (looks.labels) shown.labels = MakeLabelTables(*looks.labels, steps_per_voxel, setup.transfer.opacity_distance);
-  if (looks.overlay) {
-    const VolumeDescription description{.geometry = setup.description.geometry, .type = ScalarType::kFloat32, .mapping = {}};
-    const ClassificationTable table = Classify(looks.overlay->transfer, description, looks.overlay->range);
-    // Weight w: the opacity of a step is 1 - (1 - a)^w, as of a step w times as long.
-    shown.overlay =
-        MakeRayLook(table, looks.overlay->transfer, description, setup.camera, setup.shading, steps_per_voxel / looks.overlay->weight);
-  }
   return shown;
 }
 
@@ -122,15 +121,14 @@ class VisibilityCache : public BoxCache {
  public:
   // By piece.
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
-                                    const ShownLayers& shown, OctantSet octants) {
-    VisibleValues visible{.volume = VisibleSamples(look)};
+                                    const ShownLayers& shown, const ShownFields& fields, OctantSet octants) {
+    VisibleValues visible{.volume = VisibleSamples(look), .fields = fields.visible()};
     if (looks.labels && looks.labels->mode == LabelMode::kSurface) visible.labels.emplace(*looks.labels);
-    if (shown.overlay) visible.overlay.emplace(*shown.overlay);
     if (pieces_.empty() || visible_ != visible) {
       visible_ = std::move(visible);
       pieces_.clear();
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
+        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i], fields));
       }
     }
     for (Visibility& piece : pieces_) {
@@ -144,7 +142,7 @@ class VisibilityCache : public BoxCache {
     std::size_t total = 0;
     for (const Visibility& piece : pieces_) {
       total += piece.to_samples.bytes() + (piece.to_surfaces ? piece.to_surfaces->bytes() : 0);
-      total += piece.surface_cells.capacity() * sizeof(piece.surface_cells[0]);
+      total += piece.surface_cells.capacity() * sizeof(piece.surface_cells[0]) + piece.shown.capacity() * sizeof(piece.shown[0]);
     }
     return total;
   }
@@ -188,24 +186,33 @@ class RaycastRenderer : public Renderer {
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     const ClassificationTable& classification = data.Classification(setup);
-    RayLook look = MakeRayLook(classification, setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel,
-                               GeometryOf(setup, at.level).spacing);
+    RayLook look = MakeRayLook(classification, setup.transfer, setup.description, setup.camera, setup.shading,
+                               samples_per_voxel / setup.weight, GeometryOf(setup, at.level).spacing);
     look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
     const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
+    const Result<ShownFields> fields = ShownFields::Make(data, at, setup, samples_per_voxel);
+    if (!fields.ok()) return fields.status();
     const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
                                    setup.clip, setup.parameters.at(1));
-    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown, OctantsOf(rays));
+    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown, *fields, OctantsOf(rays));
     clock.Charge(Stage::kPrepare);
 
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
     const RayEnds ends(setup.termination);
     std::atomic<std::uint64_t> shaded = 0;
-    PerThread<GradientBricks> bricks;
+    std::vector<std::vector<RayField>> fields_of_pieces;
+    for (const RayPiece& piece : pieces) fields_of_pieces.push_back(fields->Of(piece));
+    PerThread<std::vector<GradientBricks>> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
-          const std::optional<RayLayers> layers = shown.Of(piece);
+          std::optional<RayLayers> layers = shown.Of(piece);
+          const RayFields ray_fields = {fields_of_pieces[piece], visible[piece].shown.data(), setup.flat};
+          if (!fields->empty()) {
+            if (!layers) layers.emplace();
+            layers->fields = &ray_fields;
+          }
           const MarchWork work = {.rays = &rays,
                                   .box = &ray_box,
                                   .look = &look,
@@ -215,7 +222,8 @@ class RaycastRenderer : public Renderer {
                                   .termination = ends[steps],
                                   .layers = layers ? &*layers : nullptr,
                                   .light = light ? &*light : nullptr};
-          shaded += MarchTile(work, tile, bricks.Mine(), rgba, floats_a_row);
+          std::vector<GradientBricks>& of_thread = bricks.Mine([&] { return std::vector<GradientBricks>(1 + ray_fields.fields.size()); });
+          shaded += MarchTile(work, tile, of_thread, rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
     return clock.Finish(std::move(image), control);

@@ -1,4 +1,4 @@
-// Labels and overlays in the ray caster: formulas, the kernel against its reference, and that boxes do not matter.
+// Labels in the ray caster: formulas, the kernel against its reference, and that boxes do not matter.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,6 @@ std::shared_ptr<const Volume> Shared(Volume volume) { return std::make_shared<co
 std::unique_ptr<BoxData> CutLayered(const LayeredVolume& volume, const Box& box) {
   BoxLayers layers;
   if (volume.layers.labels != nullptr) layers.labels.emplace(CutBlock(volume.layers.labels->block, box));
-  if (volume.layers.overlay != nullptr) layers.overlay.emplace(CutBlock(volume.layers.overlay->block, box));
   return std::make_unique<BoxData>(CutBlock(volume.volume->block, box), std::move(layers));
 }
 
@@ -37,7 +36,6 @@ FrameSetup LayeredSetup(const LayeredVolume& volume, SetupOptions options, Layer
   options.renderer = RayCasting();
   FrameSetup setup = MakeSetup(*volume.volume, options);
   setup.layers = volume.layers.types();
-  if (looks.overlay && volume.layers.overlay != nullptr) looks.overlay->range = Summarize(*volume.layers.overlay).range;
   setup.looks = std::move(looks);
   return setup;
 }
@@ -211,49 +209,6 @@ TEST(Labels, NormalsOfAPlaneAreThoseOfThePlane) {
   }
 }
 
-// Of constant volumes: the equation of docs/rendering.md.
-TEST(Overlay, MixesAsTheEquationSays) {
-  const double own = 0.1, over = 0.3;
-  LayeredVolume volume{.volume = Shared(MakeBlock(kGeometry))};
-  volume.layers.overlay = Shared(MakeVolume(kGeometry, ScalarType::kFloat32, [](const Index3&) { return 7.5; }));
-  for (const double weight : {0.0, 0.5, 1.0}) {
-    SetupOptions options = Unlit();
-    options.transfer = Uniform(own, {1, 0, 0});
-    // The equation is about opacities of a step: one voxel length here.
-    const auto rendered = [&](const LayerLooks& looks) {
-      FrameSetup setup = LayeredSetup(volume, options, looks);
-      SetParameters(ParseParameters(*RayCasting(), {{"sampling-rate", "1"}}).value(), setup);
-      return Rendered(volume, setup);
-    };
-    const LocalImage image = rendered({.overlay = OverlayLook{.transfer = Uniform(over, {0, 1, 0}), .weight = weight}});
-    const double b = 1 - std::pow(1 - over, weight), together = own + b - own * b;
-    options.transfer = Uniform(together, {float(own / (own + b)), float(b / (own + b)), 0});
-    const LocalImage expected = rendered({});
-    EXPECT_LT(LargestDifference(image, expected), 1e-4F) << "weight " << weight;
-  }
-}
-
-TEST(Overlay, ShowsNothingWhereItHasNoValue) {
-  LayeredVolume volume{.volume = Shared(MakeBlock(kGeometry))};
-  volume.layers.overlay =
-      Shared(MakeVolume(kGeometry, ScalarType::kFloat32, [](const Index3&) { return std::numeric_limits<double>::quiet_NaN(); }));
-  SetupOptions options;
-  const FrameSetup setup = LayeredSetup(volume, options, {.overlay = OverlayLook{.transfer = Uniform(1, {0, 1, 0})}});
-  EXPECT_EQ(LargestDifference(Rendered(volume, setup), Rendered(volume, LayeredSetup(volume, options, {}))), 0);
-}
-
-// It shows where the volume is clear, too.
-TEST(Overlay, StandsByItself) {
-  LayeredVolume volume{.volume = Shared(MakeVolume(kGeometry, ScalarType::kUint8, [](const Index3&) { return 0; }))};
-  const auto overlay = MakeBlobs(kGeometry, ScalarType::kFloat32, 5);
-  volume.layers.overlay = Shared(overlay);
-  const LocalImage alone = Rendered(volume, LayeredSetup(volume, {}, {.overlay = OverlayLook{.transfer = Ramp(0.5)}}));
-  SetupOptions options;
-  options.renderer = RayCasting();
-  options.transfer = Ramp(0.5);
-  EXPECT_LT(LargestDifference(alone, RenderWhole(overlay, MakeSetup(overlay, options))), 1e-5F);
-}
-
 // ---- any boxes, any instruction set
 
 struct Case {
@@ -269,18 +224,10 @@ Case RandomCase(unsigned seed, int i) {
   result.volume.volume = Shared(MakeBlobs(geometry, ScalarType(1 + i % 3), unsigned(i)));
   const Volume shapes = MakeBlobs(geometry, ScalarType::kUint8, unsigned(i) + 100);
   LayerLooks looks;
-  if (i % 3 != 2) {
-    const auto label = [&](const Index3& v) { return std::min(shapes.block.samples<std::uint8_t>()[shapes.block.Offset(v)] / 40, 4); };
-    result.volume.layers.labels = Shared(MakeVolume(geometry, i % 2 == 0 ? ScalarType::kUint8 : ScalarType::kUint16, label));
-    looks.labels = Look(i % 4 < 2 ? LabelMode::kTint : LabelMode::kSurface,
-                        {{kRed, 0.5F}, {kGreen, 1, i % 5 != 0}, {{0, 0, 1}, 0}, {{1, 1, 0}, float(uniform(0, 1))}}, uniform(0, 1));
-  }
-  if (i % 3 != 0) {
-    result.volume.layers.overlay = Shared(MakeVolume(geometry, ScalarType::kFloat32, [&](const Index3& v) {
-      return v.x > 17 ? std::numeric_limits<double>::quiet_NaN() : 5.0 * ((v.x + v.y * 3 + v.z) % 11) + v.z;
-    }));
-    looks.overlay = OverlayLook{.transfer = Ramp(uniform(0.1, 0.9)), .weight = uniform(0.2, 1)};
-  }
+  const auto label = [&](const Index3& v) { return std::min(shapes.block.samples<std::uint8_t>()[shapes.block.Offset(v)] / 40, 4); };
+  result.volume.layers.labels = Shared(MakeVolume(geometry, i % 2 == 0 ? ScalarType::kUint8 : ScalarType::kUint16, label));
+  looks.labels = Look(i % 4 < 2 ? LabelMode::kTint : LabelMode::kSurface,
+                      {{kRed, 0.5F}, {kGreen, 1, i % 5 != 0}, {{0, 0, 1}, 0}, {{1, 1, 0}, float(uniform(0, 1))}}, uniform(0, 1));
   SetupOptions options;
   options.view = RandomView(i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, random);
   options.transfer = Ramp(uniform(0.05, 0.9));
@@ -324,18 +271,10 @@ TEST(Layers, AgreeWithTheReference) {
         MakeRayLook(data->Classification(c.setup), c.setup.transfer, c.setup.description, c.setup.camera, c.setup.shading, rate);
     RayLayers layers;
     std::optional<LabelTables> tables;
-    std::optional<RayLook> overlay;
     if (c.setup.looks.labels) {
       layers.labels = &tables.emplace(MakeLabelTables(*c.setup.looks.labels, rate, c.setup.transfer.opacity_distance));
       layers.label_type = layer_pieces[0].labels.type;
       layers.label_samples = layer_pieces[0].labels.samples.get();
-    }
-    if (c.setup.looks.overlay) {
-      const VolumeDescription& description = c.volume.layers.overlay->description;
-      const OverlayLook& of = *c.setup.looks.overlay;
-      layers.overlay = &overlay.emplace(MakeRayLook(Classify(of.transfer, description, of.range), of.transfer, description, c.setup.camera,
-                                                    c.setup.shading, rate / of.weight));
-      layers.overlay_samples = reinterpret_cast<const float*>(layer_pieces[0].overlay.samples.get());
     }
     // Nothing is leapt over.
     EmptyDistances everywhere(pieces[0].cells.counts, std::vector<std::uint8_t>(pieces[0].cells.ranges.size(), 0));
@@ -359,7 +298,7 @@ TEST(Layers, AgreeWithTheReference) {
     const LocalImage expected = marched(MarchTileReference);
     GradientBricks bricks;
     const auto march = [&](const MarchWork& of, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-      return MarchTile(of, tile, bricks, rgba, floats_a_row);
+      return MarchTile(of, tile, {&bricks, 1}, rgba, floats_a_row);
     };
     ForEachTarget([&] { EXPECT_LE(LargestDifference(marched(march), expected), 2e-5F) << "case " << i << ", seed " << kSeed; });
     FrameSetup with_leaps = c.setup;

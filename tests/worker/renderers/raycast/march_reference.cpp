@@ -26,6 +26,19 @@ class ReferenceMarch {
     return sum;
   }
 
+  // What the volume or another field has of a sample.
+  struct Part {
+    double opacity = 0;  // of a step
+    std::array<double, 3> color{};
+  };
+  // A sample of the volume, or of another field whose work this is, lit.
+  Part LitPartAt(const Float3& p, const Float3* face) const {
+    const ValueAndGradient at = SampleAt(p);
+    Part part = PartOf(EntryAt(look_, at.value));
+    Light(face != nullptr ? *face : at.gradient, part);
+    return part;
+  }
+
  private:
   void AddPart(const PixelRay& ray, const RayPart& part, std::array<float, 4>& sum) const {
     const Float3 volume_begin = {-0.5F, -0.5F, -0.5F}, &volume_end = work_.rays->volume_end;
@@ -47,7 +60,7 @@ class ReferenceMarch {
       }
       const bool first = !in_part(k - 1), last = !in_part(k + 1);
       const double before = first ? std::clamp(k - enter, 0.0, 1.0) : 0.5, behind = last ? std::clamp(leave - k, 0.0, 1.0) : 0.5;
-      Add(p, before + behind, float(k) < part.face_end ? &part.face : nullptr, sum);
+      Add(ray, k, before + behind, float(k) < part.face_end ? &part.face : nullptr, sum);
     }
     AddCrossings(crossings, double(kRayEnd), sum);
   }
@@ -161,7 +174,7 @@ class ReferenceMarch {
   }
   float Voxel(std::int32_t x, std::int32_t y, std::int32_t z) const { return float(samples()[IndexOf(x, y, z)]); }
 
-  // `of`: samples of the volume or of its overlay.
+  // `of`: samples of the volume.
   template <class S>
   float Interpolated(const S* of, const Float3& p, const Index3& shift) const {
     const std::int32_t x = std::int32_t(std::floor(p[0])), y = std::int32_t(std::floor(p[1])), z = std::int32_t(std::floor(p[2]));
@@ -172,12 +185,6 @@ class ReferenceMarch {
     };
     return Lerp(w, Lerp(v, row(0, 0), row(1, 0)), Lerp(v, row(0, 1), row(1, 1)));
   }
-
-  // What the volume or its overlay has of a sample.
-  struct Part {
-    double opacity = 0;  // of a step
-    std::array<double, 3> color{};
-  };
 
   // Null: the sample is not finite.
   static const float* EntryAt(const RayLook& look, float sample) {
@@ -190,28 +197,59 @@ class ReferenceMarch {
   }
 
   // `steps`: the length that the sample stands for. `face`: the normal of the cut face that it lies on, or null.
-  void Add(const Float3& p, double steps, const Float3* face, std::array<float, 4>& sum) const {
-    const bool has_whole_weights = !std::is_same_v<T, float> && (look_.phong || !look_.gradient_factors.empty());
-    const ValueAndGradient at =
-        has_whole_weights ? AtWholeWeights(p) : ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)};
-    Part volume = PartOf(EntryAt(look_, at.value)), overlay;
+  void Add(const PixelRay& ray, std::int32_t k, double steps, const Float3* face, std::array<float, 4>& sum) const {
+    const Float3 p = SamplePosition(ray, k);
+    const ValueAndGradient at = SampleAt(p);
+    Part volume = PartOf(EntryAt(look_, at.value));
     Float3 gradient = at.gradient;
     if (!look_.gradient_factors.empty()) {
       volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(gradient), double(look_.step_exponent));
     }
     if (ShowsLabels()) AddLabel(p, volume, gradient);
-    if (work_.layers != nullptr && work_.layers->overlay != nullptr) {
-      const float* const samples_of = work_.layers->overlay_samples;
-      overlay = PartOf(EntryAt(*work_.layers->overlay, Interpolated(samples_of, p, {})));
-      Light(face != nullptr ? *face : GradientAt(samples_of, p), overlay);
+    if (work_.layers != nullptr && work_.layers->fields != nullptr) {
+      Light(face != nullptr ? *face : gradient, volume);
+      return AddMixed(ray, k, steps, face, volume, sum);
     }
-    const double opacity = 1 - (1 - volume.opacity) * (1 - overlay.opacity);
-    if (!(opacity > 0)) return;
+    if (!(volume.opacity > 0)) return;
     Light(face != nullptr ? *face : gradient, volume);
-    const double share = overlay.opacity / (volume.opacity + overlay.opacity);
+    Blend(volume.color, 1 - std::pow(1 - volume.opacity, steps), sum);
+  }
+
+  // The volume's part of a sample and those of other fields.
+  void AddMixed(const PixelRay& ray, std::int32_t k, double steps, const Float3* face, const Part& volume,
+                std::array<float, 4>& sum) const {
+    double weight = volume.opacity, transmittance = 1 - volume.opacity;
     std::array<double, 3> color{};
-    for (std::size_t c = 0; c < 3; ++c) color.at(c) = (1 - share) * volume.color.at(c) + share * overlay.color.at(c);
-    Blend(color, 1 - std::pow(1 - opacity, steps), sum);
+    for (std::size_t c = 0; c < 3; ++c) color.at(c) = volume.opacity * volume.color.at(c);
+    for (const RayField& field : work_.layers->fields->fields) {
+      const auto by = [](const std::array<Float3, 3>& columns, const Float3& v) {
+        Float3 sum_of{};
+        for (std::size_t i = 0; i < 3; ++i) sum_of.at(i) = v[0] * columns[0].at(i) + v[1] * columns[1].at(i) + v[2] * columns[2].at(i);
+        return sum_of;
+      };
+      PixelRay among = {by(field.map.steps, ray.first), by(field.map.steps, ray.move)};
+      for (std::size_t i = 0; i < 3; ++i) among.first.at(i) += field.map.offset.at(i);
+      const Float3 there = SamplePosition(among, k), face_there = face != nullptr ? by(field.normals, *face) : Float3{};
+      if (!Inside(there, field.map.low, field.map.high)) continue;
+      const MarchWork of_field = {.box = &field.voxels, .look = field.look};
+      const auto [opacity, lit] = VisitScalarType(field.voxels.type, [&]<class S>(const S*) {
+        const auto part = ReferenceMarch<S>(of_field).LitPartAt(there, face != nullptr ? &face_there : nullptr);
+        return std::pair(part.opacity, part.color);
+      });
+      if (!(opacity > 0)) continue;
+      if (field.over) {
+        const double cover = 1 - std::pow(1 - opacity, double(field.steps_a_length));
+        weight *= 1 - cover;
+        for (double& of : color) of *= 1 - cover;
+        transmittance = transmittance > 0 ? std::pow(transmittance, 1 - cover) : 0;
+      }
+      weight += opacity;
+      for (std::size_t c = 0; c < 3; ++c) color.at(c) += opacity * lit.at(c);
+      transmittance *= 1 - opacity;
+    }
+    if (!(weight > 0)) return;
+    for (double& of : color) of /= work_.layers->fields->flat ? 1 - transmittance : weight;
+    Blend(color, 1 - std::pow(transmittance, steps), sum);
   }
 
   // What lies behind `sum`.
@@ -304,6 +342,10 @@ class ReferenceMarch {
     float value;
     Float3 gradient;
   };
+  ValueAndGradient SampleAt(const Float3& p) const {
+    const bool has_whole_weights = !std::is_same_v<T, float> && (look_.phong || !look_.gradient_factors.empty());
+    return has_whole_weights ? AtWholeWeights(p) : ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)};
+  }
   ValueAndGradient AtWholeWeights(const Float3& p) const {
     const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
     const auto split = [&](float weight, std::size_t axis, int side) {

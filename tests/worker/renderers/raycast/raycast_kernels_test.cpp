@@ -61,7 +61,7 @@ struct Scene {
 LocalImage Marched(const Scene& scene, float termination = 0) {
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, scene.camera.width, scene.camera.height});
   GradientBricks bricks;
-  MarchTile(scene.Work(termination), image.bounds, bricks, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
+  MarchTile(scene.Work(termination), image.bounds, {&bricks, 1}, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
   return image;
 }
 LocalImage MarchedByReference(const Scene& scene) {
@@ -255,7 +255,7 @@ TEST(MarchTile, ForgetsBricksWithoutATrace) {
     LocalImage tiled = MakeLocalImage(PixelFormat::kRgba, whole.bounds);
     for (std::int32_t y = 0; y < 64; y += 16) {
       for (std::int32_t x = 0; x < 64; x += 16)
-        MarchTile(scene.Work(), {x, y, x + 16, y + 16}, kept, &tiled.rgba[4 * std::size_t(64 * y + x)], 256);
+        MarchTile(scene.Work(), {x, y, x + 16, y + 16}, {&kept, 1}, &tiled.rgba[4 * std::size_t(64 * y + x)], 256);
     }
     EXPECT_EQ(LargestDifference(tiled, whole), 0);
   }

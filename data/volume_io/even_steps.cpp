@@ -1,4 +1,4 @@
-#include "data/sources/even_steps.h"
+#include "data/volume_io/even_steps.h"
 
 #include <cmath>
 #include <cstddef>

@@ -1,0 +1,69 @@
+// Which fields of its dataset a request shows, at which time, and how: what it says of them, what the dataset says, and what is left over
+// from the values.
+//
+// Pure.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/frame/field_look.h"
+#include "common/frame/frame_request.h"
+#include "common/frame/frame_setup.h"
+#include "common/volume/field_info.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+// A level of a volume.
+struct CoarserVolume {
+  DatasetId dataset = 0;
+  std::shared_ptr<const VolumeSummary> summary;  // never null
+};
+
+// A field that a picture shows beside its volume.
+struct FieldVolume {
+  int number = 0;                                        // of the field
+  std::vector<CoarserVolume> levels;                     // FieldSetup::levels
+  std::shared_ptr<const VolumeSummary> statistics = {};  // ShownFields::statistics
+  std::vector<std::uint32_t> of_volume;                  // FieldSetup::of_volume
+  friend bool operator==(const FieldVolume&, const FieldVolume&) = default;
+};
+
+// The fields that a picture shows.
+struct ShownFields {
+  std::shared_ptr<const DatasetFields> dataset = nullptr;  // null: it has one field, of which nothing is known
+  int volume = 0;                                          // the number of the field that is the picture's volume
+  bool volume_shows = true;                                // FieldNumbers::volume_shows
+  std::vector<FieldVolume> others = {};                    // by ascending numbers
+  // From which transfer functions and ranges are made, so that all times look alike: those of the time that the dataset itself shows. Null:
+  // those of the volume.
+  std::shared_ptr<const VolumeSummary> statistics = nullptr;
+};
+
+// The request with its overlay as what it is: one of the fields.
+FrameRequest WithOverlayAsField(FrameRequest request);
+
+struct FieldNumbers {
+  std::vector<int> numbers;  // ascending. The first one is the picture's volume: a channel, even if the request shows none
+  bool volume_shows = true;  // it shows the first one
+};
+// InvalidArgument: there is no such field, or more than kMaxShownFields show.
+Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFields& dataset);
+
+// The number of the time that the request shows. InvalidArgument: there is no such time, or the dataset does not tell the unit of its
+// times.
+Result<int> TimeToShow(const FrameRequest& request, const DatasetFields& dataset);
+
+// How the request shows a field that the values of `summary` are those of. Blend::kAuto becomes that of the field. `full`: the strongest
+// value is opaque (projections). In a slice all values are, and weak ones are dark. NotFound: no such preset; InvalidArgument: one that has
+// regions.
+Result<FieldLook> LookOf(const FrameRequest& request, const DatasetFields& dataset, int number, const VolumeSummary& summary, bool full);
+
+// Whether the request shows its volume by LookOf, and not by FrameRequest::transfer: it is named, or one of several channels that show, and
+// nothing is said of the transfer function. InvalidArgument: a transfer function is given, but several channels show.
+Result<bool> ShowsAsChannel(const FrameRequest& request, const ShownFields& shown);
+
+}  // namespace slabstream

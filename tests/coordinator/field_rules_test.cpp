@@ -1,0 +1,169 @@
+// What the coordinator does about datasets with several fields and times, told as scripts.
+#include "common/planning/levels.h"
+#include "tests/coordinator/coordinator_script.h"
+
+namespace slabstream {
+namespace {
+
+std::shared_ptr<const DatasetFields> ThreeChannels() {
+  return std::make_shared<const DatasetFields>(
+      DatasetFields{.fields = {{.name = "DAPI"}, {.name = "Actin"}, {.name = "GFP"}, {.name = "overlay", .channel = false, .shown = false}},
+                    .times = {.count = 5}});
+}
+
+SubmitFrame Showing(RequestId request, std::vector<std::string> channels, const std::string& time = "") {
+  SubmitFrame submit = Frame(request);
+  submit.frame.renderer = "raycast";
+  submit.frame.transfer = {};
+  submit.frame.channels = std::move(channels);
+  submit.frame.time = time;
+  return submit;
+}
+
+class FieldRules : public testing::Test {
+ protected:
+  static ScriptConfig Config() {
+    ScriptConfig config = TestConfig();
+    config.datasets = {{"block", DataSource("/named/block.tif", "", {.overlay = "/named/map.nii"})}};
+    return config;
+  }
+  FieldRules() : script(Config()) { script.Join(11, 1); }
+
+  // The end of a load. Each load has voxels of its own.
+  Actions Loaded(const LoadDataset& load) {
+    return script.Step(
+        DatasetLoaded{load.name, load.load, load.load, BlockSummary(), 0, stamp_, IsPart(load.name) ? nullptr : ThreeChannels()});
+  }
+  Actions LoadedAll(std::size_t from = 0) {
+    Actions actions;
+    for (std::size_t i = from; i < script.loads.size(); ++i) CoordinatorScript::Append(actions, Loaded(LoadDataset(script.loads[i])));
+    return NothingChanged(std::move(actions));
+  }
+  Actions NothingChanged(Actions actions) {
+    std::vector<CheckDatasetFiles> looks = Of<CheckDatasetFiles>(actions);
+    for (std::size_t i = 0; i < looks.size(); ++i) {
+      const Actions more = script.Step(DatasetSeen{looks[i].name, looks[i].load, false});
+      for (const CheckDatasetFiles& look : Of<CheckDatasetFiles>(more)) looks.push_back(look);
+      CoordinatorScript::Append(actions, more);
+    }
+    return actions;
+  }
+  std::vector<std::string> LoadedNames(std::size_t from = 0) const {
+    std::vector<std::string> names;
+    for (std::size_t i = from; i < script.loads.size(); ++i) names.push_back(script.loads[i].name);
+    return names;
+  }
+  static std::vector<std::string> Failures(const Actions& actions) {
+    std::vector<std::string> failures;
+    for (const auto& failed : ToClients<FrameFailed>(actions)) failures.push_back(failed.message.status.message());
+    return failures;
+  }
+
+  CoordinatorScript script;
+  std::shared_ptr<const FileStamp> stamp_ = std::make_shared<const FileStamp>();
+};
+
+TEST_F(FieldRules, AFrameShowsAllChannelsOnceTheyAreThere) {
+  script.Client(kClient, Showing(1, {}));
+  EXPECT_THAT(LoadedNames(), ElementsAre("block"));
+  EXPECT_THAT(HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[0])))), IsEmpty());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 1, 0), PartName("block", 2, 0))) << "the overlay is not asked for";
+  EXPECT_EQ(script.loads[1].source.path, "/named/block.tif?channel=1,time=0");
+  EXPECT_THAT(HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[2])))), IsEmpty());
+  const std::vector<GroupAssignment> groups = HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[1]))));
+  ASSERT_THAT(groups, SizeIs(1));
+  const FrameSetup& setup = groups[0].setup;
+  EXPECT_EQ(setup.dataset, script.loads[0].load);
+  ASSERT_THAT(setup.fields, SizeIs(2));
+  EXPECT_EQ(setup.fields[0].levels.at(0).dataset, script.loads[1].load);
+  EXPECT_EQ(setup.fields[1].levels.at(0).dataset, script.loads[2].load);
+  EXPECT_EQ(setup.fields[0].look.blend, Blend::kAdd);
+  EXPECT_NE(setup.transfer.colors, setup.fields[0].look.transfer.colors);
+}
+
+TEST_F(FieldRules, TheFirstChannelThatShowsIsTheVolume) {
+  script.Client(kClient, Showing(1, {"GFP", "1"}));
+  const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 1, 0), PartName("block", 2, 0)));
+  ASSERT_THAT(groups, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.dataset, script.loads[1].load);
+  ASSERT_THAT(groups[0].setup.fields, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.fields[0].levels.at(0).dataset, script.loads[2].load);
+}
+
+TEST_F(FieldRules, AnOverlayCoversTheVolumeAndIsReadFromItsOwnFile) {
+  SubmitFrame submit = Showing(1, {"0"});
+  submit.frame.transfer.choice = "ct-bone";
+  submit.frame.overlay = OverlayChoice{.choice = "hot", .weight = 0.5};
+  script.Client(kClient, submit);
+  const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 3, 0)));
+  EXPECT_EQ(script.loads[1].source.path, "/named/map.nii");
+  ASSERT_THAT(groups, SizeIs(1));
+  ASSERT_THAT(groups[0].setup.fields, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.fields[0].look.blend, Blend::kOver);
+  EXPECT_EQ(groups[0].setup.fields[0].look.weight, 0.5);
+}
+
+TEST_F(FieldRules, AFrameShowsOneTimeOfAllItsFields) {
+  script.Client(kClient, Showing(1, {"0", "2"}, "3"));
+  const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());
+  ASSERT_THAT(LoadedNames(), testing::IsSupersetOf({"block", PartName("block", 0, 3).c_str(), PartName("block", 2, 3).c_str()}));
+  const auto of = [&](const std::string& name) { return std::ranges::find(script.loads, name, &LoadDataset::name); };
+  EXPECT_EQ(of(PartName("block", 2, 3))->source.path, "/named/block.tif?channel=2,time=3");
+  ASSERT_THAT(groups, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.dataset, of(PartName("block", 0, 3))->load);
+  EXPECT_EQ(groups[0].setup.fields.at(0).levels.at(0).dataset, of(PartName("block", 2, 3))->load);
+}
+
+TEST_F(FieldRules, WhatIsNotThereIsRefusedInOneLine) {
+  LoadedAll();
+  const auto refusal = [&](const SubmitFrame& submit) {
+    const std::size_t before = script.loads.size();
+    Actions actions = script.Client(kClient, submit);
+    CoordinatorScript::Append(actions, LoadedAll(before));
+    const std::vector<std::string> failures = Failures(actions);
+    return failures.size() == 1 ? failures[0] : "no refusal";
+  };
+  EXPECT_EQ(refusal(Showing(1, {"DAPY"})),
+            "dataset \"block\" has no field 'DAPY': it has 0 (DAPI), 1 (Actin), 2 (GFP), 3 (overlay); did you mean 'DAPI'?");
+  EXPECT_THAT(refusal(Showing(2, {"7"})), HasSubstr("has no field '7'"));
+  EXPECT_EQ(refusal(Showing(3, {}, "5")), "time is '5', but dataset \"block\" has times 0 to 4");
+  EXPECT_THAT(refusal(Showing(4, {}, "2.5s")), HasSubstr("does not tell when its times were"));
+  EXPECT_THAT(refusal(Showing(5, {}, "soon")), HasSubstr("a number with a unit such as 3.5s, or last"));
+  SubmitFrame transfer = Showing(6, {});
+  transfer.frame.transfer.choice = "ct-bone";
+  EXPECT_THAT(refusal(transfer), HasSubstr("transfer is that of one channel, but 3 of dataset \"block\" show"));
+  SubmitFrame splat = Showing(7, {});
+  splat.frame.renderer = "splat";
+  EXPECT_THAT(refusal(splat), HasSubstr("renderer is 'splat', but a picture of 3 fields needs one of: raycast"));
+}
+
+TEST_F(FieldRules, AFieldThatCannotBeReadFailsTheFrameInOneLineThatNamesIt) {
+  script.Client(kClient, Showing(1, {}));
+  NothingChanged(Loaded(LoadDataset(script.loads[0])));
+  ASSERT_THAT(script.loads, SizeIs(3));
+  const Actions actions =
+      script.Step(DatasetFailed{script.loads[2].name, script.loads[2].load, Status::Unavailable("the store does not answer")});
+  ASSERT_THAT(Failures(actions), SizeIs(1));
+  EXPECT_THAT(Failures(actions)[0], HasSubstr("the store does not answer"));
+}
+
+TEST_F(FieldRules, IfAFileChangesAllFieldsAreReadAnew) {
+  script.Client(kClient, Showing(1, {}));
+  script.AnswerAll(LoadedAll());
+  const std::size_t before = script.loads.size();
+  const Actions looks = script.Client(kClient, Showing(2, {}));
+  ASSERT_FALSE(Of<CheckDatasetFiles>(looks).empty());
+  const CheckDatasetFiles look = Of<CheckDatasetFiles>(looks).back();
+  EXPECT_TRUE(IsPart(look.name));
+  script.Step(DatasetSeen{look.name, look.load, true});
+  ASSERT_THAT(LoadedNames(before), ElementsAre("block"));
+  const std::vector<GroupAssignment> groups = HandedOut(LoadedAll(before));
+  EXPECT_THAT(LoadedNames(before), ElementsAre("block", PartName("block", 1, 0), PartName("block", 2, 0)));
+  ASSERT_THAT(groups, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.dataset, script.loads[before].load);
+}
+
+}  // namespace
+}  // namespace slabstream

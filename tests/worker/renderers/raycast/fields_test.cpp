@@ -1,0 +1,335 @@
+// Several fields in the ray caster: formulas, the kernel against its reference, and that neither boxes nor the order of channels matter.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "common/kernels/combine.h"
+#include "tests/support/renderers.h"
+#include "tests/support/simd_targets.h"
+#include "tests/worker/renderers/raycast/march_reference.h"
+#include "tests/worker/renderers/render_support.h"
+#include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/shown_fields.h"
+
+namespace slabstream {
+namespace {
+
+using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
+
+const VolumeGeometry kGeometry = {{24, 20, 22}, {1, 1, 1}, {}};
+
+// Volumes of a picture: the frame's, and those of FrameSetup::fields.
+struct Scene {
+  Volume volume;
+  std::vector<Volume> fields;
+  FrameSetup setup;
+
+  void Show(Volume field, FieldLook look) {
+    look.range = Summarize(field).range;
+    setup.fields.push_back({.levels = {{DatasetId(2 + fields.size()), field.description, {}}}, .of_volume = {0}, .look = std::move(look)});
+    fields.push_back(std::move(field));
+  }
+};
+Scene MakeScene(Volume volume, SetupOptions options, double rate = 1) {
+  FrameSetup setup = RaycastSetup(volume, std::move(options), rate);
+  return {std::move(volume), {}, std::move(setup)};
+}
+
+// The voxels of a box and of the fields there.
+struct Boxes {
+  Boxes(const Scene& scene, const Box& box) : volume(CutBox(scene.volume, PaddedBox(box, scene.setup))) {
+    std::vector<BoxData*> all;
+    for (std::size_t i = 0; i < scene.fields.size(); ++i) {
+      const Box there = PaddedBox(box, scene.setup, scene.setup.fields[i]);
+      fields.push_back(there.empty() ? nullptr : CutBox(scene.fields[i], there));
+      all.push_back(fields.back().get());
+    }
+    volume->SetFields(std::move(all));
+  }
+  std::unique_ptr<BoxData> volume;
+  std::vector<std::unique_ptr<BoxData>> fields;
+};
+
+LocalImage Rendered(const Scene& scene, const Box& box) {
+  const Boxes boxes(scene, box);
+  RankReport report;
+  return MakeRenderer(*scene.setup.renderer)->Render(*boxes.volume, box, scene.setup, {}, RenderControl(), report).value();
+}
+LocalImage Rendered(const Scene& scene) { return Rendered(scene, scene.volume.description.geometry.bounds()); }
+
+SetupOptions Unlit(double opacity, Rgb color) {
+  SetupOptions options;
+  options.shading.model = ShadingModel::kNone;
+  options.transfer = Uniform(opacity, color);
+  return options;
+}
+
+const Rgb kRed = {1, 0, 0}, kGreen = {0, 1, 0};
+
+// ---- formulas: a block of each field fills the picture, so that the mixture is one material
+
+Rgb StraightOf(const std::array<float, 4>& pixel) { return {pixel[0] / pixel[3], pixel[1] / pixel[3], pixel[2] / pixel[3]}; }
+
+// As one material of these colours and this opacity of a voxel length.
+void ExpectMaterial(const Scene& scene, double opacity, Rgb color) {
+  SetupOptions options = Unlit(opacity, color);
+  const LocalImage image = Rendered(scene);
+  Scene alone = MakeScene(scene.volume, options);
+  alone.setup.camera = scene.setup.camera;
+  EXPECT_LT(LargestDifference(image, Rendered(alone)), 1e-4F) << opacity << " " << color.r << " " << color.g;
+}
+
+TEST(Fields, ThatAddHaveTheirDensitiesAndMeanColour) {
+  constexpr double kA = 0.3, kB = 0.2, kWeight = 0.6;
+  Scene scene = MakeScene(MakeBlock(kGeometry), Unlit(kA, kRed));
+  scene.Show(MakeBlock(kGeometry), {.transfer = Uniform(kB, kGreen), .range = {}, .weight = kWeight});
+  const double b = 1 - std::pow(1 - kB, kWeight);
+  ExpectMaterial(scene, 1 - (1 - kA) * (1 - b), {float(kA / (kA + b)), float(b / (kA + b)), 0});
+}
+
+TEST(Fields, ThatCoverThinTheOthers) {
+  constexpr double kA = 0.3, kB = 0.6;
+  Scene scene = MakeScene(MakeBlock(kGeometry), Unlit(kA, kRed));
+  scene.Show(MakeBlock(kGeometry), {.transfer = Uniform(kB, kGreen), .range = {}, .blend = Blend::kOver});
+  const double below = kA * (1 - kB);
+  ExpectMaterial(scene, 1 - std::pow(1 - kA, 1 - kB) * (1 - kB), {float(below / (below + kB)), float(kB / (below + kB)), 0});
+  scene.setup.fields[0].look.transfer = Uniform(1, kGreen);
+  ExpectMaterial(scene, 1, kGreen);
+}
+
+TEST(Fields, InASliceAddTheirLight) {
+  constexpr double kA = 1, kB = 0.75;
+  Scene scene = MakeScene(MakeBlock(kGeometry), Unlit(kA, kRed));
+  scene.Show(MakeBlock(kGeometry), {.transfer = Uniform(kB, {0, 1, 1}), .range = {}});
+  scene.setup.flat = true;
+  const LocalImage image = Rendered(scene);
+  int pixels = 0;
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const auto pixel = PixelOf(image, x, y);
+      if (pixel[3] < 0.99F) continue;
+      ++pixels;
+      EXPECT_NEAR(StraightOf(pixel).r, 1, 1e-4);
+      EXPECT_NEAR(StraightOf(pixel).g, kB, 1e-4) << "one field does not take light from the other";
+    }
+  }
+  EXPECT_GT(pixels, 100);
+}
+
+TEST(Fields, ShowTheVolumeAsItIsWhereTheyHaveNothing) {
+  SetupOptions options;
+  Scene scene = MakeScene(MakeBlobs(kGeometry, ScalarType::kUint16, 3), options);
+  const LocalImage alone = Rendered(scene);
+  const auto nothing = [](const Index3&) { return std::numeric_limits<double>::quiet_NaN(); };
+  scene.Show(MakeVolume(kGeometry, ScalarType::kFloat32, nothing), {.transfer = Uniform(1, kGreen)});
+  scene.Show(MakeBlobs(kGeometry, ScalarType::kUint8, 4), {.transfer = Uniform(1, kGreen), .range = {}, .weight = 0});
+  EXPECT_LT(LargestDifference(Rendered(scene), alone), 1e-5F);
+}
+
+TEST(Fields, StandByThemselves) {
+  Scene scene = MakeScene(MakeBlobs(kGeometry, ScalarType::kUint8, 3), {});
+  scene.setup.weight = 0;
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    const Volume field = MakeBlobs(kGeometry, type, 5);
+    scene.setup.fields.clear();
+    scene.fields.clear();
+    scene.Show(field, {.transfer = Ramp(0.4)});
+    SetupOptions options;
+    options.transfer = Ramp(0.4);
+    EXPECT_LT(LargestDifference(Rendered(scene), Rendered(MakeScene(field, options))), 1e-5F);
+  }
+}
+
+// The same matter in a grid whose axes point elsewhere: positions, gradients, lights and spacings are turned with it.
+TEST(Fields, LookTheSameWhicheverWayTheirAxesPoint) {
+  const VolumeGeometry grid = {{24, 20, 22}, {1, 0.8, 1.3}, {}};
+  const Volume field = MakeBlobs(grid, ScalarType::kFloat32, 6);
+  // x' = y, y' = -x, z' = z.
+  VolumeGeometry turned = {{20, 24, 22}, {0.8, 1, 1.3}, {}};
+  turned.orientation.axes = {Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}};
+  turned.orientation.origin = {23, 0, 0};
+  const Volume same = MakeVolume(turned, ScalarType::kFloat32, [&](const Index3& v) {
+    return double(field.block.samples<float>()[field.block.Offset({23 - v.y, v.x, v.z})]);
+  });
+  SetupOptions options;
+  options.view.azimuth_degrees = 33;
+  options.view.elevation_degrees = 20;
+  options.shading.lights = {{1, 2, 3}, {-1, 0.3, -0.2}};
+  options.clipping.planes = {{{1, 0.5, 0.2}, 0.3}};
+  Scene scene = MakeScene(MakeVolume(grid, ScalarType::kUint8, [](const Index3&) { return 0; }), options);
+  scene.Show(field, {.transfer = Ramp(0.6)});
+  const LocalImage expected = Rendered(scene);
+  scene.setup.fields.clear();
+  scene.fields.clear();
+  scene.Show(same, {.transfer = Ramp(0.6)});
+  EXPECT_LT(LargestDifference(Rendered(scene), expected), 1e-4F);
+  EXPECT_GT(PixelOf(expected, 32, 32)[3], 0.1F);
+}
+
+// A coarser level of a field looks as the same level of a volume does.
+TEST(Fields, HaveLevels) {
+  VolumeGeometry coarse = {{12, 10, 11}, {2, 2, 2}, {}};
+  coarse.orientation.origin = {0.5, 0.5, 0.5};
+  const Volume fine = MakeBlobs(kGeometry, ScalarType::kUint16, 3), clear = MakeBlobs(coarse, ScalarType::kUint16, 4),
+               shown = MakeBlobs(coarse, ScalarType::kUint16, 5);
+  SetupOptions options;
+  options.transfer = Ramp(0.4);
+  options.view.azimuth_degrees = 25;
+  const auto rendered = [&](const FrameSetup& setup, const Volume& volume, const Volume* field) {
+    const LevelBox at = {{{0, 0, 0}, {24, 20, 12}}, 1};
+    const auto data = CutBox(volume, PaddedBox(at, setup));
+    std::unique_ptr<BoxData> of_field;
+    if (field != nullptr) {
+      of_field = CutBox(*field, PaddedBox(at, setup, setup.fields[0]));
+      data->SetFields({of_field.get()});
+    }
+    RankReport report;
+    return MakeRenderer(*setup.renderer)->Render(*data, at, setup, {}, RenderControl(), report).value();
+  };
+  Scene scene = MakeScene(fine, options);
+  scene.setup.coarser = {{7, clear.description, {}}};
+  const LocalImage expected = rendered(scene.setup, shown, nullptr);
+  scene.setup.weight = 0;
+  scene.setup.fields.push_back({.levels = {{8, fine.description, {}}, {9, shown.description, {}}},
+                                .of_volume = {0, 1},
+                                .look = {.transfer = options.transfer, .range = scene.setup.range}});
+  EXPECT_LT(LargestDifference(rendered(scene.setup, clear, &shown), expected), 1e-5F);
+  EXPECT_GT(PixelOf(expected, 32, 32)[3], 0.1F);
+}
+
+TEST(Fields, AddInAnyOrder) {
+  constexpr unsigned kSeed = 71;
+  std::mt19937 random(kSeed);
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    SetupOptions options;
+    options.view = RandomView(Projection::kPerspective, random);
+    options.transfer = Ramp(0.3);
+    Scene scene = MakeScene(MakeBlobs(kGeometry, type, 1), options, 1.5);
+    scene.setup.weight = 0.7;
+    for (unsigned i = 2; i < 5; ++i) {
+      TransferFunction transfer = Ramp(0.1 * i);
+      transfer.colors = {{0, {float(i) / 5, 0.5, 1}}, {200, {1, float(i) / 6, 0}}};
+      scene.Show(MakeBlobs(kGeometry, type, i), {.transfer = transfer, .range = {}, .weight = 1.0 / i});
+    }
+    const LocalImage expected = Rendered(scene);
+    Scene exchanged = scene;
+    FieldLook& other = exchanged.setup.fields[1].look;
+    std::swap(exchanged.volume, exchanged.fields[1]);
+    std::swap(exchanged.setup.transfer, other.transfer);
+    std::swap(exchanged.setup.range, other.range);
+    std::swap(exchanged.setup.weight, other.weight);
+    std::swap(exchanged.setup.fields[0], exchanged.setup.fields[2]);
+    std::swap(exchanged.fields[0], exchanged.fields[2]);
+    EXPECT_LT(LargestDifference(Rendered(exchanged), expected), 1e-5F) << "type " << int(type) << ", seed " << kSeed;
+  }
+}
+
+// ---- any fields, boxes and instruction set
+
+Vec3 Unit(const Vec3& v) { return (1 / std::sqrt(Dot(v, v))) * v; }
+
+Scene RandomScene(unsigned seed, int i) {
+  std::mt19937 random(seed + unsigned(i));
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto number = [&](int least, int most) { return std::uniform_int_distribution<int>(least, most)(random); };
+  const VolumeGeometry geometry = {{23, 19, 27}, {1, 0.7, 1.4}, {}};
+  SetupOptions options;
+  options.view = RandomView(i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, random);
+  options.transfer = Ramp(uniform(0.05, 0.9));
+  if (i % 5 == 2) options.transfer.isosurfaces = {{60, {1, 1, 1}, 0.5}};
+  if (i % 5 == 4) options.transfer.gradient_opacities = {{0, 0.2}, {30, 1}};
+  if (i % 4 == 1) options.clipping = RandomClipping(geometry, random);
+  if (i % 7 == 3) options.shading.model = ShadingModel::kNone;
+  if (i % 3 == 1) options.shading.lights = {{1, 2, 3}, {-1, 0.3, -0.2}};
+  options.size = {45, 38};
+  Scene scene = MakeScene(MakeBlobs(geometry, ScalarType(1 + i % 3), unsigned(i)), options, i % 4 == 1 ? 2.5 : 1);
+  scene.setup.weight = uniform(0.3, 1);
+  scene.setup.flat = i % 6 == 5;
+  for (int field = number(1, 3); field > 0; --field) {
+    VolumeGeometry grid = geometry;
+    if (number(0, 2) != 0) {
+      grid.size = {number(5, 30), number(5, 30), number(5, 30)};
+      grid.spacing = {uniform(0.4, 2), uniform(0.4, 2), uniform(0.4, 2)};
+      const Vec3 x = Unit({uniform(-1, 1), uniform(-1, 1), uniform(0.1, 1)}), z = Unit(Cross(x, Vec3{uniform(-1, 1), 1, 0.3}));
+      grid.orientation.axes = {x, Cross(z, x), z};
+      // Its middle lies somewhere in the volume.
+      grid.orientation.origin =
+          Vec3{uniform(0, 22), uniform(0, 14), uniform(0, 36)} - grid.orientation.ToWorld(0.5 * grid.spacing * ToVec3(grid.size));
+    }
+    Volume volume = MakeBlobs(grid, ScalarType(number(1, 3)), unsigned(i) + 100 * unsigned(field));
+    if (volume.description.type == ScalarType::kFloat32) {
+      volume.block.samples<float>()[volume.block.box.voxel_count() / 2] = std::numeric_limits<float>::quiet_NaN();
+    }
+    scene.Show(std::move(volume), {.transfer = Ramp(uniform(0.05, 0.9)),
+                                   .range = {},
+                                   .weight = uniform(0.2, 1),
+                                   .blend = number(0, 1) == 0 ? Blend::kAdd : Blend::kOver});
+  }
+  return scene;
+}
+
+TEST(Fields, DoNotDependOnBoxes) {
+  constexpr unsigned kSeed = 330;
+  std::mt19937 random(kSeed);
+  for (int i = 0; i < 16; ++i) {
+    const Scene scene = RandomScene(kSeed, i);
+    const Partition partition = CutAtRandom(scene.volume.description.geometry.bounds(), 2 + i % 5, random);
+    LocalImage frame = MakeLocalImage(scene.setup.format, {});
+    for (const BoxId id : VisibilityOrder(partition, scene.setup.camera)) {
+      Combine(frame, Rendered(scene, partition.boxes()[id]), Side::kBack);
+    }
+    EXPECT_LE(LargestDifference(frame, Rendered(scene)), 5e-6F) << "case " << i << ", seed " << kSeed;
+  }
+}
+
+// Twice as far from it as one field: covering takes two powers a sample.
+TEST(Fields, AgreeWithTheReference) {
+  constexpr unsigned kSeed = 57;
+  for (int i = 0; i < 16; ++i) {
+    const Scene scene = RandomScene(kSeed, i);
+    const FrameSetup& setup = scene.setup;
+    const Box whole = scene.volume.block.box;
+    const double rate = setup.parameters[0];
+    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, rate, setup.clip);
+    const Boxes boxes(scene, whole);
+    const RayPiece& piece = boxes.volume->CacheOf<RayVolume>().PiecesOf(*boxes.volume).front();
+    const RayLook look = MakeRayLook(boxes.volume->Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading,
+                                     rate / setup.weight);
+    // Nothing is leapt over.
+    EmptyDistances everywhere(piece.cells.counts, std::vector<std::uint8_t>(piece.cells.ranges.size(), 0));
+    everywhere.Find((1U << kOctants) - 1);
+    const std::vector<std::int32_t> surface_cells(2 * piece.cells.ranges.size(), -1);
+    const std::vector<std::uint16_t> all_shown(piece.cells.ranges.size() + 1, 0xFFFF);
+    const Result<ShownFields> shown = ShownFields::Make(*boxes.volume, whole, setup, rate);
+    ASSERT_TRUE(shown.ok());
+    const std::vector<RayField> ray_fields = shown->Of(piece);
+    const RayFields fields = {ray_fields, all_shown.data(), setup.flat};
+    const RayLayers layers = {.fields = &fields};
+    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, WholeBox(whole), WholeBox(whole), rays, setup.camera);
+    const MarchWork work = {.rays = &rays,
+                            .box = &box,
+                            .look = &look,
+                            .to_samples = &everywhere,
+                            .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
+                            .surface_cells = surface_cells.data(),
+                            .layers = &layers};
+    const PixelBounds all = {0, 0, setup.camera.width, setup.camera.height};
+    const auto marched = [&](auto&& marcher) {
+      LocalImage image = MakeLocalImage(PixelFormat::kRgba, all);
+      marcher(work, all, image.rgba.data(), 4 * std::size_t(all.width()));
+      return image;
+    };
+    const LocalImage expected = marched(MarchTileReference);
+    std::vector<GradientBricks> bricks(1 + ray_fields.size());
+    const auto march = [&](const MarchWork& of, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
+      return MarchTile(of, tile, bricks, rgba, floats_a_row);
+    };
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(marched(march), expected), 4e-5F) << "case " << i << ", seed " << kSeed; });
+    EXPECT_LE(LargestDifference(Rendered(scene), expected), 4e-5F) << "leaps change case " << i;
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,138 @@
+#include "worker/renderers/raycast/shown_fields.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/parallel/parallel.h"
+#include "worker/renderers/raycast/empty_distance.h"
+
+namespace slabstream {
+namespace {
+
+// The inverse of the map's transpose, which maps normals, by its columns.
+std::array<Float3, 3> NormalsOf(const AffineMap& map) {
+  const auto& [x, y, z] = map.steps;
+  const Vec3 yz = Cross(y, z);
+  const double volume = Dot(x, yz);
+  return {ToFloat3((1 / volume) * yz), ToFloat3((1 / volume) * Cross(z, x)), ToFloat3((1 / volume) * Cross(x, y))};
+}
+
+// As a field's axes see the view and the lights.
+RayLook LookOf(const FieldLook& field, const VolumeDescription& description, const FrameSetup& setup, double samples_per_voxel) {
+  const auto turned = [&](const Vec3& direction) {
+    return description.geometry.orientation.FromWorld(setup.description.geometry.orientation.ToWorld(direction));
+  };
+  Camera camera = setup.camera;
+  camera.view_direction = turned(camera.view_direction);
+  Shading shading = setup.shading;
+  for (Vec3& light : shading.lights) light = turned(light);
+  // Weight w: the opacity of a step is 1 - (1 - a)^w, as of a step w times as long.
+  return MakeRayLook(Classify(field.transfer, description, field.range), field.transfer, description, camera, shading,
+                     samples_per_voxel / field.weight, description.geometry.spacing);
+}
+
+}  // namespace
+
+Result<ShownFields> ShownFields::Make(const BoxData& data, const LevelBox& at, const FrameSetup& setup, double samples_per_voxel) {
+  ShownFields shown;
+  CHECK_EQ(data.fields().size(), setup.fields.size());
+  for (std::size_t i = 0; i < setup.fields.size(); ++i) {
+    BoxData* const voxels = data.fields()[i];
+    const FieldSetup& field = setup.fields[i];
+    if (voxels == nullptr || !(field.look.weight > 0)) continue;
+    const VolumeDescription& description = LevelOf(field, at.level).description;
+    const std::vector<RayPiece>& pieces = voxels->CacheOf<RayVolume>().PiecesOf(*voxels);
+    if (pieces.size() > 1) return TooLargeForRays(i);
+    Field& of = shown.fields_.emplace_back();
+    of.piece = &pieces.front();
+    of.from_level = AffineMapBetween(GeometryOf(setup, at.level), description.geometry);
+    of.look = LookOf(field.look, description, setup, samples_per_voxel);
+    of.at.voxels = BoxOfVoxels(of.piece->voxels, of.piece->cells.counts);
+    of.at.map = MakeFieldMap(at, setup, field);
+    of.at.normals = NormalsOf(of.from_level);
+    of.at.over = field.look.blend == Blend::kOver;
+    of.at.steps_a_length = setup.flat ? 1 : float(samples_per_voxel * field.look.transfer.opacity_distance);
+  }
+  return shown;
+}
+
+bool ShownFields::Field::among_same_voxels(const RayPiece& other) const {
+  return from_level.is_identity() && piece->voxels.box.begin == other.voxels.box.begin;
+}
+
+std::vector<RayField> ShownFields::Of(const RayPiece& piece) const {
+  std::vector<RayField> fields;
+  for (const Field& of : fields_) {
+    RayField& field = fields.emplace_back(of.at);
+    field.look = &of.look;
+    field.among_same_voxels = of.among_same_voxels(piece);
+  }
+  return fields;
+}
+
+std::vector<std::uint16_t> ShownFields::ShownIn(const RayPiece& piece) const {
+  constexpr double kRounding = 1.0 / 64;  // voxels
+  const Index3& counts = piece.cells.counts;
+  std::vector<std::uint16_t> shown(CountIn(counts));
+  for (std::size_t i = 0; i < fields_.size(); ++i) {
+    const Field& field = fields_[i];
+    const MacrocellRanges& ranges = field.piece->cells;
+    const VisibleSamples visible(field.look);
+    const auto bit = std::uint16_t(2 * RayFields::kVolume << i);
+    const std::vector<std::uint8_t> hidden =
+        VisibleCells(ranges, [&](float low, float high) { return visible.AnyMatterBetween(low, high); });
+    const auto any_in = [&](const Index3& begin, const Index3& end) {
+      for (Index3 cell = begin; cell.z < end.z; ++cell.z) {
+        for (cell.y = begin.y; cell.y < end.y; ++cell.y) {
+          const std::uint8_t* const row = &hidden[NumberIn(ranges.counts, {0, cell.y, cell.z})];
+          if (std::any_of(row + begin.x, row + end.x, [](std::uint8_t of) { return of == 0; })) return true;
+        }
+      }
+      return false;
+    };
+    const bool same_cells = field.among_same_voxels(piece);
+    const Vec3 origin = ToVec3(piece.voxels.box.begin) - Vec3{1, 1, 1},
+               field_origin = ToVec3(field.piece->voxels.box.begin) - Vec3{1, 1, 1};
+    ParallelFor(0, counts.z, [&](std::int32_t z) {
+      for (Index3 cell = {0, 0, z}; cell.y < counts.y; ++cell.y) {
+        for (cell.x = 0; cell.x < counts.x; ++cell.x) {
+          Index3 begin = cell, end = cell + Uniform(1);
+          if (!same_cells) {
+            const SampledRegion span =
+                Mapped({origin + double(kCellSide) * ToVec3(cell), origin + double(kCellSide) * ToVec3(end)}, field.from_level);
+            for (const Axis axis : kAxes) {
+              const auto of = [&](double position) {
+                const double number = std::floor((position - field_origin[axis]) / kCellSide);
+                return std::int32_t(std::clamp(number, -1.0, double(ranges.counts[axis])));
+              };
+              begin[axis] = std::max(of(span.low[axis] - kRounding), 0);
+              end[axis] = of(span.high[axis] + kRounding) + 1;
+            }
+          }
+          for (const Axis axis : kAxes) end[axis] = std::min(end[axis], ranges.counts[axis]);
+          const bool empty = begin.x >= end.x || begin.y >= end.y || begin.z >= end.z;
+          if (!empty && any_in(begin, end)) shown[NumberIn(counts, cell)] |= bit;
+        }
+      }
+    });
+  }
+  return shown;
+}
+
+ShownFields::Visible ShownFields::visible() const {
+  Visible visible;
+  for (const Field& of : fields_) {
+    visible.fields_.push_back({VisibleSamples(of.look), of.piece->voxels.samples, of.from_level});
+  }
+  return visible;
+}
+
+bool operator==(const ShownFields::Visible& a, const ShownFields::Visible& b) {
+  return std::ranges::equal(a.fields_, b.fields_, [](const auto& x, const auto& y) {
+    const bool same_voxels = !x.voxels.owner_before(y.voxels) && !y.voxels.owner_before(x.voxels);
+    return same_voxels && x.map == y.map && x.samples == y.samples;
+  });
+}
+
+}  // namespace slabstream
