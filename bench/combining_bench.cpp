@@ -50,7 +50,7 @@ struct Case {
   bool sparse = false;
   std::string link;
   ColorCoding color = ColorCoding::kFloat32;  // of the pixels sent
-  Compression compression = Compression::kAuto;
+  LinkCompression compression = LinkCompression::kAuto;
 };
 
 // Memory that the processes of one case share.
@@ -388,7 +388,7 @@ struct Options {
   std::vector<std::string> images = {"full", "sparse"}, links = {"shared", "tcp"};
   int repeats = 50;
   ColorCoding color = ColorCoding::kFloat32;
-  Compression compression = Compression::kAuto;
+  LinkCompression compression = LinkCompression::kAuto;
 };
 
 // A case at a time, in a process of its own.
@@ -424,7 +424,7 @@ void AddOptions(const Command& app, Options& options) {
   AddChoice<ColorCoding, 3>(app, "--color", options.color, {"float32", "half", "fixed16"},
                             {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16},
                             "Coding of colours that are sent: float32, half or fixed16");
-  const auto compression = [](const std::string&, const std::string& text) -> Result<Compression> {
+  const auto compression = [](const std::string&, const std::string& text) -> Result<LinkCompression> {
     if (const auto parsed = ParseCompression(text)) return *parsed;
     return Status::InvalidArgument(fmt::format("--compress is '{}', but must be auto, on or off", text));
   };

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that every file includes only headers of targets that its own target links, and that renderers do not link each other.
+"""Checks that every file includes only headers of targets that its own target links, that renderers do not link each other, and that no
+two headers define types of one name in one namespace, which a program that links both would mix up.
 
     check_includes.py ROOT TARGETS
 
@@ -23,6 +24,8 @@ SEALED = {
     "tbb": "slabstream_parallel",
 }
 SEALED_INCLUDE = re.compile(rf'\s*#\s*include\s*<(({"|".join(SEALED)})[/.][^>]*)>')
+NAMESPACE = re.compile(r"namespace (\S+) {")
+TYPE = re.compile(r"(?:class|struct|enum class) ([A-Z]\w*)\b(?!::|;)")
 GENERATED = "slabstream/v1/"  # headers made from the folder proto
 
 
@@ -95,8 +98,21 @@ class Check:
                 if halves[link].renderer() != target.renderer():
                     yield f"{target.folder}: {name} links {link}, which is of another renderer"
 
+    def repeated_types(self):
+        first = {}
+        for file in (file for file in self.files if file.suffix == ".h" and file.parts[0] not in ("tests", "bench")):
+            within = []
+            for line in (self.root / file).read_text().splitlines():
+                if namespace := NAMESPACE.match(line):
+                    within.append(namespace.group(1))
+                elif found := TYPE.match(line):
+                    name = "::".join((*within, found.group(1)))
+                    if first.setdefault(name, file) != file:
+                        yield f"{file}: {name} is a type of {first[name]}, too"
+
     def violations(self):
         yield from self.linked_renderers()
+        yield from self.repeated_types()
         yield from self.sealed()
         shared = {text for file in self.files for _, text, of in self.includes(file) if not self.owners(file) & of}
         for file in self.files:

@@ -38,7 +38,7 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
   ViewMessage view;
   value.Fields({{"type", ignore},
                 {"seq", [&](const JsonValue& v) { view.seq = Sequence(v); }},
-                {"picture", [&](const JsonValue& v) { view.kind = v.OneOf(kKinds) == 0 ? PictureKind::kRender : PictureKind::kSlice; }},
+                {"picture", [&](const JsonValue& v) { view.kind = v.OneOf(kKinds) == 0 ? PagePicture::kRender : PagePicture::kSlice; }},
                 {"timeline", [&](const JsonValue& v) { view.timeline = v.Boolean(); }},
                 {"options", ignore}});
   (void)value.At("seq");
@@ -50,9 +50,9 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
   return PageMessage(std::move(view));
 }
 
-Result<PictureJob> MakePictureJob(PictureKind kind, const PictureFields& fields) {
+Result<PictureJob> MakePictureJob(PagePicture kind, const PictureFields& fields) {
   PictureJob job;
-  if (kind == PictureKind::kSlice) {
+  if (kind == PagePicture::kSlice) {
     const Result<SliceRequest> slice = ParseSliceFields(fields);
     if (!slice.ok()) return slice.status();
     Result<std::vector<FrameRequest>> frames = FramesOf(*slice);

@@ -13,12 +13,12 @@ namespace slabstream {
 inline constexpr std::size_t kMaxPageMessageBytes = std::size_t{1} << 20;
 inline constexpr std::uint64_t kMaxSequence = std::uint64_t{1} << 53;  // whole numbers up to this are exact in JavaScript
 
-enum class PictureKind : std::uint8_t { kRender = 1, kSlice = 2 };
+enum class PagePicture : std::uint8_t { kRender = 1, kSlice = 2 };
 
 // A view to be shown. Its options are checked when it is rendered, because most views are overtaken before that.
 struct ViewMessage {
   std::uint64_t seq = 0;  // [1, kMaxSequence]
-  PictureKind kind = PictureKind::kRender;
+  PagePicture kind = PagePicture::kRender;
   bool timeline = false;
   PictureFields options;
 };
@@ -40,6 +40,6 @@ struct PictureJob {
   PictureFormat format;
 };
 // InvalidArgument: as ParseRenderFields.
-Result<PictureJob> MakePictureJob(PictureKind kind, const PictureFields& fields);
+Result<PictureJob> MakePictureJob(PagePicture kind, const PictureFields& fields);
 
 }  // namespace slabstream

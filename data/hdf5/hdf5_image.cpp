@@ -74,7 +74,7 @@ Result<ImageDescription> Described(Hdf5File& file, const Hdf5Dataset& dataset) {
 }
 
 // The volume of the chosen axes as RawHeader has it: its stored axes are the dataset's x, y and z.
-RawHeader HeaderOf(const ImageDescription& image, const AxisChoice& choice, const std::vector<std::uint64_t>& sizes) {
+RawHeader HeaderOf(const ImageDescription& image, const ChosenAxes& choice, const std::vector<std::uint64_t>& sizes) {
   RawHeader header{.size = {1, 1, 1}, .world = image.world, .origin = image.origin, .matrix = "the directions of its axes"};
   std::array<const ImageAxis*, 3> axes{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -115,7 +115,7 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(named, names, options);
   if (!kinds.ok()) return kinds.status();
   const std::vector<std::uint64_t> sizes = (*dataset)->size();
-  const Result<AxisChoice> choice = ChooseAxes(named, *kinds, sizes, options);
+  const Result<ChosenAxes> choice = ChooseAxes(named, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   if (choice->axes[0] < 0 || choice->axes[1] < 0) return Status::InvalidArgument(named + " has no axes x and y");
   const Result<WorldPlacement> placed = PlaceInWorld(HeaderOf(*image, *choice, sizes), named);

@@ -220,7 +220,7 @@ class Container {
     if (!names.ok()) return names.status();
     const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(NameOf(node.path), *names, options);
     if (!kinds.ok()) return kinds.status();
-    const Result<AxisChoice> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
+    const Result<ChosenAxes> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
     if (!choice.ok()) return choice.status();
     choice->Describe(pyramid.info);
     pyramid.info.times = TimesOf(node.field(), group.field(), choice->times);

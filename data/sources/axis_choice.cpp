@@ -15,7 +15,7 @@ Status Wrong(const std::string& array, const std::string& why) { return Status::
 
 }  // namespace
 
-void AxisChoice::Describe(SourceInfo& info) const {
+void ChosenAxes::Describe(SourceInfo& info) const {
   info.times.count = times;
   info.time = time;
   info.channel = channel;
@@ -45,9 +45,9 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
   return kinds;
 }
 
-Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
+Result<ChosenAxes> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
                               const ReadOptions& options, std::vector<FieldInfo> channels) {
-  AxisChoice choice{.at = std::vector<std::uint64_t>(kinds.size(), 0)};
+  ChosenAxes choice{.at = std::vector<std::uint64_t>(kinds.size(), 0)};
   std::uint64_t times = 1, channel_count = 1;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     switch (kinds[axis]) {

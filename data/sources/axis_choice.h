@@ -15,7 +15,7 @@
 
 namespace slabstream {
 
-struct AxisChoice {
+struct ChosenAxes {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
   std::vector<FieldInfo> channels = {};    // at least one
@@ -31,7 +31,7 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 
 // `sizes`: of each axis. `channels`: what is said of the first ones. InvalidArgument, naming `array`: no time is taken although there are
 // several; an option takes what there is not; an axis that is none of the known ones has several indices; too many channels.
-Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
+Result<ChosenAxes> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
                               const ReadOptions& options, std::vector<FieldInfo> channels = {});
 
 }  // namespace slabstream

@@ -99,7 +99,7 @@ Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& conte
 
 // Spacing, origin, unit and times by coordinates that lie beside the array.
 Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
-                          const std::vector<AxisKind>& kinds, const AxisChoice& choice, const std::vector<std::uint64_t>& sizes,
+                          const std::vector<AxisKind>& kinds, const ChosenAxes& choice, const std::vector<std::uint64_t>& sizes,
                           Pyramid& pyramid) {
   const std::size_t slash = node.path.rfind('/');
   if (node.path.empty()) return Status::Ok();
@@ -191,7 +191,7 @@ Status UnpackValues(const ZarrNode& node, ZarrArray& array, Pyramid& pyramid) {
 
 }  // namespace
 
-PyramidLevel LevelOf(const ZarrArray& array, const AxisChoice& choice) {
+PyramidLevel LevelOf(const ZarrArray& array, const ChosenAxes& choice) {
   PyramidLevel level{.array = array.array};
   for (const std::size_t axis : array.from) level.at.push_back(choice.at[axis]);
   for (std::size_t i = 0; i < level.axes.size(); ++i) {
@@ -216,7 +216,7 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(name, *names, options);
   if (!kinds.ok()) return kinds.status();
   const std::vector<std::uint64_t> sizes = SizesInMetadata(*array);
-  const Result<AxisChoice> choice = ChooseAxes(name, *kinds, sizes, options);
+  const Result<ChosenAxes> choice = ChooseAxes(name, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   Pyramid pyramid;
   pyramid.info.format = fmt::format("Zarr {}", node.version);

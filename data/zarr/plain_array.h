@@ -23,7 +23,7 @@ namespace slabstream::zarr {
 Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options);
 
 // A level of the axes of the metadata, as those of the array.
-PyramidLevel LevelOf(const ZarrArray& array, const AxisChoice& choice);
+PyramidLevel LevelOf(const ZarrArray& array, const ChosenAxes& choice);
 std::vector<std::uint64_t> SizesInMetadata(const ZarrArray& array);
 
 }  // namespace slabstream::zarr

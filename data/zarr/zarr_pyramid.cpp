@@ -53,7 +53,7 @@ struct CommonUnit {
   std::optional<LengthUnit> unit;
   Vec3 factor = {1, 1, 1};
 };
-CommonUnit UnitOf(const OmeImage& image, const AxisChoice& choice) {
+CommonUnit UnitOf(const OmeImage& image, const ChosenAxes& choice) {
   CommonUnit common{image.axes[std::size_t(choice.axes[0])].unit};
   for (const Axis axis : kAxes) {
     const int number = choice.axes[std::size_t(axis)];
@@ -66,7 +66,7 @@ CommonUnit UnitOf(const OmeImage& image, const AxisChoice& choice) {
 }
 
 // Where the voxels of the levels are.
-void PlaceLevels(const OmeImage& image, const AxisChoice& choice, const std::vector<std::vector<std::uint64_t>>& sizes, Pyramid& pyramid) {
+void PlaceLevels(const OmeImage& image, const ChosenAxes& choice, const std::vector<std::vector<std::uint64_t>>& sizes, Pyramid& pyramid) {
   const CommonUnit common = UnitOf(image, choice);
   pyramid.orientation.unit = common.unit;
   for (std::size_t i = 0; i < image.levels.size(); ++i) {
@@ -148,7 +148,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   for (const OmeAxis& axis : image->axes) kinds.push_back(axis.kind);
 
   Pyramid pyramid;
-  AxisChoice choice;
+  ChosenAxes choice;
   std::vector<std::vector<std::uint64_t>> sizes;
   std::vector<NodeReading> arrays;
   for (const OmeLevel& level : image->levels) arrays.emplace_back(*context.store, Join(node.path, level.path));
@@ -164,7 +164,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
       return Status::InvalidArgument(
           fmt::format("{}: has {} axes, must have {} as its image", array_name, sizes.back().size(), kinds.size()));
     }
-    const Result<AxisChoice> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, image->channels);
+    const Result<ChosenAxes> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, image->channels);
     if (!chosen.ok()) return chosen.status();
     if (sizes.size() == 1) choice = *chosen;
     pyramid.levels.push_back(LevelOf(*array, *chosen));

@@ -49,7 +49,7 @@ Trial HostTrial() {
     MachineModel machine = OrThrow(CalibrateThisHost(1));
     // Between hosts pixels travel in messages, instead of being lent. Hosts have one thread for it.
     TaskArena one_thread(1);
-    machine.combining = one_thread.Run([] { return MeasureCombining(Transfer::kMessage); });
+    machine.combining = one_thread.Run([] { return MeasureCombining(ImageTransfer::kMessage); });
     Json numbers = Json::object();
     for (const Found& number : kNumbers) numbers[number.name] = number.of(machine);
     return numbers;

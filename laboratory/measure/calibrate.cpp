@@ -10,7 +10,7 @@ namespace slabstream {
 
 MachineModel ThisHost(int workers) {
   MachineModel machine;
-  machine.combining = MeasureCombining(Transfer::kLent);
+  machine.combining = MeasureCombining(ImageTransfer::kLent);
   machine.link = {Contention::kNone, 0, 1e12};  // pixels stay where they are
   // The wake-ups to and from the coordinator include its work.
   machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;

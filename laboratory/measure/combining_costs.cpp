@@ -56,7 +56,7 @@ double MedianSeconds(Prepare&& prepare, Work&& work) {
 
 }  // namespace
 
-CombiningCosts MeasureCombining(Transfer transfer, PixelFormat format) {
+CombiningCosts MeasureCombining(ImageTransfer transfer, PixelFormat format) {
   constexpr double kFilled = double(kBounds.width()) * kBounds.height();
   const PixelRange all = {0, std::uint64_t(kSide) * kSide};
   LocalImage full, half, target, other;
@@ -71,7 +71,7 @@ CombiningCosts MeasureCombining(Transfer transfer, PixelFormat format) {
   if (format == PixelFormat::kRgba) {
     costs.hidden_pixel = MedianSeconds(make_pictures, [&] { CHECK(FindHiddenTiles(full, kSide, kSide, 1e-3).empty()); }) / kPixels;
   }
-  if (transfer == Transfer::kLent) {
+  if (transfer == ImageTransfer::kLent) {
     // The sender only finds and describes where rows begin and end.
     costs.lent = true;
     costs.scan_pixel = MedianSeconds(make_pictures, [&] { CHECK(!ViewOf(half, all, kSide).rows.empty()); }) / kPixels;

@@ -7,7 +7,7 @@
 namespace slabstream {
 
 // How the pixels of a partial image travel from one worker to another.
-enum class Transfer {
+enum class ImageTransfer {
   kLent,     // between workers of one host: they stay where they are and are read there
   kMessage,  // between hosts: as runs, in the message
 };
@@ -15,6 +15,6 @@ enum class Transfer {
 // Processor time, medians of several runs on pictures that are full and half empty. As in frames, the pixels are not in this core's caches
 // (incoming ones were written by another core, and rendering has run on this one since), and an image becomes as large as the frame when
 // the first other one is combined into it. The costs of finding hidden tiles are those of colour images; others have none.
-CombiningCosts MeasureCombining(Transfer transfer, PixelFormat format = PixelFormat::kRgba);
+CombiningCosts MeasureCombining(ImageTransfer transfer, PixelFormat format = PixelFormat::kRgba);
 
 }  // namespace slabstream

@@ -199,7 +199,7 @@ MachineModel ChangedMachine(const MachineModel& machine, const ReplayChange& cha
   MachineModel changed = machine;
   if (!change.link) return changed;
   changed.link = *change.link;
-  changed.combining = MeasureCombining(change.link->contention == Contention::kNone ? Transfer::kLent : Transfer::kMessage);
+  changed.combining = MeasureCombining(change.link->contention == Contention::kNone ? ImageTransfer::kLent : ImageTransfer::kMessage);
   return changed;
 }
 

@@ -10,7 +10,7 @@ namespace slabstream {
 namespace {
 
 // Whether the fields are a picture that could be asked for.
-bool Takes(PictureKind kind, const PictureFields& fields) {
+bool Takes(PagePicture kind, const PictureFields& fields) {
   const Result<PictureJob> job = MakePictureJob(kind, fields);
   if (!job.ok()) {
     CheckRefusal(job.status());
@@ -42,8 +42,8 @@ bool DecodeTarget(std::string_view text) {
   }
   CHECK(target->path.starts_with('/'));
   CHECK_LE(target->fields.size(), kMaxPictureFields);
-  bool taken = Takes(PictureKind::kRender, target->fields);
-  taken = Takes(PictureKind::kSlice, target->fields) || taken;
+  bool taken = Takes(PagePicture::kRender, target->fields);
+  taken = Takes(PagePicture::kSlice, target->fields) || taken;
   return taken;
 }
 

@@ -17,7 +17,7 @@ TEST(PageMessageTest, ViewsAndAcknowledgements) {
   ASSERT_TRUE(view.ok()) << view.status().message();
   const auto& message = std::get<ViewMessage>(*view);
   EXPECT_EQ(message.seq, 17U);
-  EXPECT_EQ(message.kind, PictureKind::kRender);
+  EXPECT_EQ(message.kind, PagePicture::kRender);
   const auto job = MakePictureJob(message.kind, message.options);
   ASSERT_TRUE(job.ok()) << job.status().message();
   EXPECT_EQ(job->frames.front().view.azimuth_degrees, 30);

@@ -4,7 +4,7 @@
 namespace slabstream {
 namespace {
 
-WorkerOptions Frames(Compression compression) {
+WorkerOptions Frames(LinkCompression compression) {
   WorkerOptions options;
   options.share_memory = false;
   options.machine.compression = compression;
@@ -13,7 +13,7 @@ WorkerOptions Frames(Compression compression) {
 
 class PackedImagesTest : public WorkerAndPeer {
  protected:
-  PackedImagesTest() : WorkerAndPeer(Frames(Compression::kOn)) {}
+  PackedImagesTest() : WorkerAndPeer(Frames(LinkCompression::kOn)) {}
 };
 
 TEST_F(PackedImagesTest, TheReceiverGetsWhatWasPacked) {
@@ -76,7 +76,7 @@ TEST_F(PackedInputTest, DamageFailsTheGroupAndNothingElse) {
 
 class AcknowledgedImagesTest : public WorkerAndPeer {
  protected:
-  AcknowledgedImagesTest() : WorkerAndPeer(Frames(Compression::kAuto), "tcp://127.0.0.1:*") { peer_scope_ = memory_scope_ + 1; }
+  AcknowledgedImagesTest() : WorkerAndPeer(Frames(LinkCompression::kAuto), "tcp://127.0.0.1:*") { peer_scope_ = memory_scope_ + 1; }
 };
 
 TEST_F(AcknowledgedImagesTest, WithinAHostNothingIsTimedOrPacked) {

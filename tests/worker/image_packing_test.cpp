@@ -41,9 +41,9 @@ TEST(PackingPays, AtItsLimits) {
 }
 
 TEST(ParseCompression, KnowsItsWords) {
-  EXPECT_EQ(ParseCompression("auto"), Compression::kAuto);
-  EXPECT_EQ(ParseCompression("on"), Compression::kOn);
-  EXPECT_EQ(ParseCompression("off"), Compression::kOff);
+  EXPECT_EQ(ParseCompression("auto"), LinkCompression::kAuto);
+  EXPECT_EQ(ParseCompression("on"), LinkCompression::kOn);
+  EXPECT_EQ(ParseCompression("off"), LinkCompression::kOff);
   for (const char* text : {"", "On", "auto ", "zstd", "1"}) EXPECT_EQ(ParseCompression(text), std::nullopt) << text;
 }
 

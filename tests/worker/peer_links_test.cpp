@@ -106,7 +106,7 @@ TEST_F(PeerLinksTest, TimesLinksToOtherHostsOneMessageAtATime) {
 }
 
 TEST_F(PeerLinksTest, TimesNothingThatIsPackedAnywayOrNever) {
-  for (const auto& [compression, rate] : {std::pair(Compression::kOn, 0.0), std::pair(Compression::kOff, LinkRates::kUnknown)}) {
+  for (const auto& [compression, rate] : {std::pair(LinkCompression::kOn, 0.0), std::pair(LinkCompression::kOff, LinkRates::kUnknown)}) {
     WorkerConfig config = OnNetwork();
     config.compression = compression;
     Start(config);

@@ -65,9 +65,9 @@ void PeerLinks::Deliver(SendPartial& send, Time now) {
   const bool on_this_host = config_.memory_scope != 0 && to.memory_scope == config_.memory_scope;
   if (on_this_host && config_.lends_memory && !takes_frames_only_.contains(to.worker)) {
     send.delivery.lend = true;
-  } else if (config_.compression == Compression::kOn) {
+  } else if (config_.compression == LinkCompression::kOn) {
     send.delivery.bytes_per_second = 0;
-  } else if (config_.compression == Compression::kAuto && !on_this_host && IsTcp(to.images_endpoint)) {
+  } else if (config_.compression == LinkCompression::kAuto && !on_this_host && IsTcp(to.images_endpoint)) {
     send.delivery = {.timed = true, .bytes_per_second = rates_.Of(to.worker)};
     send.message.acknowledge = rates_.Ask(to.worker, now);
   }

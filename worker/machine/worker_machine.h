@@ -71,7 +71,7 @@ struct BoxKey {
 
 // The user's choice. kAuto: pack partial images if it pays. kOn: pack all partial images between processes, and pictures for clients. kOff:
 // pack nothing.
-enum class Compression : std::uint8_t { kAuto, kOn, kOff };
+enum class LinkCompression : std::uint8_t { kAuto, kOn, kOff };
 
 struct WorkerConfig {
   Incarnation incarnation = 0;  // random, not 0: of the first registration; later registrations count up from it
@@ -81,7 +81,7 @@ struct WorkerConfig {
   std::string images_key;          // Register::images_key
   std::uint64_t memory_scope = 0;  // Register::memory_scope
   bool lends_memory = false;       // Register::lends_memory
-  Compression compression = Compression::kAuto;
+  LinkCompression compression = LinkCompression::kAuto;
   std::uint32_t threads = 1;                           // render threads, reported to the coordinator
   std::uint64_t memory_bytes = 0;                      // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;  // padded boxes not needed by a current group are dropped, oldest first, above this,

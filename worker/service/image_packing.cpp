@@ -32,10 +32,10 @@ CodecSpeed SampleCodec(std::span<const std::byte> payload) {
 
 }  // namespace
 
-std::optional<Compression> ParseCompression(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, Compression>, 3> kNames = {
-      {{"auto", Compression::kAuto}, {"on", Compression::kOn}, {"off", Compression::kOff}}};
-  const auto found = std::ranges::find(kNames, text, &std::pair<std::string_view, Compression>::first);
+std::optional<LinkCompression> ParseCompression(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, LinkCompression>, 3> kNames = {
+      {{"auto", LinkCompression::kAuto}, {"on", LinkCompression::kOn}, {"off", LinkCompression::kOff}}};
+  const auto found = std::ranges::find(kNames, text, &std::pair<std::string_view, LinkCompression>::first);
   return found == kNames.end() ? std::nullopt : std::optional(found->second);
 }
 

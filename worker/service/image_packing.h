@@ -15,7 +15,7 @@
 namespace slabstream {
 
 // "auto", "on" or "off"; none for any other text.
-std::optional<Compression> ParseCompression(std::string_view text);
+std::optional<LinkCompression> ParseCompression(std::string_view text);
 
 struct CodecSpeed {
   double bytes_per_second = 0;  // unpacked bytes a second, packed and unpacked one after the other

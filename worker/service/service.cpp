@@ -91,7 +91,7 @@ struct WorkerService::Impl {
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
         pictures(service_context, keys ? std::optional(keys->own) : std::nullopt, UnsentShare(options.machine.memory_bytes)),
-        executor(std::in_place, outbox, options.machine.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw,
+        executor(std::in_place, outbox, options.machine.compression == LinkCompression::kOn ? Codec::kZstd : Codec::kRaw,
                  int(options.machine.threads), options.make_renderer, options.task_hook) {}
 
   void Run();

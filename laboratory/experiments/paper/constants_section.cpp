@@ -31,7 +31,7 @@ std::vector<CostSample> SlabsOf(const PaperSetup& setup, const RendererKind* ren
 Trial CombiningTrial(const RendererKind* renderer) {
   const auto run = [renderer]() -> Json {
     TaskArena one_thread(1);
-    const CombiningCosts costs = one_thread.Run([renderer] { return MeasureCombining(Transfer::kMessage, renderer->format()); });
+    const CombiningCosts costs = one_thread.Run([renderer] { return MeasureCombining(ImageTransfer::kMessage, renderer->format()); });
     return {{"seconds", costs.scan_pixel + costs.encode_pixel + costs.combine_pixel}};
   };
   return {{{"what", "combining pixel"}, {"renderer", renderer->name()}}, run, 5};

@@ -15,9 +15,9 @@
 #include "common/parallel/per_thread.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/frame_fields.h"
 #include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
-#include "worker/renderers/raycast/shown_fields.h"
 #include "worker/renderers/raycast/surface_cells.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
@@ -38,12 +38,12 @@ struct Visibility {
 struct VisibleValues {
   VisibleSamples volume;
   std::optional<MatterLabels> labels = {};
-  ShownFields::Visible fields = {};
+  FrameFields::Visible fields = {};
   friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
 // `layers`: of the piece; null if none is shown.
-Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers, const ShownFields& fields) {
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers, const FrameFields& fields) {
   const bool has_surfaces = !visible.volume.isovalues().empty();
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint8_t> with_samples =
@@ -121,7 +121,7 @@ class VisibilityCache : public BoxCache {
  public:
   // By piece.
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
-                                    const ShownLayers& shown, const ShownFields& fields, OctantSet octants) {
+                                    const ShownLayers& shown, const FrameFields& fields, OctantSet octants) {
     VisibleValues visible{.volume = VisibleSamples(look), .fields = fields.visible()};
     if (looks.labels && looks.labels->mode == LabelMode::kSurface) visible.labels.emplace(*looks.labels);
     if (pieces_.empty() || visible_ != visible) {
@@ -190,7 +190,7 @@ class RaycastRenderer : public Renderer {
                                samples_per_voxel / setup.weight, GeometryOf(setup, at.level).spacing);
     look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
     const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
-    const Result<ShownFields> fields = ShownFields::Make(data, at, setup, samples_per_voxel);
+    const Result<FrameFields> fields = FrameFields::Make(data, at, setup, samples_per_voxel);
     if (!fields.ok()) return fields.status();
     const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
                                    setup.clip, setup.parameters.at(1));

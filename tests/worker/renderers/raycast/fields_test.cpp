@@ -11,7 +11,7 @@
 #include "tests/worker/renderers/raycast/march_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
-#include "worker/renderers/raycast/shown_fields.h"
+#include "worker/renderers/raycast/frame_fields.h"
 
 namespace slabstream {
 namespace {
@@ -302,7 +302,7 @@ TEST(Fields, AgreeWithTheReference) {
     everywhere.Find((1U << kOctants) - 1);
     const std::vector<std::int32_t> surface_cells(2 * piece.cells.ranges.size(), -1);
     const std::vector<std::uint16_t> all_shown(piece.cells.ranges.size() + 1, 0xFFFF);
-    const Result<ShownFields> shown = ShownFields::Make(*boxes.volume, whole, setup, rate);
+    const Result<FrameFields> shown = FrameFields::Make(*boxes.volume, whole, setup, rate);
     ASSERT_TRUE(shown.ok());
     const std::vector<RayField> ray_fields = shown->Of(piece);
     const RayFields fields = {ray_fields, all_shown.data(), setup.flat};

@@ -1,4 +1,4 @@
-// ShownFields: what the ray caster needs of the other fields of a frame. Made once a frame.
+// FrameFields: what the ray caster needs of the other fields of a frame. Made once a frame.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace slabstream {
 
-class ShownFields {
+class FrameFields {
  public:
   // `data`: of the box `at`. ResourceExhausted: kernels cannot address the voxels that a field has there. Parallel.
-  static Result<ShownFields> Make(const BoxData& data, const LevelBox& at, const FrameSetup& setup, double samples_per_voxel);
+  static Result<FrameFields> Make(const BoxData& data, const LevelBox& at, const FrameSetup& setup, double samples_per_voxel);
 
   bool empty() const { return fields_.empty(); }
 
@@ -31,7 +31,7 @@ class ShownFields {
     friend bool operator==(const Visible& a, const Visible& b);
 
    private:
-    friend class ShownFields;
+    friend class FrameFields;
     struct Field {
       VisibleSamples samples;
       std::weak_ptr<std::byte[]> voxels;

@@ -1,4 +1,4 @@
-#include "worker/renderers/raycast/shown_fields.h"
+#include "worker/renderers/raycast/frame_fields.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,8 +34,8 @@ RayLook LookOf(const FieldLook& field, const VolumeDescription& description, con
 
 }  // namespace
 
-Result<ShownFields> ShownFields::Make(const BoxData& data, const LevelBox& at, const FrameSetup& setup, double samples_per_voxel) {
-  ShownFields shown;
+Result<FrameFields> FrameFields::Make(const BoxData& data, const LevelBox& at, const FrameSetup& setup, double samples_per_voxel) {
+  FrameFields shown;
   CHECK_EQ(data.fields().size(), setup.fields.size());
   for (std::size_t i = 0; i < setup.fields.size(); ++i) {
     BoxData* const voxels = data.fields()[i];
@@ -57,11 +57,11 @@ Result<ShownFields> ShownFields::Make(const BoxData& data, const LevelBox& at, c
   return shown;
 }
 
-bool ShownFields::Field::among_same_voxels(const RayPiece& other) const {
+bool FrameFields::Field::among_same_voxels(const RayPiece& other) const {
   return from_level.is_identity() && piece->voxels.box.begin == other.voxels.box.begin;
 }
 
-std::vector<RayField> ShownFields::Of(const RayPiece& piece) const {
+std::vector<RayField> FrameFields::Of(const RayPiece& piece) const {
   std::vector<RayField> fields;
   for (const Field& of : fields_) {
     RayField& field = fields.emplace_back(of.at);
@@ -71,7 +71,7 @@ std::vector<RayField> ShownFields::Of(const RayPiece& piece) const {
   return fields;
 }
 
-std::vector<std::uint16_t> ShownFields::ShownIn(const RayPiece& piece) const {
+std::vector<std::uint16_t> FrameFields::ShownIn(const RayPiece& piece) const {
   constexpr double kRounding = 1.0 / 64;  // voxels
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint16_t> shown(CountIn(counts));
@@ -120,7 +120,7 @@ std::vector<std::uint16_t> ShownFields::ShownIn(const RayPiece& piece) const {
   return shown;
 }
 
-ShownFields::Visible ShownFields::visible() const {
+FrameFields::Visible FrameFields::visible() const {
   Visible visible;
   for (const Field& of : fields_) {
     visible.fields_.push_back({VisibleSamples(of.look), of.piece->voxels.samples, of.from_level});
@@ -128,7 +128,7 @@ ShownFields::Visible ShownFields::visible() const {
   return visible;
 }
 
-bool operator==(const ShownFields::Visible& a, const ShownFields::Visible& b) {
+bool operator==(const FrameFields::Visible& a, const FrameFields::Visible& b) {
   return std::ranges::equal(a.fields_, b.fields_, [](const auto& x, const auto& y) {
     const bool same_voxels = !x.voxels.owner_before(y.voxels) && !y.voxels.owner_before(x.voxels);
     return same_voxels && x.map == y.map && x.samples == y.samples;
