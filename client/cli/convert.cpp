@@ -63,7 +63,7 @@ Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& sourc
   if (!opened.ok()) return opened.status();
   Result<LoadedVolume> loaded = ReadVolume(*opened->source, source.path, source.options, true);
   if (loaded.ok()) WarnOfPart(source.path, source.options, loaded->info);
-  if (!loaded.ok()) return AsInput(loaded.status());
+  if (!loaded.ok()) return loaded.status();
   return loaded;
 }
 

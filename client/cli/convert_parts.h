@@ -18,7 +18,7 @@ struct SourceToConvert {
   std::uint64_t memory = 0;  // bytes that it holds
 };
 
-// Errors of opening it (AsInput); InvalidArgument: it has no such level or voxels; the message says which it has.
+// Errors of opening it; InvalidArgument: it has no such level or voxels; the message says which it has.
 Result<SourceToConvert> OpenToConvert(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits);
 
 // Whether `output` ends in .zarr.

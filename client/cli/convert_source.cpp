@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/input_volume.h"
 #include "data/open/open_source.h"
 #include "data/sources/part_source.h"
 
@@ -13,7 +12,7 @@ namespace slabstream {
 
 Result<SourceToConvert> OpenToConvert(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits) {
   Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
-  if (!opened.ok()) return AsInput(opened.status());
+  if (!opened.ok()) return opened.status();
   const SourceInfo& info = (*opened)->info();
   const std::size_t held = info.whole ? CountIn(info.finest().geometry.size) * BytesPerSample(info.exact.type) : 0;
   if (!options.converts_part()) return SourceToConvert{*std::move(opened), held};

@@ -7,7 +7,6 @@
 #include <iostream>
 
 #include "client/cli/byte_progress.h"
-#include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_text.h"
 #include "data/open/read_volume.h"
@@ -67,7 +66,7 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
     return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.output, shown.percent()));
   }
   if (status.code() == StatusCode::kInvalidArgument) return Status::InvalidArgument("OUTPUT " + status.message());
-  if (!status.ok()) return AsInput(status);
+  if (!status.ok()) return status;
   const Index3& size = volume.geometry.size;
   bar.Clear();
   std::cout << fmt::format("wrote {}: OME-Zarr {}, {} x {} x {} voxels\n", options.output, ToString(options.zarr_version), size.x, size.y,

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "client/cli/input_volume.h"
 #include "common/base/printable.h"
 #include "data/volume_io/read_options.h"
 
@@ -41,7 +40,7 @@ Result<std::vector<DicomSeries>> SeriesAt(const std::string& source) {
   if (!parsed.ok()) return parsed.status();
   if (!IsDicom(parsed->path)) return std::vector<DicomSeries>();
   Result<std::vector<DicomSeries>> all = ListDicomSeries(parsed->path);
-  if (!all.ok()) return Printable(AsInput(all.status()));
+  if (!all.ok()) return Printable(all.status());
   return all;
 }
 

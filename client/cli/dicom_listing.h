@@ -9,7 +9,7 @@
 
 namespace slabstream {
 
-// The series that a source names (read_options.h), if it is DICOM; else none. Errors of ListDicomSeries, as bad input (AsInput).
+// The series that a source names (read_options.h), if it is DICOM; else none. Errors of ListDicomSeries.
 Result<std::vector<DicomSeries>> SeriesAt(const std::string& source);
 
 // Whether several of them are volumes, and the source does not say which is meant.

@@ -26,7 +26,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, std::uint64
   const Result<std::shared_ptr<VolumeSource>> opened =
       OpenSource(source.path, source.options,
                  std::make_shared<ReadContext>(ReadContext::Limits{.under_way_bytes = memory / 8, .cache_bytes = memory / 8}));
-  if (!opened.ok()) return AsInput(opened.status());
+  if (!opened.ok()) return opened.status();
   return opened;
 }
 
@@ -63,7 +63,7 @@ Status RunIndex(const IndexingOptions& options) {
     return version.ok() ? file->NameNow(*version, info) : version.status();
   };
   const Result<std::string> name = name_now();
-  if (!name.ok()) return AsInput(name.status());
+  if (!name.ok()) return name.status();
   Result<BrickIndex> index = Begun(*file, *name, info);
   if (!index.ok()) return index.status();
 
@@ -80,7 +80,7 @@ Status RunIndex(const IndexingOptions& options) {
   if (read.code() == StatusCode::kCancelled) {
     return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.source, shown.percent()));
   }
-  if (!read.ok()) return AsInput(read);
+  if (!read.ok()) return read;
   std::size_t bricks = 0;
   for (const BrickRangeList& level : index->levels) bricks += level.size();
   bar.Clear();

@@ -106,7 +106,7 @@ Result<VolumeFacts> FactsOf(const std::string& source) {
   ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
   const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
   Result<ReadableSource> read = ReadSource(DataSource(source, ""), std::uint64_t(kExactBytes), tell);
-  if (!read.ok()) return AsInput(read.status());
+  if (!read.ok()) return read.status();
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     SourceInfo info = opened->source->info();
     if (MayBeRounded(info.exact.type)) info.notes.push_back(RoundingText(info.exact.type));
@@ -417,13 +417,13 @@ Status RunInfo(const InfoOptions& options) {
   const double occupancy = OccupancyOf(*facts->summary, *transfer);
 
   const Result<Layers> layers = ReadLayers(options.layers, facts->file.finest().geometry);
-  if (!layers.ok()) return AsInput(layers.status());
+  if (!layers.ok()) return layers.status();
   std::optional<VolumeSummary> overlay;
   if (!options.layers.overlay.empty()) {
     const Result<SourceText> text = ParseSourceText(options.layers.overlay);
     if (!text.ok()) return text.status();
     const Result<LoadedVolume> read = ReadVolume(text->path, text->options);
-    if (!read.ok()) return AsInput(read.status());
+    if (!read.ok()) return read.status();
     overlay = Summarize(*read->volume);
   }
 

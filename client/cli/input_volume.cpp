@@ -20,10 +20,8 @@ Status CheckInputHeaders(const std::string& source) {
   if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
   if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
   parsed->options.describe = true;
-  return AsInput(CheckVolumeHeaders(parsed->path, parsed->options).status());
+  return CheckVolumeHeaders(parsed->path, parsed->options).status();
 }
-
-Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
 
 Result<LoadedVolume> ReadInputVolume(const std::string& source) {
   Result<SourceText> parsed = ParseSourceText(source);
@@ -33,9 +31,7 @@ Result<LoadedVolume> ReadInputVolume(const std::string& source) {
 }
 
 Result<LoadedVolume> ReadInputVolume(const SourceText& source, bool all_exact) {
-  Result<LoadedVolume> loaded = ReadVolume(source.path, source.options, all_exact);
-  if (!loaded.ok()) return AsInput(loaded.status());
-  return loaded;
+  return ReadVolume(source.path, source.options, all_exact);
 }
 
 }  // namespace slabstream

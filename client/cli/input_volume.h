@@ -19,10 +19,7 @@ Status CheckInputVolume(const SourceText& source);
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
 Status CheckInputHeaders(const std::string& source);
 
-// A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
-Status AsInput(const Status& status);
-
-// ReadVolume with such failures. If there are several times or components, the first one is read, unless the source
+// ReadVolume. If there are several times or components, the first one is read, unless the source
 // says which, and a line is logged. A parsed source must say which.
 Result<LoadedVolume> ReadInputVolume(const std::string& source);
 Result<LoadedVolume> ReadInputVolume(const SourceText& source, bool all_exact = false);

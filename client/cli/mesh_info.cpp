@@ -9,7 +9,6 @@
 #include <span>
 
 #include "client/cli/commands.h"
-#include "client/cli/input_volume.h"
 #include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/renderers/registry.h"
@@ -83,7 +82,7 @@ Status RunMeshInfo(const InfoOptions& options) {
   if (!source.ok()) return source.status();
   const Result<LoadedMesh> loaded =
       ReadMesh(source->path, {.array = source->options.array, .time = source->options.time, .channel = source->options.channel});
-  if (!loaded.ok()) return AsInput(loaded.status());
+  if (!loaded.ok()) return loaded.status();
   const ValueRange range = RangeOf(loaded->mesh.values);
   std::cout << (options.json ? MeshJson(*loaded, range).dump(2) + "\n" : MeshText(*loaded, range, source->options.lattice));
   return Status::Ok();

@@ -97,7 +97,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     files.emplace_back(source, "", layers);
   }
   if (layers.any()) {
-    if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
+    if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return headers.status();
   }
   if (connection.unasked) {
     PrintNote(fmt::format("{}, so this process works on {} itself, as with --local",

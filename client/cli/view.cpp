@@ -138,7 +138,7 @@ Status CheckEntry(const std::string& source, const std::string& entry) {
   if (Status status = CheckInputVolume(source); !status.ok()) return status;
   FoundData found = FindData({entry}, "SOURCE ");
   CheckFiles(found);
-  return found.errors.empty() ? Status::Ok() : AsInput(found.errors.front());
+  return found.errors.empty() ? Status::Ok() : found.errors.front();
 }
 
 // The token in the file, which is made if it does not exist.

@@ -75,6 +75,9 @@ struct TransferFunction {
   std::optional<Material> material = {};                      // none: the standard one; Shading may replace its numbers
   std::vector<TransferRegion> regions = {};                   // at most kMaxTransferRegions
 
+  // It has nothing but the two curves over values, and perhaps a material.
+  bool curves_alone() const { return isosurfaces.empty() && gradient_opacities.empty() && regions.empty(); }
+
   // By the curves; value finite.
   Rgb Color(double value) const;
   double Opacity(double value) const;  // [0, 1]

@@ -135,6 +135,15 @@ LevelMap WithoutUnused(LevelMap map) {
   return map;
 }
 
+// The frame drawn from the overview, without light: it changes no level, and here there is no level to make a light volume from.
+Result<FrameSetup> SetupOfOverview(const FrameRequest& request, const VolumeGeometry& finest,
+                                   const std::shared_ptr<const VolumeSummary>& overview, const ShownFields& fields) {
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview, fields);
+  if (!resolved.ok()) return resolved.status();
+  resolved->frame.shading = {};
+  return MakeFrameSetup(*resolved);
+}
+
 void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& level) {
   if (box.unit == ClipUnit::kWorld) return;
   const GridMap map = MapBetween(finest, level);
@@ -192,12 +201,9 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     if (*level < count) return LevelMap{.levels = {*level}};
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
-  const VolumeGeometry& overview = levels.overview->description.geometry;
-  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview, fields);
-  if (!resolved.ok()) return resolved.status();
-  resolved->frame.shading = {};  // light changes no level, and here there is no level to make a light volume from
-  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  const Result<FrameSetup> setup = SetupOfOverview(request, finest, levels.overview, fields);
   if (!setup.ok()) return setup.status();
+  const VolumeGeometry& overview = levels.overview->description.geometry;
   const Camera& camera = setup->camera;
   const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
@@ -215,13 +221,10 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
 
 Result<double> DetailOf(const FrameRequest& request, const VolumeGeometry& finest, const std::shared_ptr<const VolumeSummary>& overview,
                         const ShownFields& fields) {
-  const VolumeGeometry& geometry = overview->description.geometry;
-  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, geometry), 1, overview, fields);
-  if (!resolved.ok()) return resolved.status();
-  resolved->frame.shading = {};
-  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  const Result<FrameSetup> setup = SetupOfOverview(request, finest, overview, fields);
   if (!setup.ok()) return setup.status();
   if (LevelNumber(request.level)) return 0;  // that level of all fields, as far as they have it
+  const VolumeGeometry& geometry = overview->description.geometry;
   const double least = LeastWidth(finest, *setup);
   const double width = least > 0 ? least : setup->unit * WidthAt(ExtentOf(geometry.bounds(), {}, setup->camera), setup->camera);
   return width * (request.detail == 0 ? 1 : request.detail);

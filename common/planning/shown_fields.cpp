@@ -172,6 +172,22 @@ Result<int> TimeToShow(const FrameRequest& request, const DatasetFields& dataset
   return int(nearest);
 }
 
+Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const DatasetFields> dataset) {
+  static const auto kOneField = std::make_shared<const DatasetFields>();
+  if (dataset == nullptr) dataset = kOneField;
+  Result<FieldNumbers> shown = FieldsToShow(request, *dataset);
+  if (!shown.ok()) return shown.status();
+  const Result<int> time = TimeToShow(request, *dataset);
+  if (!time.ok()) return time.status();
+  ShownAtTime found{.fields = {.dataset = std::move(dataset), .volume = shown->numbers.front(), .volume_shows = shown->volume_shows},
+                    .numbers = std::move(shown->numbers),
+                    .time = *time};
+  for (const int number : found.numbers) {
+    if (number != found.fields.volume) found.fields.others.push_back({.number = number});
+  }
+  return found;
+}
+
 Result<bool> ShowsAsChannel(const FrameRequest& request, const ShownFields& shown) {
   if (shown.dataset == nullptr) return false;
   const std::vector<FieldInfo>& fields = shown.dataset->fields;

@@ -57,6 +57,15 @@ Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFiel
 // times.
 Result<int> TimeToShow(const FrameRequest& request, const DatasetFields& dataset);
 
+// What a request shows of a dataset.
+struct ShownAtTime {
+  ShownFields fields;        // `others` have only their numbers
+  std::vector<int> numbers;  // of all fields, the volume's first
+  int time = 0;
+};
+// `dataset`: null: there is one field, of which nothing is known. Errors of FieldsToShow and TimeToShow.
+Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const DatasetFields> dataset);
+
 // How the request shows a field that the values of `summary` are those of. Blend::kAuto becomes that of the field. `full`: the strongest
 // value is opaque (projections). In a slice all values are, and weak ones are dark. NotFound: no such preset; InvalidArgument: one that has
 // regions.

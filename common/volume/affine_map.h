@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "common/volume/volume.h"
 
@@ -16,6 +17,19 @@ struct AffineMap {
   Vec3 offset;
 
   Vec3 To(const Vec3& p) const { return offset + p.x * steps[0] + p.y * steps[1] + p.z * steps[2]; }
+  // The least and the greatest coordinates of what positions from `low` to `high` become.
+  std::pair<Vec3, Vec3> Bounds(const Vec3& low, const Vec3& high) const {
+    Vec3 least = offset, most = offset;
+    for (const Axis from : kAxes) {
+      const Vec3& step = steps.at(std::size_t(Number(from)));
+      for (const Axis axis : kAxes) {
+        const double a = step[axis] * low[from], b = step[axis] * high[from];
+        least[axis] += std::min(a, b);
+        most[axis] += std::max(a, b);
+      }
+    }
+    return {least, most};
+  }
   bool is_identity() const { return *this == AffineMap(); }
   friend bool operator==(const AffineMap&, const AffineMap&) = default;
 };
@@ -44,15 +58,11 @@ inline AffineMap AffineMapBetween(const VolumeGeometry& from, const VolumeGeomet
 // none.
 inline Box CoveringVoxels(const Box& box, const AffineMap& map, const Index3& size, std::int32_t more) {
   constexpr double kSame = 1e-4;  // voxels: what rounding moves
-  const Vec3 low = ToVec3(box.begin) - Vec3{0.5, 0.5, 0.5}, high = ToVec3(box.end) - Vec3{0.5, 0.5, 0.5};
+  const Vec3 half = {0.5, 0.5, 0.5};
+  const auto [low, high] = map.Bounds(ToVec3(box.begin) - half, ToVec3(box.end) - half);
   Box voxels;
   for (const Axis axis : kAxes) {
-    double least = map.offset[axis], most = map.offset[axis];
-    for (const Axis from : kAxes) {
-      const double step = map.steps.at(std::size_t(Number(from)))[axis];
-      least += std::min(step * low[from], step * high[from]);
-      most += std::max(step * low[from], step * high[from]);
-    }
+    const double least = low[axis], most = high[axis];
     // The grid fills [-0.5, size - 0.5).
     if (most < -0.5 || least > size[axis] - 0.5) return {};
     const double first = std::floor(least + 0.5 + kSame) - more, end = std::ceil(most + 0.5 - kSame) + more;

@@ -89,8 +89,7 @@ void CheckFields(const FrameSetup& setup, Checker& check) {
       check.That(alike, "levels", "of other values than the first one");
     }
     const TransferFunction& transfer = look.transfer;
-    check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty() && transfer.regions.empty(), "look.transfer",
-               "not of curves over values alone");
+    check.That(transfer.curves_alone(), "look.transfer", "not of curves over values alone");
     check.That(look.blend != Blend::kAuto, "look.blend", "not settled");
     check.Adopt(Validate(transfer));
   }

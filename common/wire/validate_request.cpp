@@ -181,7 +181,7 @@ Status CheckRules(const LabelChoice& labels) {
 // Overlays have no isosurfaces and nothing that depends on gradients.
 Status CheckRules(const OverlayChoice& overlay) {
   const auto* function = std::get_if<TransferFunction>(&overlay.choice);
-  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty() && function->regions.empty())) {
+  if (function != nullptr && !function->curves_alone()) {
     return Status::InvalidArgument("overlay.function has isosurfaces, gradient_opacities or regions, which are of the volume alone");
   }
   return CheckRules(overlay.scalar_range, "overlay.scalar_range");
@@ -189,7 +189,7 @@ Status CheckRules(const OverlayChoice& overlay) {
 
 Status CheckRules(const FieldChoice& choice, const std::string& name) {
   const auto* function = std::get_if<TransferFunction>(&choice.choice);
-  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty() && function->regions.empty())) {
+  if (function != nullptr && !function->curves_alone()) {
     return Status::InvalidArgument(name +
                                    ".function has isosurfaces, gradient_opacities or regions, which only a dataset's first field has");
   }

@@ -106,28 +106,22 @@ Status DatasetMachine::State::Advance(Use& use) {
 }
 
 Status DatasetMachine::State::SeekSources(Use& use) {
-  static const auto kOneField = std::make_shared<const DatasetFields>();
-  const FrameRequest& request = *use.request;
-  const std::shared_ptr<const DatasetFields> known = datasets.Find(request.dataset)->fields;
-  const DatasetFields& fields = known != nullptr ? *known : *kOneField;
-  const Result<FieldNumbers> shown = FieldsToShow(request, fields);
+  const std::string& name = use.request->dataset;
+  Result<ShownAtTime> shown = WhatShows(*use.request, datasets.Find(name)->fields);
   if (!shown.ok()) return shown.status();
-  const Result<int> time = TimeToShow(request, fields);
-  if (!time.ok()) return time.status();
-  use.fields = {.dataset = known != nullptr ? known : kOneField, .volume = shown->numbers.front(), .volume_shows = shown->volume_shows};
   const Use::Entry dataset = use.entries.front();
   std::vector<Use::Entry> entries;
-  for (const int number : shown->numbers) {
-    const std::string name = SourceOf(request.dataset, number, *time);
-    entries.push_back(name == dataset.name ? dataset : Use::Entry{name, Seek(name)});
-    if (number != use.fields.volume) use.fields.others.push_back({.number = number});
-  }
+  const auto seek = [&](int number, int time) {
+    const std::string source = SourceOf(name, number, time);
+    entries.push_back(source == name ? dataset : Use::Entry{source, Seek(source)});
+  };
+  for (const int number : shown->numbers) seek(number, shown->time);
   // At another time than the dataset's own, looks need the values of that one, too.
-  const auto& statistics = datasets.Find(request.dataset)->statistics;
+  use.fields = std::move(shown->fields);
+  const DatasetFields& fields = *use.fields.dataset;
+  const auto& statistics = datasets.Find(name)->statistics;
   for (const int number : shown->numbers) {
-    if (*time == fields.time || statistics.contains(number) || !fields.fields[std::size_t(number)].channel) continue;
-    const std::string name = SourceOf(request.dataset, number, fields.time);
-    entries.push_back(name == dataset.name ? dataset : Use::Entry{name, Seek(name)});
+    if (shown->time != fields.time && !statistics.contains(number) && fields.fields[std::size_t(number)].channel) seek(number, fields.time);
   }
   use.entries = std::move(entries);
   use.stage = Use::Stage::kSources;

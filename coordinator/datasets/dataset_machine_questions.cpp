@@ -55,24 +55,19 @@ Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLe
 
 // Of a dataset that is open: the question waits for the first field that it is about. Errors of FieldsToShow and TimeToShow.
 Status DatasetMachine::State::FindField(OpenQuestion& open) {
-  static const auto kOneField = std::make_shared<const DatasetFields>();
   const FrameRequest picture = PictureOf(open.question);
-  const std::shared_ptr<const DatasetFields> known = datasets.Find(open.entry)->fields;
-  open.fields.dataset = known != nullptr ? known : kOneField;
-  const Result<FieldNumbers> shown = FieldsToShow(picture, *open.fields.dataset);
+  Result<ShownAtTime> shown = WhatShows(picture, datasets.Find(open.entry)->fields);
   if (!shown.ok()) return shown.status();
-  const Result<int> time = TimeToShow(picture, *open.fields.dataset);
-  if (!time.ok()) return time.status();
-  open.fields.volume = shown->numbers.front();
-  open.fields.volume_shows = shown->volume_shows;
+  open.fields = std::move(shown->fields);
+  open.fields.others.clear();  // the question is about the first one
   const auto& fields = open.fields.dataset->fields;
   const auto overlay = std::ranges::find(fields, false, &FieldInfo::channel);
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
   if (of_points && overlay != fields.end()) {
-    open.overlay = SourceOf(picture.dataset, int(overlay - fields.begin()), *time);
+    open.overlay = SourceOf(picture.dataset, int(overlay - fields.begin()), shown->time);
     open.overlay_check = Seek(open.overlay);
   }
-  const std::string source = SourceOf(picture.dataset, open.fields.volume, *time);
+  const std::string source = SourceOf(picture.dataset, open.fields.volume, shown->time);
   if (source == open.entry) return Status::Ok();
   open.entry = source;
   open.check = Seek(source);

@@ -61,9 +61,8 @@ struct OpenRequest {
     std::vector<DatasetId> datasets() const {
       std::vector<DatasetId> all = {volume().dataset()};
       for (const CoarserVolume& level : resolved->coarser) all.push_back(level.dataset);
-      for (const FieldVolume& field : resolved->fields.others) {
-        for (const CoarserVolume& level : field.levels) all.push_back(level.dataset);
-      }
+      const std::vector<DatasetId> of_fields = FieldsOf(resolved->fields);
+      all.insert(all.end(), of_fields.begin(), of_fields.end());
       if (resolved->light) all.push_back(resolved->light->dataset);
       return all;
     }

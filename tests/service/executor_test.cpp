@@ -60,6 +60,17 @@ class ExecutorTest : public testing::Test {
     return *ReadRuns(partial.image, sent.payload.span(), partial.image.bounds);
   }
 
+  // The box of all of the volume, whose voxels are stored. They fit a chunk.
+  BoxKey StoredBoxOf(const std::shared_ptr<const Volume>& volume) {
+    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
+    executor_.Perform(OpenBox{padded, {}});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
+    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+    executor_.Perform(StoreChunk{padded, chunk, payload});
+    EXPECT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+    return padded;
+  }
+
   Outputs outputs_;
   Executor executor_{outputs_.outbox, Codec::kZstd, 2};
 };
@@ -375,12 +386,7 @@ TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
       setups.at(std::size_t(client)) =
           std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
     }
-    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
-    executor_.Perform(OpenBox{padded, {}});
-    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
-    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
-    executor_.Perform(StoreChunk{padded, chunk, payload});
-    ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+    const BoxKey padded = StoredBoxOf(volume);
 
     ImageHandle image = 0;
     const auto start = [&](ClientId client) {
@@ -422,12 +428,7 @@ TEST_F(ExecutorTest, ARenderReadsTheBoxOfEachFieldThatItShows) {
   const FieldSetup field = {
       .levels = {{1, alone.description, {}}}, .of_volume = {0}, .look = {.transfer = alone.transfer, .range = alone.range}};
   several.fields = {field, field, field};
-  const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
-  executor_.Perform(OpenBox{padded, {}});
-  Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
-  const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
-  executor_.Perform(StoreChunk{padded, chunk, payload});
-  ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+  const BoxKey padded = StoredBoxOf(volume);
   const PixelBounds frame = FrameBounds(alone);
   const auto rendered = [&](ImageHandle image, const FrameSetup& setup, std::vector<std::optional<BoxKey>> fields) {
     const auto fields_shown = std::size_t(std::ranges::count_if(fields, [](const auto& of) { return of.has_value(); }));

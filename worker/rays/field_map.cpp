@@ -29,16 +29,8 @@ FieldMap MakeFieldMap(const LevelBox& at, const FrameSetup& setup, const FieldSe
 }
 
 SampledRegion Mapped(const SampledRegion& region, const AffineMap& map) {
-  SampledRegion mapped = {map.offset, map.offset};
-  for (const Axis from : kAxes) {
-    const Vec3& step = map.steps.at(std::size_t(Number(from)));
-    for (const Axis axis : kAxes) {
-      const double a = step[axis] * region.low[from], b = step[axis] * region.high[from];
-      mapped.low[axis] += std::min(a, b);
-      mapped.high[axis] += std::max(a, b);
-    }
-  }
-  return mapped;
+  const auto [low, high] = map.Bounds(region.low, region.high);
+  return {low, high};
 }
 
 }  // namespace slabstream

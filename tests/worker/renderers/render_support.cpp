@@ -187,12 +187,14 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
   return RenderBox(volume, setup, volume.description.geometry.bounds());
 }
 
-LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn) {
+LocalImage CombinedBoxes(const FrameSetup& setup, const Partition& partition, const std::function<LocalImage(const Box&)>& render) {
   LocalImage frame = MakeLocalImage(setup.format, {});
-  for (BoxId id : VisibilityOrder(partition, setup.camera)) {
-    Combine(frame, RenderBox(volume, setup, partition.boxes()[id], drawn), Side::kBack);
-  }
+  for (const BoxId id : VisibilityOrder(partition, setup.camera)) Combine(frame, render(partition.boxes()[id]), Side::kBack);
   return frame;
+}
+
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn) {
+  return CombinedBoxes(setup, partition, [&](const Box& box) { return RenderBox(volume, setup, box, drawn); });
 }
 
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }

@@ -73,6 +73,8 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
 // Hides each tile of the frame with probability `part`: every other pixel keeps its bits, and if all tiles are hidden
 // nothing is drawn.
 void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random);
+// The images of the boxes, combined in visibility order. `render`: that of a box.
+LocalImage CombinedBoxes(const FrameSetup& setup, const Partition& partition, const std::function<LocalImage(const Box&)>& render);
 // Each box of the partition from its own padded box, combined in visibility order.
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn = nullptr);
 // The picture, of the whole volume as one box.

@@ -276,10 +276,7 @@ TEST(Fields, DoNotDependOnBoxes) {
   for (int i = 0; i < 16; ++i) {
     const Scene scene = RandomScene(kSeed, i);
     const Partition partition = CutAtRandom(scene.volume.description.geometry.bounds(), 2 + i % 5, random);
-    LocalImage frame = MakeLocalImage(scene.setup.format, {});
-    for (const BoxId id : VisibilityOrder(partition, scene.setup.camera)) {
-      Combine(frame, Rendered(scene, partition.boxes()[id]), Side::kBack);
-    }
+    const LocalImage frame = CombinedBoxes(scene.setup, partition, [&](const Box& box) { return Rendered(scene, box); });
     EXPECT_LE(LargestDifference(frame, Rendered(scene)), 5e-6F) << "case " << i << ", seed " << kSeed;
   }
 }

@@ -247,10 +247,7 @@ TEST(Layers, DoNotDependOnBoxes) {
     const Case c = RandomCase(kSeed, i);
     const LocalImage whole = Rendered(c.volume, c.setup);
     const Partition partition = CutAtRandom(c.volume.volume->description.geometry.bounds(), 2 + i % 5, random);
-    LocalImage frame = MakeLocalImage(c.setup.format, {});
-    for (const BoxId id : VisibilityOrder(partition, c.setup.camera)) {
-      Combine(frame, Rendered(c.volume, c.setup, partition.boxes()[id]), Side::kBack);
-    }
+    const LocalImage frame = CombinedBoxes(c.setup, partition, [&](const Box& box) { return Rendered(c.volume, c.setup, box); });
     EXPECT_LE(LargestDifference(frame, whole), 2e-6F) << "case " << i << ", seed " << kSeed;
   }
 }

@@ -218,10 +218,7 @@ TEST(ZBufferLabels, DoNotDependOnBoxes) {
     const FrameSetup setup = LabelledSetup(data, options, look);
     const LocalImage whole = Rendered(data, setup);
     const Partition partition = CutAtRandom(geometry.bounds(), 2 + i % 5, random);
-    LocalImage frame = MakeLocalImage(setup.format, {});
-    for (const BoxId id : VisibilityOrder(partition, setup.camera)) {
-      Combine(frame, Rendered(data, setup, partition.boxes()[id]), Side::kBack);
-    }
+    const LocalImage frame = CombinedBoxes(setup, partition, [&](const Box& box) { return Rendered(data, setup, box); });
     int seen = 0;
     for (int y = 0; y < setup.camera.height; ++y) {
       for (int x = 0; x < setup.camera.width; ++x) {
