@@ -120,13 +120,15 @@ class Uploads(WithAService):
 
         class Slow(Slabs):
             def __getitem__(self, index: slice) -> np.ndarray:
-                begun.set()
-                go_on.wait(60)
+                if self.asked:  # The service has asked for what was read before, so it knows the name.
+                    begun.set()
+                    go_on.wait(60)
                 return super().__getitem__(index)
 
-        first = threading.Thread(target=self.service.add, args=("both", Slow(np.full((8, 8, 8), 7, np.uint8))))
+        slabs = Slow(np.full((20, 512, 512), 7, np.float32))  # 20 MiB, more than is read at a time
+        first = threading.Thread(target=self.service.add, args=("both", slabs))
         first.start()
-        begun.wait(60)
+        self.assertTrue(begun.wait(60))
         with ss.connect(endpoint=self.running.endpoint) as other:
             with self.assertRaisesRegex(ss.InvalidArgument, "on its way from another client"):
                 other.add("both", np.zeros((8, 8, 8), np.uint8))
