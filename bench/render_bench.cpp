@@ -181,8 +181,7 @@ void Channels(benchmark::State& state) {
       setup.fields.push_back(
           {.levels = {{DatasetId(i), volume.description, {}}}, .of_volume = {0}, .look = {.transfer = transfer, .range = {0, 60000}}});
     }
-    channels.push_back(
-        std::make_unique<BoxData>(std::make_shared<BoxVoxels>(Pad(VoxelBricks(volume.block), volume.block.box), BoxLayers())));
+    channels.push_back(std::make_unique<BoxData>(std::make_shared<BoxVoxels>(Pad(VoxelBricks(volume.block), volume.block.box), nullptr)));
   }
   std::vector<BoxData*> fields;
   for (std::size_t i = 1; i < channels.size(); ++i) fields.push_back(channels[i].get());

@@ -15,7 +15,7 @@ constexpr std::uint64_t kUploadNonce = 1;  // pings have those that follow
 }  // namespace
 
 FileUpload::FileUpload(Context& context, const ServiceAddress& service, std::string name, SentFile file, Events events)
-    : order_{.nonce = kUploadNonce, .name = std::move(name), .description = {}, .layers = {}, .labels = {}, .file = std::move(file)},
+    : order_{.nonce = kUploadNonce, .name = std::move(name), .description = {}, .labels = {}, .file = std::move(file)},
       events_(std::move(events)),
       pings_(kUploadNonce) {
   thread_ = std::thread([this, &context, service] { Run(context, service); });

@@ -55,8 +55,9 @@ FramePlan PlanForMachines(const FramePlan& plan, std::uint32_t frame, const std:
   out.setup.dataset = frame + 1;
   out.setup.halo = 0;
   out.setup.description = {};
-  out.setup.layers = {};  // the one voxel stands for them, too
-  out.setup.front = {};   // box costs know what is hidden
+  out.setup.cells = false;  // the one voxel stands for them, too
+  out.setup.fields = {};    // and for their voxels
+  out.setup.front = {};     // box costs know what is hidden
   out.setup.description.geometry.size = {1, 1, std::numeric_limits<std::int32_t>::max()};
   for (GroupPlan& group : out.groups) {
     for (Placement& placement : group.placements) {

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -32,6 +33,7 @@
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
 #include "data/catalogue/catalogue.h"
+#include "data/layers/layer_files.h"
 #include "data/open/read_volume.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/brick_index.h"
@@ -109,7 +111,7 @@ Result<VolumeFacts> FactsOf(const std::string& source) {
   if (!read.ok()) return read.status();
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     SourceInfo info = opened->source->info();
-    if (MayBeRounded(info.exact.type)) info.notes.push_back(RoundingText(info.exact.type));
+    if (opened->survey.summary->labels == nullptr && MayBeRounded(info.exact.type)) info.notes.push_back(RoundingText(info.exact.type));
     return VolumeFacts{std::move(info), opened->survey.summary, std::move(*opened)};
   }
   const LoadedSource& loaded = std::get<LoadedSource>(*read);
@@ -124,6 +126,7 @@ std::uint64_t VoxelsOf(const VolumeSummary& summary) { return CountIn(summary.de
 
 // Of the voxels that were counted, which may be a sample.
 double OccupancyOf(const VolumeSummary& summary, const TransferFunction& transfer) {
+  if (CountedVoxels(summary) == 0) return 0;  // labels of more than 16 bits
   return EstimateOccupancy(summary, transfer) * (double(VoxelsOf(summary)) / double(CountedVoxels(summary)));
 }
 
@@ -293,44 +296,73 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
 
 std::string JsonText(const Json& json) { return json.dump(2) + "\n"; }
 
-// Voxels of the volume by number of the label.
-std::vector<std::uint64_t> CountLabels(const Layers& layers) {
-  std::vector<std::uint64_t> counts(layers.table->labels.size() + 1);
-  VisitScalarType(layers.labels->block.type, [&]<class T>(const T*) {
-    const VoxelBlock& block = layers.labels->block;
-    for (const T number : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) ++counts[std::size_t(number)];
-  });
-  return counts;
-}
+// The labels and the overlay of the volume.
+struct LayerFacts {
+  std::shared_ptr<const LabelTable> labels;       // null: there are none
+  std::map<std::uint64_t, std::uint64_t> voxels;  // of each label, if all were read
+  std::optional<VolumeSummary> overlay;
+};
 
-// `overlay`: none: there is none.
-std::string LayersText(const Layers& layers, const std::optional<VolumeSummary>& overlay) {
-  std::string text;
-  if (layers.labels != nullptr) {
-    const std::vector<std::uint64_t> counts = CountLabels(layers);
-    text += fmt::format("label layer  {} labels: value, colour, voxels of this volume, name\n", layers.table->labels.size());
-    for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
-      const Label& label = layers.table->labels[i];
-      text += fmt::format("  {:>8} {} {:>10} {}\n", label.value, ColorText(label.color), counts[i + 1], label.name);
+Result<LayerFacts> FactsOf(const LayerFiles& files) {
+  const DataSource source("", "", files);
+  LayerFacts facts;
+  if (source.labels != nullptr) {
+    const Result<ReadableSource> read = ReadSource(*source.labels, std::uint64_t(kExactBytes));
+    if (!read.ok()) return Status(read.status().code(), "labels: " + read.status().message());
+    if (const auto* const opened = std::get_if<OpenedSource>(&*read)) {
+      facts.labels = opened->survey.summary->labels;
+    } else {
+      const auto& [file, volume, labels, stamp, exact] = std::get<LoadedSource>(*read);
+      facts.labels = labels;
+      VisitLabelType(volume->block.type, [&]<class T>(const T*) {
+        for (const T label : std::span(volume->block.samples<T>(), std::size_t(volume->block.box.voxel_count()))) {
+          if (label > 0 && (labels->complete || facts.voxels.size() < kMaxLabels)) ++facts.voxels[label];
+        }
+      });
     }
   }
+  if (source.overlay != nullptr) {
+    const Result<SourceText> text = ParseSourceText(files.overlay);
+    if (!text.ok()) return text.status();
+    const Result<LoadedVolume> read = ReadVolume(text->path, text->options);
+    if (!read.ok()) return read.status();
+    facts.overlay = Summarize(*read->volume);
+  }
+  return facts;
+}
+
+std::string LayersText(const LayerFacts& facts) {
+  std::string text;
+  if (facts.labels != nullptr) {
+    const std::size_t count = facts.labels->labels.size();
+    text += facts.labels->complete
+                ? fmt::format("labels       {}: value, colour, voxels, name\n", count)
+                : fmt::format("labels       more than are counted; {} have a colour or a name: value, colour, name\n", count);
+    for (const Label& label : facts.labels->labels) {
+      const auto voxels = facts.voxels.find(label.value);
+      text += fmt::format("  {:>8} {} {:>10} {}\n", label.value, ColorText(label.color),
+                          facts.labels->complete ? fmt::format("{}", voxels == facts.voxels.end() ? 0 : voxels->second) : "", label.name);
+    }
+  }
+  const std::optional<VolumeSummary>& overlay = facts.overlay;
   if (overlay) text += fmt::format("overlay      values {} ... {}\n", ValueText(overlay->range.min), ValueText(overlay->range.max));
   return text;
 }
 
 Json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
 
-Json LayersJson(const Layers& layers, const std::optional<VolumeSummary>& overlay) {
+Json LayersJson(const LayerFacts& facts) {
   Json json = Json::object();
-  if (layers.labels != nullptr) {
-    const std::vector<std::uint64_t> counts = CountLabels(layers);
+  if (facts.labels != nullptr) {
     json["labels"] = Json::array();
-    for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
-      Json label = LabelJson(layers.table->labels[i]);
-      label["voxels"] = counts[i + 1];
+    json["all_labels"] = facts.labels->complete;
+    for (const Label& of : facts.labels->labels) {
+      Json label = LabelJson(of);
+      if (const auto voxels = facts.voxels.find(of.value); voxels != facts.voxels.end()) label["voxels"] = voxels->second;
       json["labels"].push_back(std::move(label));
     }
   }
+  const std::optional<VolumeSummary>& overlay = facts.overlay;
   if (overlay) json["overlay"] = {{"range", RangeJson(overlay->range)}, {"no_value", overlay->non_finite}};
   return json;
 }
@@ -350,7 +382,7 @@ void AddPartsJson(const VolumeFacts& facts, Json& json) {
 }
 
 std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy,
-                     const std::vector<DicomSeries>& series, const Layers& layers, const std::optional<VolumeSummary>& overlay) {
+                     const std::vector<DicomSeries>& series, const LayerFacts& layers) {
   const SourceInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.finest();
@@ -390,7 +422,7 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
     json["index"] = IndexJson(index);
   }
   if (!series.empty()) json["series"] = SeriesJson(series);
-  if (layers.types().any() || overlay) json["layers"] = LayersJson(layers, overlay);
+  if (layers.labels != nullptr || layers.overlay) json["layers"] = LayersJson(layers);
   return JsonText(json);
 }
 
@@ -416,22 +448,14 @@ Status RunInfo(const InfoOptions& options) {
   if (!transfer.ok()) return transfer.status();
   const double occupancy = OccupancyOf(*facts->summary, *transfer);
 
-  const Result<Layers> layers = ReadLayers(options.layers, facts->file.finest().geometry);
+  const Result<LayerFacts> layers = FactsOf(options.layers);
   if (!layers.ok()) return layers.status();
-  std::optional<VolumeSummary> overlay;
-  if (!options.layers.overlay.empty()) {
-    const Result<SourceText> text = ParseSourceText(options.layers.overlay);
-    if (!text.ok()) return text.status();
-    const Result<LoadedVolume> read = ReadVolume(text->path, text->options);
-    if (!read.ok()) return read.status();
-    overlay = Summarize(*read->volume);
-  }
 
   const std::string name = TransferName(options.request.transfer);
   std::optional<IndexFacts> index;
   if (facts->parts) index = IndexFactsOf(options.path, *facts->parts, *transfer);
-  std::cout << (options.json ? InfoJson(*facts, index, name, occupancy, *series, *layers, overlay)
-                             : InfoText(*facts, index, name, occupancy) + LayersText(*layers, overlay));
+  std::cout << (options.json ? InfoJson(*facts, index, name, occupancy, *series, *layers)
+                             : InfoText(*facts, index, name, occupancy) + LayersText(*layers));
   return Status::Ok();
 }
 

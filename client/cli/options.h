@@ -17,7 +17,7 @@
 #include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
 #include "common/wire/client_messages.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
 #include "data/zarr_writer/ome_metadata.h"

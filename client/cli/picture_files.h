@@ -5,7 +5,7 @@
 
 #include "client/cli/picture_sink.h"
 #include "client/pictures/picture_writer.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 
 namespace slabstream {
 

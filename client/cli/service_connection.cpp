@@ -96,8 +96,8 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     if (Status status = CheckInputHeaders(source); !status.ok()) return status;
     files.emplace_back(source, "", layers);
   }
-  if (layers.any()) {
-    if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return headers.status();
+  if (!files.empty()) {
+    if (Status status = CheckFields(files.front()); !status.ok()) return status;
   }
   if (connection.unasked) {
     PrintNote(fmt::format("{}, so this process works on {} itself, as with --local",

@@ -10,7 +10,7 @@
 #include "client/client.h"
 #include "common/base/status.h"
 #include "data/catalogue/data_source.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 
 namespace slabstream {
 

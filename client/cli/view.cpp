@@ -25,7 +25,7 @@
 #include "common/threads/stop_signals.h"
 #include "common/transport/this_machine.h"
 #include "data/catalogue/catalogue.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 #include "data/open/cache_option.h"
 #include "data/open/source_name.h"
 #include "data/volume_io/read_options.h"

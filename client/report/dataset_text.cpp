@@ -14,9 +14,14 @@
 namespace slabstream {
 namespace {
 
+bool HasLabels(const DatasetStatus& dataset) { return dataset.fields && dataset.fields->labels(); }
+bool HasOverlay(const DatasetStatus& dataset) {
+  return dataset.fields && !dataset.fields->fields[std::size_t(dataset.fields->values()) - 1].channel;
+}
+
 std::string LayersText(const DatasetStatus& dataset) {
-  std::string text = dataset.labels > 0 ? fmt::format("{} label{}", dataset.labels, dataset.labels == 1 ? "" : "s") : "";
-  if (dataset.overlay) text += text.empty() ? "overlay" : ", overlay";
+  std::string text = HasLabels(dataset) ? "labels" : "";
+  if (HasOverlay(dataset)) text += text.empty() ? "overlay" : ", overlay";
   if (dataset.cells > 0) text += fmt::format("{}{} cells", text.empty() ? "" : ", ", dataset.cells);
   return text.empty() ? "-" : text;
 }
@@ -32,7 +37,7 @@ Json LevelJson(const VolumeDescription& level) {
 
 // "name", and what its author shows as far as the file says it.
 Json FieldJson(const FieldInfo& field) {
-  Json json = {{"name", field.name}, {"channel", field.channel}, {"shown", field.shown}};
+  Json json = {{"name", field.name}, {"channel", field.channel}, {"labels", field.labels}, {"shown", field.shown}};
   if (field.color) json["color"] = ColorText(*field.color);
   if (field.window) json["window"] = {field.window->min, field.window->max};
   return json;
@@ -74,7 +79,7 @@ Json DatasetJson(const DatasetStatus& dataset) {
     entry["type"] = NameOf(dataset.description.type);
     entry["spacing"] = {geometry.spacing.x, geometry.spacing.y, geometry.spacing.z};
     entry["memory_bytes"] = dataset.memory_bytes;
-    entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
+    entry["layers"] = {{"labels", HasLabels(dataset)}, {"overlay", HasOverlay(dataset)}};
     entry["cells"] = dataset.cells;
     const DatasetFields fields = dataset.fields.value_or(DatasetFields());
     entry["fields"] = Json::array();

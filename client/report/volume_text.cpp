@@ -80,7 +80,7 @@ Json LabelJson(const Label& label) { return {{"value", label.value}, {"name", la
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary) {
   Json labels = Json::array();
   for (const Label& label : summary.labels) labels.push_back(LabelJson(label));
-  return {{"dataset", dataset}, {"labels", std::move(labels)}};
+  return {{"dataset", dataset}, {"labels", std::move(labels)}, {"complete", summary.all_labels}};
 }
 
 Json SampleJson(const VolumeSample& sample) {

@@ -3,7 +3,7 @@
 
 #include "common/cli/command.h"
 #include "common/frame/frame_request.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 
 namespace slabstream {
 

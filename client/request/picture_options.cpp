@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cstddef>
 #include <functional>
 #include <initializer_list>
 #include <string>
@@ -15,6 +17,7 @@
 #include "client/request/value_window.h"
 #include "client/request/values.h"
 #include "common/cli/add_option.h"
+#include "common/files/files.h"
 #include "common/renderers/registry.h"
 #include "common/view/default_view.h"
 #include "common/view/named_view.h"
@@ -110,11 +113,35 @@ void AddAnnotationOptions(const Command& app, Annotations& annotations) {
   font.Range(sizes);
 }
 
+// The words of a file, with a comma between each two: thousands of labels are too many for a command line.
+Result<std::string> ListIn(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{8} << 20;
+  const Result<std::string> file = ReadTextFile(path, kMostBytes);
+  if (!file.ok()) return file.status();
+  std::string list;
+  for (const char c : *file) {
+    const bool between = c == ',' || std::isspace(static_cast<unsigned char>(c)) != 0;
+    if (!between) {
+      list += c;
+    } else if (!list.empty() && list.back() != ',') {
+      list += ',';
+    }
+  }
+  if (list.ends_with(',')) list.pop_back();
+  if (list.empty()) return Status::InvalidArgument(path + ": no label is in it");
+  return list;
+}
+
 }  // namespace
 
 Option AddRequestOption(const Command& app, const RequestOption& option, FrameRequest& request, ColorMaps maps) {
   const std::string name = "--" + option.name;
-  const auto set = [&option, &request, maps](const std::string& shown, const std::vector<std::string>& texts) {
+  const auto set = [&option, &request, maps](const std::string& shown, std::vector<std::string> texts) {
+    if (option.name == "labels-shown" && texts.back().starts_with('@')) {
+      Result<std::string> list = ListIn(texts.back().substr(1));
+      if (!list.ok()) return Status(list.status().code(), shown + " " + list.status().message());
+      texts.back() = *std::move(list);
+    }
     return SetOption(option, shown, texts, maps, request);
   };
   app.GroupOptions(option.group);

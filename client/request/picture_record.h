@@ -21,7 +21,7 @@
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/client_messages.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 
 namespace slabstream {
 

@@ -11,7 +11,9 @@
 #include "client/request/named_colors.h"
 #include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
+#include "common/base/printable.h"
 #include "common/cli/parse.h"
+#include "common/text/parse_number.h"
 #include "common/text/split.h"
 #include "common/view/world_limits.h"
 
@@ -219,16 +221,24 @@ Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_vie
   return points;
 }
 
+// A whole number of at least `least`.
+Result<std::uint64_t> ParseLabel(std::string_view option, std::string_view text, std::uint64_t least) {
+  const auto value = ParseNumber<std::uint64_t>(text);
+  if (value && *value >= least) return *value;
+  return Status::InvalidArgument(
+      fmt::format("{} has '{}', must be a whole number of at least {}", option, Printable(std::string(text.substr(0, 64))), least));
+}
+
 Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, std::string_view text) {
   std::vector<LabelOpacity> opacities;
   for (const std::string_view item : Split(text, ',')) {
     const std::vector<std::string_view> fields = Split(item, '=');
     if (fields.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not LABEL=OPACITY", option, item));
-    const Result<int> value = ParseInteger(option, fields[0], 1, int(kMaxLabelValue));
+    const Result<std::uint64_t> value = ParseLabel(option, fields[0], 1);
     if (!value.ok()) return value.status();
     const Result<double> opacity = ParseNumber(option, fields[1], {0, 1});
     if (!opacity.ok()) return opacity.status();
-    opacities.push_back({std::uint32_t(*value), *opacity});
+    opacities.push_back({*value, *opacity});
   }
   return opacities;
 }
@@ -245,12 +255,11 @@ Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::s
       continue;
     }
     const std::size_t hyphen = item.find('-');
-    const Result<int> first = ParseInteger(option, item.substr(0, hyphen), 1, int(kMaxLabelValue));
+    const Result<std::uint64_t> first = ParseLabel(option, item.substr(0, hyphen), 1);
     if (!first.ok()) return first.status();
-    const Result<int> last =
-        hyphen == std::string_view::npos ? first : ParseInteger(option, item.substr(hyphen + 1), *first, int(kMaxLabelValue));
+    const Result<std::uint64_t> last = hyphen == std::string_view::npos ? first : ParseLabel(option, item.substr(hyphen + 1), *first);
     if (!last.ok()) return last.status();
-    ranges.push_back({std::uint32_t(*first), std::uint32_t(*last)});
+    ranges.push_back({*first, *last});
   }
   return ranges;
 }

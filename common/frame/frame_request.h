@@ -15,7 +15,7 @@
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/frame/field_look.h"
-#include "common/frame/layer_look.h"
+#include "common/frame/label_look.h"
 #include "common/text/parse_number.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"

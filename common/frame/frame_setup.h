@@ -11,7 +11,7 @@
 #include "common/frame/dataset_id.h"
 #include "common/frame/field_look.h"
 #include "common/frame/frame_request.h"
-#include "common/frame/layer_look.h"
+#include "common/frame/label_look.h"
 #include "common/frame/opaque_front.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
@@ -19,7 +19,7 @@
 #include "common/view/sheet_grid.h"
 #include "common/volume/affine_map.h"
 #include "common/volume/grid_map.h"
-#include "common/volume/layers.h"
+#include "common/volume/sample_types.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/summary.h"
 
@@ -43,9 +43,11 @@ struct CoarserLevel {
 
 // A field of the dataset that the picture shows beside its volume.
 struct FieldSetup {
-  std::vector<CoarserLevel> levels;      // those that are drawn, finest first; not empty. Of one grid, type and mapping
-  std::vector<std::uint32_t> of_volume;  // which of them belongs to each level of the volume (LevelBox::level)
-  FieldLook look;
+  std::vector<CoarserLevel> levels;        // those that are drawn, finest first; not empty. Of one grid, type and mapping
+  std::vector<std::uint32_t> of_volume;    // which of them belongs to each level of the volume (LevelBox::level)
+  FieldLook look = {};                     // of values
+  std::optional<CoarserLevel> light = {};  // of values: its light volume, as FrameSetup::light
+  std::optional<LabelLook> labels = {};    // there if it has labels
   friend bool operator==(const FieldSetup&, const FieldSetup&) = default;
 };
 
@@ -54,7 +56,7 @@ struct FrameSetup {
   DatasetId dataset = 0;
   double unit = 1;  // in that of the volume's world; a power of two (common/frame/frame_unit.h)
   VolumeDescription description;
-  LayerTypes layers;                       // layers that the dataset has
+  bool cells = false;                      // the dataset is an unstructured grid
   ValueRange range;                        // data values that the classification table is made for
   std::optional<StoredAt> stored = {};     // none: the coordinator holds the voxels
   std::vector<CoarserLevel> coarser = {};  // finest first
@@ -67,9 +69,8 @@ struct FrameSetup {
   SheetGrid sheets;  // the frame grid of renderers that work along slices; empty: the camera's grid
   ClipRegion clip;   // empty: all is drawn
   TransferFunction transfer;
-  LayerLooks looks;   // the looks of those layers that the dataset has and the picture shows
   double weight = 1;  // [0, 1]: a factor of the volume's density
-  // The other fields that the picture shows, in the order in which they are blended; at most kMaxShownFields - 1.
+  // The other fields that the picture shows: at most kMaxShownFields - 1, in the order in which they are blended; then its labels.
   std::vector<FieldSetup> fields = {};
   bool flat = false;  // the picture is a slice: colours of fields that add are added, not averaged (docs/rendering.md)
   Shading shading;
@@ -79,12 +80,27 @@ struct FrameSetup {
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 
+// The light volumes that a frame needs: the volume's, then that of each field. Empty: it has neither shadows nor ambient occlusion.
+inline std::vector<const CoarserLevel*> LightVolumesOf(const FrameSetup& setup) {
+  if (!setup.light) return {};
+  std::vector<const CoarserLevel*> all = {&*setup.light};
+  for (const FieldSetup& field : setup.fields) {
+    if (!field.labels) all.push_back(&*field.light);
+  }
+  return all;
+}
+
 // The volume's geometry in its world.
 VolumeGeometry WorldGeometryOf(const FrameSetup& setup);
 PictureGeometry PictureGeometryOf(const FrameSetup& setup);
 
 // What workers hold of each voxel.
-inline SampleTypes TypesOf(const FrameSetup& setup) { return {setup.description.type, setup.layers}; }
+inline SampleTypes TypesOf(const FrameSetup& setup) { return {setup.description.type, setup.cells}; }
+
+// The field of labels; null: none is shown.
+inline const FieldSetup* LabelsOf(const FrameSetup& setup) {
+  return setup.fields.empty() || !setup.fields.back().labels ? nullptr : &setup.fields.back();
+}
 
 // All pixels that workers render and combine, and that the final picture is made from. Local images, runs and pixel ranges lie in it.
 PixelBounds FrameBounds(const FrameSetup& setup);
@@ -160,7 +176,12 @@ inline AffineMap MapTo(const FrameSetup& setup, const FieldSetup& field, std::ui
 }
 // Voxels of the field that a worker must hold to render `at`; empty: the field does not reach there.
 inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup, const FieldSetup& field) {
-  return CoveringVoxels(at.box, MapTo(setup, field, at.level), LevelOf(field, at.level).description.geometry.size, setup.halo);
+  const AffineMap map = MapTo(setup, field, at.level);
+  const Index3& size = LevelOf(field, at.level).description.geometry.size;
+  const Box voxels = CoveringVoxels(at.box, map, size, setup.halo);
+  // Voxels of the volume's halo have labels, too.
+  if (!field.labels) return voxels;
+  return Hull(voxels, CoveringVoxels(Grown(at.box, setup.halo, setup.description.geometry.bounds()), map, size, 0));
 }
 
 }  // namespace slabstream

@@ -95,6 +95,5 @@ void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& su
 }
 
 VolumeSummary SummaryOf(const Volume& volume) { return WithCells(Summarize(volume), volume); }
-VolumeSummary SummaryOf(const LayeredVolume& volume) { return WithCells(Summarize(volume), *volume.volume); }
 
 }  // namespace slabstream

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "common/mesh/mesh.h"
-#include "common/volume/layers.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 
@@ -16,6 +15,5 @@ void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& su
 
 // Summarize, and SummarizeCells if the volume has cells.
 VolumeSummary SummaryOf(const Volume& volume);
-VolumeSummary SummaryOf(const LayeredVolume& volume);
 
 }  // namespace slabstream

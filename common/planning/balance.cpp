@@ -105,7 +105,7 @@ double ChangeSeconds(const BalanceRequest& request, const Layout& to) {
     if (to.owners[box] == kNoSlot || present.contains({to.owners[box], voxels})) continue;
     prepared[to.owners[box]] += double(voxels.voxel_count());
   }
-  const double by_rate = double(request.make->summary->types().bytes_per_voxel()) / calibration::service::kVoxelRate;
+  const double by_rate = double(BytesPerSample(request.make->summary->description.type)) / calibration::service::kVoxelRate;
   return double(MovedVoxels(from, to)) * request.move.fetch.value_or(by_rate) +
          std::ranges::max(prepared) * request.move.prepare.value_or(0);
 }

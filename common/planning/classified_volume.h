@@ -1,6 +1,6 @@
-// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it, perhaps with layers, perhaps clipped. Layouts,
-// chosen policies and learnt costs belong to one of these, so it is their key; occupied voxels are counted of the whole volume. Copies
-// share the transfer function and the looks of layers.
+// ClassifiedVolume: a loaded volume under one transfer function, as one renderer draws it, perhaps with other fields, perhaps clipped.
+// Layouts, chosen policies and learnt costs belong to one of these, so it is their key; occupied voxels are counted of the whole volume.
+// Copies share the transfer function and the looks of fields.
 #pragma once
 
 #include <memory>
@@ -11,30 +11,31 @@
 
 namespace slabstream {
 
-// Another field that shows: its finest level, and its look.
+// Another field that shows: its finest level, and its look, which is that of values or of labels.
 struct ClassifiedField {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;  // never null
-  FieldLook look;
-  friend bool operator==(const ClassifiedField& a, const ClassifiedField& b) { return a.dataset == b.dataset && a.look == b.look; }
+  FieldLook look = {};
+  std::optional<LabelLook> labels = {};
+  friend bool operator==(const ClassifiedField& a, const ClassifiedField& b) {
+    return a.dataset == b.dataset && a.look == b.look && a.labels == b.labels;
+  }
 };
 
 class ClassifiedVolume {
  public:
-  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {}, LayerLooks looks = {},
+  ClassifiedVolume(DatasetId dataset, TransferFunction transfer, const RendererKind* renderer, ClipRegion clip = {},
                    std::vector<ClassifiedField> fields = {})
       : dataset_(dataset),
         transfer_(std::make_shared<const TransferFunction>(std::move(transfer))),
         renderer_(renderer),
         clip_(std::move(clip)),
-        looks_(std::make_shared<const LayerLooks>(std::move(looks))),
         fields_(std::make_shared<const std::vector<ClassifiedField>>(std::move(fields))) {}
 
   DatasetId dataset() const { return dataset_; }
   const TransferFunction& transfer() const { return *transfer_; }
   const RendererKind* renderer() const { return renderer_; }
   const ClipRegion& clip() const { return clip_; }
-  const LayerLooks& looks() const { return *looks_; }
   const std::vector<ClassifiedField>& fields() const { return *fields_; }  // the other fields that show
 
   ClassifiedVolume Whole() const {
@@ -45,8 +46,7 @@ class ClassifiedVolume {
 
   friend bool operator==(const ClassifiedVolume& a, const ClassifiedVolume& b) {
     return a.dataset_ == b.dataset_ && a.renderer_ == b.renderer_ && a.clip_ == b.clip_ &&
-           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_) && (a.looks_ == b.looks_ || *a.looks_ == *b.looks_) &&
-           (a.fields_ == b.fields_ || *a.fields_ == *b.fields_);
+           (a.transfer_ == b.transfer_ || *a.transfer_ == *b.transfer_) && (a.fields_ == b.fields_ || *a.fields_ == *b.fields_);
   }
 
  private:
@@ -54,7 +54,6 @@ class ClassifiedVolume {
   std::shared_ptr<const TransferFunction> transfer_;
   const RendererKind* renderer_;
   ClipRegion clip_;
-  std::shared_ptr<const LayerLooks> looks_;
   std::shared_ptr<const std::vector<ClassifiedField>> fields_;
 };
 

@@ -17,19 +17,22 @@ namespace slabstream {
 
 namespace {
 
-// InvalidArgument: too many voxels for a light volume, and nobody holds them.
-Result<CoarserLevel> LightVolumeFrom(const std::string& name, DatasetId dataset, const VolumeSummary& summary) {
-  CoarserLevel light = {dataset, summary.description, summary.stored};
-  const Index3& size = summary.description.geometry.size;
+// `name`: of the field. InvalidArgument: too many voxels for a light volume, and nobody holds them.
+Result<CoarserLevel> LightVolumeFrom(const std::string& name, const CoarserVolume& from, double unit) {
+  const VolumeSummary& summary = *from.summary;
+  CoarserLevel light = {from.dataset, summary.description, summary.stored};
+  VolumeGeometry& geometry = light.description.geometry;
+  const Index3& size = geometry.size;
   if (!summary.stored) {
-    light.dataset = LightVolumeOf(dataset);
-    light.description.geometry = LightGeometry(summary.description.geometry);
-  } else if (!IsLightSized(summary.description.geometry)) {
+    light.dataset = LightVolumeOf(from.dataset);
+    geometry = LightGeometry(geometry);
+  } else if (!IsLightSized(geometry)) {
     return Status::InvalidArgument(
-        fmt::format("shadows and ambient-occlusion need a level of dataset \"{}\" of at most {} voxels a side, and its coarsest one has "
+        fmt::format("shadows and ambient-occlusion need a level of {} of at most {} voxels a side, and its coarsest one has "
                     "{} x {} x {}; slabstream convert makes levels",
                     name, kMaxLightSide, size.x, size.y, size.z));
   }
+  geometry = InUnit(geometry, unit);
   return light;
 }
 
@@ -55,7 +58,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
     return description;
   };
   setup.description = in_unit(summary.description);
-  setup.layers = summary.layers();
+  setup.cells = !summary.cells.empty();
   setup.range = summary.range;
   setup.stored = summary.stored;
   for (const CoarserVolume& level : resolved.coarser) {
@@ -66,12 +69,12 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   setup.transfer = InUnit(resolved.volume.transfer(), setup.unit);
   const ClipRegion& clip = resolved.volume.clip();
   setup.clip = InUnit(clip, setup.unit);
-  setup.looks = resolved.volume.looks();
   setup.weight = resolved.weight;
   setup.flat = request.clipping.slab.has_value();
   for (std::size_t i = 0; i < resolved.fields.others.size(); ++i) {
     const FieldVolume& other = resolved.fields.others[i];
-    FieldSetup field{.levels = {}, .of_volume = other.of_volume, .look = resolved.volume.fields()[i].look};
+    const ClassifiedField& shown = resolved.volume.fields()[i];
+    FieldSetup field{.levels = {}, .of_volume = other.of_volume, .look = shown.look, .labels = shown.labels};
     for (const CoarserVolume& level : other.levels) {
       field.levels.push_back({level.dataset, in_unit(level.summary->description), level.summary->stored});
     }
@@ -86,11 +89,16 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
   if (setup.shading.shadows > 0 && setup.shading.lights.empty()) setup.shading.lights = {Normalized(BesideViewer(setup.camera))};
   if (setup.shading.needs_light_volume()) {
-    const CoarserVolume from = resolved.light.value_or(CoarserVolume{setup.dataset, resolved.summary});
-    Result<CoarserLevel> light = LightVolumeFrom(request.dataset, from.dataset, *from.summary);
+    const std::string name = fmt::format("dataset \"{}\"", request.dataset);
+    Result<CoarserLevel> light = LightVolumeFrom(name, resolved.light.value_or(CoarserVolume{setup.dataset, resolved.summary}), setup.unit);
     if (!light.ok()) return light.status();
-    light->description = in_unit(light->description);
     setup.light = *std::move(light);
+    for (std::size_t i = 0; i + 1 < resolved.fields.values(); ++i) {
+      const FieldVolume& other = resolved.fields.others[i];
+      light = LightVolumeFrom(fmt::format("field {} of {}", other.number, name), other.light.value_or(other.levels.front()), setup.unit);
+      if (!light.ok()) return light.status();
+      setup.fields[i].light = *std::move(light);
+    }
   }
   setup.termination = request.termination;
   return setup;

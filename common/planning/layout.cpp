@@ -124,7 +124,7 @@ struct LayoutMaker::State {
     const Index3 units = UnitsOver(bounds.end, unit);
     const WorkField work = WorkField::Uniform(units);
     const std::int64_t slots = request.slots, count = std::int64_t(CountIn(units));
-    const std::int64_t bytes = bounds.voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
+    const std::int64_t bytes = bounds.voxel_count() * std::int64_t(BytesPerSample(request.summary->description.type));
     const int least = int(std::clamp<std::int64_t>(bytes / (request.box_bytes_target * slots), 1, kMaxGroups));
     for (int groups = policy.groups > 0 ? policy.groups : least; groups <= kMaxGroups; groups += std::max(1, groups / 8)) {
       const std::int64_t boxes = std::min(groups * slots, kMostBoxes);
@@ -175,7 +175,7 @@ struct LayoutMaker::State {
   }
 
   std::int64_t BytesOf(const LevelBox& at) const {
-    return PaddedBoxOf(at).voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
+    return PaddedBoxOf(at).voxel_count() * std::int64_t(BytesPerSample(request.summary->description.type));
   }
   int LeastBoxes(const ResolvedPolicy& policy) const {
     return int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes));
@@ -247,7 +247,7 @@ struct LayoutMaker::State {
   bool stopped() const { return request.stop.stop_requested(); }
 
   bool BoxesFit(const Partition& partition) {
-    const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
+    const auto sample_bytes = std::int64_t(BytesPerSample(request.summary->description.type));
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
       const std::int64_t bytes = Grown(box, request.volume->renderer()->reach(), partition.bounds()).voxel_count() * sample_bytes;
       return bytes <= request.box_bytes_target || !fields.Shows(box);
@@ -318,7 +318,7 @@ struct LayoutMaker::State {
     if (request.summary->indexed == nullptr) return std::nullopt;
     const RendererKind& renderer = *request.volume->renderer();
     return UnreadParts(*request.summary, renderer.DrawnTable(request.volume->transfer(), *request.summary), renderer.reach(),
-                       LabelBricks(*request.summary, request.volume->looks()));
+                       OtherBricks(*request.summary, *request.volume));
   }
 
   // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work

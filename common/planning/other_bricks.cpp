@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "common/frame/matter_labels.h"
 #include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
 #include "common/renderers/renderer_kind.h"
@@ -13,27 +12,29 @@
 namespace slabstream {
 namespace {
 
-void AddLabels(const VolumeSummary& labels, const LabelLook& look, std::vector<std::uint8_t>& bricks) {
-  const MatterLabels matter(look);
-  if (!matter.any()) return;
-  bricks.resize(labels.bricks.size());
-  for (std::size_t i = 0; i < bricks.size(); ++i) {
-    if (matter.AnyBetween(labels.bricks[i].min, labels.bricks[i].max)) bricks[i] = 1;
+// Whether labels may be material in a box of theirs. Of a level that nobody has read they may be anywhere.
+bool AnyMatter(const VolumeSummary& labels, const LabelLook& look, const Box& box) {
+  const BrickRangeList& ranges = labels.indexed != nullptr ? *labels.indexed : labels.bricks;
+  if (ranges.empty()) return true;
+  for (const Index3& brick : IndicesIn(CubesTouched(box, kBrick))) {
+    if (MayBeMatter(look, ranges[NumberIn(labels.brick_counts, brick)])) return true;
   }
+  return false;
 }
 
-// Bricks of the volume at which the field may show.
-void AddField(const VolumeSummary& volume, const ClassifiedField& field, const RendererKind& renderer, std::vector<std::uint8_t>& bricks) {
-  const BrickVisibility visibility(*field.summary, renderer.DrawnTable(field.look.transfer, *field.summary));
+// Bricks of the volume at which the field may show: shows(box of its voxels).
+template <class Shows>
+void AddField(const VolumeSummary& volume, const VolumeSummary& field, std::int32_t reach, Shows&& shows,
+              std::vector<std::uint8_t>& bricks) {
   const VolumeGeometry& geometry = volume.description.geometry;
-  const Index3& size = field.summary->description.geometry.size;
-  const AffineMap map = AffineMapBetween(geometry, field.summary->description.geometry);
+  const Index3& size = field.description.geometry.size;
+  const AffineMap map = AffineMapBetween(geometry, field.description.geometry);
   bricks.resize(CountIn(volume.brick_counts));
   ParallelFor(0, volume.brick_counts.z, [&](std::int32_t z) {
     for (const Index3& brick : IndicesIn(Box{{0, 0, z}, {volume.brick_counts.x, volume.brick_counts.y, z + 1}})) {
       const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds());
-      const Box voxels = CoveringVoxels(box, map, size, renderer.reach());
-      if (!voxels.empty() && visibility.AnyVisible(voxels)) bricks[NumberIn(volume.brick_counts, brick)] = 1;
+      const Box voxels = CoveringVoxels(box, map, size, reach);
+      if (!voxels.empty() && shows(voxels)) bricks[NumberIn(volume.brick_counts, brick)] = 1;
     }
   });
 }
@@ -41,15 +42,19 @@ void AddField(const VolumeSummary& volume, const ClassifiedField& field, const R
 }  // namespace
 
 std::vector<std::uint8_t> OtherBricks(const VolumeSummary& summary, const ClassifiedVolume& volume) {
-  std::vector<std::uint8_t> bricks = LabelBricks(summary, volume.looks());
-  for (const ClassifiedField& field : volume.fields()) AddField(summary, field, *volume.renderer(), bricks);
-  if (std::ranges::count(bricks, 1) == 0) bricks.clear();
-  return bricks;
-}
-
-std::vector<std::uint8_t> LabelBricks(const VolumeSummary& summary, const LayerLooks& looks) {
   std::vector<std::uint8_t> bricks;
-  if (looks.labels) AddLabels(*summary.labels, *looks.labels, bricks);
+  const RendererKind& renderer = *volume.renderer();
+  for (const ClassifiedField& field : volume.fields()) {
+    if (field.labels && field.labels->mode != LabelMode::kSurface) continue;
+    if (field.labels) {
+      const auto shows = [&](const Box& box) { return AnyMatter(*field.summary, *field.labels, box); };
+      AddField(summary, *field.summary, 0, shows, bricks);  // a sample has the label of one voxel, not a mix of several
+    } else {
+      const BrickVisibility visibility(*field.summary, renderer.DrawnTable(field.look.transfer, *field.summary));
+      AddField(
+          summary, *field.summary, renderer.reach(), [&](const Box& box) { return visibility.AnyVisible(box); }, bricks);
+    }
+  }
   if (std::ranges::count(bricks, 1) == 0) bricks.clear();
   return bricks;
 }

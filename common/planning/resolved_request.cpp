@@ -18,10 +18,6 @@
 namespace slabstream {
 namespace {
 
-Status Missing(const FrameRequest& request, std::string_view layer, std::string_view option) {
-  return Status::InvalidArgument(fmt::format("dataset \"{}\" has no {}: it cannot be shown with {}", request.dataset, layer, option));
-}
-
 std::string Span(const LabelTable& table) {
   if (table.labels.empty()) return "it has none";
   return fmt::format("it has {} from {} to {}", table.labels.size(), table.labels.front().value, table.labels.back().value);
@@ -40,51 +36,61 @@ Status NoneNamed(const std::string& name, const LabelTable& table) {
                                              more));
 }
 
+// The labels of a range, or those that have its name.
+Status AddShown(const LabelRange& range, const LabelTable& table, std::vector<LabelLook::Span>& shown) {
+  const auto covered = [&](const Label& label) { return Covers(range, label); };
+  if (!range.name.empty()) {
+    for (const Label& label : table.labels) {
+      if (covered(label)) shown.push_back({label.value, label.value});
+    }
+    return std::ranges::any_of(table.labels, covered) ? Status::Ok() : NoneNamed(range.name, table);
+  }
+  shown.push_back({range.first, range.last});
+  if (!table.complete || std::ranges::any_of(table.labels, covered)) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
+}
+
+// Spans that rise and do not touch.
+std::vector<LabelLook::Span> Joined(std::vector<LabelLook::Span> spans) {
+  std::ranges::sort(spans, {}, &LabelLook::Span::first);
+  std::vector<LabelLook::Span> joined;
+  for (const LabelLook::Span& span : spans) {
+    if (joined.empty() || span.first - 1 > joined.back().last) {
+      joined.push_back(span);
+    } else {
+      joined.back().last = std::max(joined.back().last, span.last);
+    }
+  }
+  return joined;
+}
+
 // `slice`: of a slice, which keeps the grey values of hidden labels.
 Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table, bool slice) {
   LabelLook look{.mode = choice.mode == LabelMode::kHighlight ? LabelMode::kTint : choice.mode, .tint = choice.tint};
-  for (const Label& label : table.labels) {
-    look.entries.push_back({.color = {label.color[0], label.color[1], label.color[2]}, .opacity = 1, .shown = choice.shown.empty()});
-  }
-  const auto first_from = [&](std::uint32_t value) {
-    return std::size_t(std::ranges::lower_bound(table.labels, value, {}, &Label::value) - table.labels.begin());
-  };
+  look.hides = choice.mode == LabelMode::kTint && !slice;
+  const auto rgb = [](const LabelColor& color) { return Rgb{color[0], color[1], color[2]}; };
+  for (const Label& label : table.labels) look.entries.push_back({label.value, rgb(label.color)});
   for (const LabelRange& range : choice.shown) {
-    bool any = false;
-    for (std::size_t i = 0; i < table.labels.size(); ++i) {
-      if (Covers(range, table.labels[i])) look.entries[i].shown = any = true;
-    }
-    if (any) continue;
-    if (!range.name.empty()) return NoneNamed(range.name, table);
-    return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
+    if (Status added = AddShown(range, table, look.shown); !added.ok()) return added;
   }
+  look.shown = Joined(std::move(look.shown));
   for (const auto& [value, opacity] : choice.opacities) {
-    const std::size_t i = first_from(value);
-    if (i == table.labels.size() || table.labels[i].value != value) {
-      return Status::InvalidArgument(fmt::format("labels.opacities: no label {}; {}", value, Span(table)));
+    auto entry = std::ranges::lower_bound(look.entries, value, {}, &LabelLook::Entry::value);
+    if (entry == look.entries.end() || entry->value != value) {
+      if (table.complete) return Status::InvalidArgument(fmt::format("labels.opacities: no label {}; {}", value, Span(table)));
+      entry = look.entries.insert(entry, {value, rgb(StandardColor(value))});
     }
-    look.entries[i].opacity = float(opacity);
-  }
-  for (LabelLook::Entry& entry : look.entries) {
-    if (choice.mode == LabelMode::kTint && !slice && !entry.shown) entry = {.color = entry.color, .opacity = 0};
+    entry->opacity = float(opacity);
   }
   return look;
-}
-
-Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummary& summary) {
-  LayerLooks looks;
-  if (request.labels) {
-    if (summary.labels == nullptr) return Missing(request, "labels", "--label-mode, --label-tint, --label-opacity or --labels-shown");
-    Result<LabelLook> labels = ResolveLabels(*request.labels, *summary.label_table, request.clipping.slab.has_value());
-    if (!labels.ok()) return labels.status();
-    looks.labels = *std::move(labels);
-  }
-  return looks;
 }
 
 }  // namespace
 
 Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary) {
+  if (IsOfLabels(summary.description.type)) {
+    return Status::InvalidArgument(fmt::format("dataset \"{}\" is one of labels (?ids), which need values that they name", dataset));
+  }
   if (!renderer.Can(Ability::kCells) || !summary.cells.empty()) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume", renderer.name(), dataset));
@@ -112,15 +118,15 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
                                                projects ? "max" : "add or over"));
   }
   constexpr std::size_t kMostProjected = 4;  // a pixel holds as many values
-  if (projects && fields.others.size() >= kMostProjected) {
+  if (projects && fields.values() > kMostProjected) {
     return Status::InvalidArgument(
-        fmt::format("{} fields of dataset \"{}\" would show, but renderer '{}' shows at most {}: name some with channel",
-                    fields.others.size() + 1, request.dataset, renderer.name(), kMostProjected));
+        fmt::format("{} fields of dataset \"{}\" would show, but renderer '{}' shows at most {}: name some with channel", fields.values(),
+                    request.dataset, renderer.name(), kMostProjected));
   }
   const auto parameters = ParseParameters(renderer, request.parameters);
-  if (projects && !fields.others.empty() && parameters.ok() && renderer.FormatOf(*parameters) != PixelFormat::kMaximum) {
-    return Status::InvalidArgument(fmt::format("projection-mode is 'mean', which shows one field, but {} of dataset \"{}\" show",
-                                               fields.others.size() + 1, request.dataset));
+  if (projects && fields.values() > 1 && parameters.ok() && renderer.FormatOf(*parameters) != PixelFormat::kMaximum) {
+    return Status::InvalidArgument(
+        fmt::format("projection-mode is 'mean', which shows one field, but {} of dataset \"{}\" show", fields.values(), request.dataset));
   }
   std::vector<ClassifiedField> resolved;
   for (const FieldVolume& other : fields.others) {
@@ -130,6 +136,12 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
       return Status::InvalidArgument(fmt::format("field {} of dataset \"{}\" lies in a {} world, the volume in a {} one", other.number,
                                                  request.dataset, NameOf(geometry.orientation.world),
                                                  NameOf(volume.description.geometry.orientation.world)));
+    }
+    if (other.labels) {
+      Result<LabelLook> labels = ResolveLabels(*request.labels, *level.summary->labels, request.clipping.slab.has_value());
+      if (!labels.ok()) return labels.status();
+      resolved.push_back({level.dataset, level.summary, {}, *std::move(labels)});
+      continue;
     }
     const VolumeSummary& statistics = other.statistics != nullptr ? *other.statistics : *level.summary;
     Result<FieldLook> look = LookOf(request, *fields.dataset, other.number, statistics, HasFullRange(request, renderer));
@@ -149,7 +161,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   const VolumeGeometry& geometry = summary->description.geometry;
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
   const Result<std::vector<const RendererKind*>> able =
-      RenderersFor(request, {fields.others.size() + 1, std::ranges::any_of(request.fields, weighted)});
+      RenderersFor(request, {fields.values(), std::ranges::any_of(request.fields, weighted)});
   if (!able.ok()) return able.status();
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
@@ -178,11 +190,9 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   Brighten(request.brightness, *transfer);
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
   if (!clip.ok()) return clip.status();
-  Result<LayerLooks> layers = ResolveLayers(request, *summary);
-  if (!layers.ok()) return layers.status();
   Result<std::vector<ClassifiedField>> others = ResolveFields(request, *summary, fields, renderer, transfer->opacity_distance);
   if (!others.ok()) return others.status();
-  const ClassifiedVolume volume{dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers), *std::move(others)};
+  const ClassifiedVolume volume{dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(others)};
   request.view = WithDefaults(request.view, geometry.orientation.world);
   std::optional<Ball> framed;
   if (*request.view.fit) {

@@ -26,8 +26,7 @@ struct ResolvedRequest {
   // If the picture is drawn from several levels: which one each part, and those beside the summary's, finest first. Null: there are none.
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
-  // The level that the light volume is made from, if the dataset has several levels and the request shows shadows or
-  // ambient occlusion.
+  // The level that the light volume is made from. None: the one that is drawn.
   std::optional<CoarserVolume> light = {};
   std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
   ShownFields fields = {};

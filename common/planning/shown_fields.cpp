@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -31,14 +32,15 @@ std::string NameOf(const DatasetFields& dataset, int number) {
   return name.empty() ? fmt::format("{}", number) : fmt::format("{} ({})", number, Printable(name));
 }
 
-// By name, or by number.
+// By name, or by number. Not the labels: LabelChoice shows them.
 Result<int> FieldNamed(const std::string& text, const FrameRequest& request, const DatasetFields& dataset) {
-  const auto named = std::ranges::find(dataset.fields, text, &FieldInfo::name);
-  if (named != dataset.fields.end()) return int(named - dataset.fields.begin());
-  if (const auto number = ParseNumber<int>(text); number && *number >= 0 && *number < int(dataset.fields.size())) return *number;
+  const auto values = std::span(dataset.fields).first(std::size_t(dataset.values()));
+  const auto named = std::ranges::find(values, text, &FieldInfo::name);
+  if (named != values.end()) return int(named - values.begin());
+  if (const auto number = ParseNumber<int>(text); number && *number >= 0 && *number < dataset.values()) return *number;
   constexpr int kMostNamed = 12;
   std::vector<std::string> names, all;
-  for (int i = 0; i < int(dataset.fields.size()); ++i) {
+  for (int i = 0; i < dataset.values(); ++i) {
     if (i < kMostNamed) names.push_back(NameOf(dataset, i));
     all.push_back(dataset.fields[std::size_t(i)].name);
   }
@@ -96,6 +98,8 @@ TransferFunction Ramp(const Rgb& color, const ScalarRange& range, double gamma, 
 FrameRequest WithOverlayAsField(FrameRequest request) {
   if (!request.overlay) return request;
   const OverlayChoice overlay = *std::exchange(request.overlay, std::nullopt);
+  // That it shows says nothing beside its look by the options of channels.
+  if (overlay == OverlayChoice() && std::ranges::count(request.fields, kOverlayField, &FieldChoice::field) > 0) return request;
   request.fields.push_back({.field = std::string(kOverlayField),
                             .shown = true,
                             .choice = overlay.choice,
@@ -105,7 +109,7 @@ FrameRequest WithOverlayAsField(FrameRequest request) {
 }
 
 Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFields& dataset) {
-  const int count = int(dataset.fields.size());
+  const int count = dataset.values();
   std::vector<bool> shows(std::size_t(count), false);
   if (request.channels.empty()) {
     const bool any = std::ranges::any_of(dataset.fields, [](const FieldInfo& field) { return field.channel && field.shown; });
@@ -184,6 +188,16 @@ Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const
                     .time = *time};
   for (const int number : found.numbers) {
     if (number != found.fields.volume) found.fields.others.push_back({.number = number});
+  }
+  if (request.labels) {
+    const std::optional<int> labels = found.fields.dataset->labels();
+    if (!labels) {
+      return Status::InvalidArgument(
+          fmt::format("dataset \"{}\" has no labels: it cannot be shown with --label-mode, --label-tint, --label-opacity or --labels-shown",
+                      request.dataset));
+    }
+    found.numbers.push_back(*labels);
+    found.fields.others.push_back({.number = *labels, .labels = true});
   }
   return found;
 }

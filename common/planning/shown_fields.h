@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/base/status.h"
@@ -26,9 +27,11 @@ struct CoarserVolume {
 // A field that a picture shows beside its volume.
 struct FieldVolume {
   int number = 0;                                        // of the field
+  bool labels = false;                                   // its values are labels
   std::vector<CoarserVolume> levels;                     // FieldSetup::levels
   std::shared_ptr<const VolumeSummary> statistics = {};  // ShownFields::statistics
   std::vector<std::uint32_t> of_volume;                  // FieldSetup::of_volume
+  std::optional<CoarserVolume> light = {};               // ResolvedRequest::light, of this field
   friend bool operator==(const FieldVolume&, const FieldVolume&) = default;
 };
 
@@ -37,10 +40,13 @@ struct ShownFields {
   std::shared_ptr<const DatasetFields> dataset = nullptr;  // null: it has one field, of which nothing is known
   int volume = 0;                                          // the number of the field that is the picture's volume
   bool volume_shows = true;                                // FieldNumbers::volume_shows
-  std::vector<FieldVolume> others = {};                    // by ascending numbers
+  std::vector<FieldVolume> others = {};                    // by ascending numbers, so labels are the last one
   // From which transfer functions and ranges are made, so that all times look alike: those of the time that the dataset itself shows. Null:
   // those of the volume.
   std::shared_ptr<const VolumeSummary> statistics = nullptr;
+
+  // How many show that have values, with the volume.
+  std::size_t values() const { return 1 + others.size() - (!others.empty() && others.back().labels ? 1 : 0); }
 };
 
 // The request with its overlay as what it is: one of the fields.
@@ -60,10 +66,11 @@ Result<int> TimeToShow(const FrameRequest& request, const DatasetFields& dataset
 // What a request shows of a dataset.
 struct ShownAtTime {
   ShownFields fields;        // `others` have only their numbers
-  std::vector<int> numbers;  // of all fields, the volume's first
+  std::vector<int> numbers;  // of all fields, the volume's first, labels last
   int time = 0;
 };
-// `dataset`: null: there is one field, of which nothing is known. Errors of FieldsToShow and TimeToShow.
+// `dataset`: null: there is one field, of which nothing is known. Errors of FieldsToShow and TimeToShow; InvalidArgument: labels are
+// asked for, and it has none.
 Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const DatasetFields> dataset);
 
 // How the request shows a field that the values of `summary` are those of. Blend::kAuto becomes that of the field. `full`: the strongest

@@ -17,7 +17,7 @@ namespace slabstream {
 class UnreadParts {
  public:
   // summary.indexed is not null, summary.stored has a value; `summary` must outlive this. `drawn`: RendererKind::DrawnTable; `reach`: of
-  // the renderer, in voxels; `layers`: LabelBricks (other_bricks.h).
+  // the renderer, in voxels; `layers`: OtherBricks (other_bricks.h).
   UnreadParts(const VolumeSummary& summary, ClassificationTable drawn, std::int32_t reach, const std::vector<std::uint8_t>& layers);
 
   // Whether a sample that `box` owns may show something. The box is not empty, and inside the volume.

@@ -111,7 +111,13 @@ std::uint64_t LightBytes(const FrameSetup& setup) {
   // Of two looks: extinction in two orders, and shares of light for two lights.
   constexpr std::uint64_t kOfVoxel = 24, kOfLight = 8;
   const std::uint64_t lights = std::max<std::size_t>(setup.shading.lights.size(), 1);
-  return CountIn(setup.light->description.geometry.size) * (BytesPerSample(setup.light->description.type) + kOfVoxel + kOfLight * lights);
+  std::uint64_t bytes = CountIn(setup.light->description.geometry.size) * (kOfVoxel + kOfLight * lights);
+  // Samples, and of other fields the extinction until it is added to the volume's.
+  for (const CoarserLevel* const light : LightVolumesOf(setup)) {
+    const std::size_t sample = BytesPerSample(light->description.type) + (light == &*setup.light ? 0 : sizeof(float));
+    bytes += CountIn(light->description.geometry.size) * sample;
+  }
+  return bytes;
 }
 
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share) {
@@ -126,7 +132,6 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double
     });
   }
   auto bytes = std::uint64_t((1 + derived_share) * double(voxels * BytesPerSample(summary.description.type)));
-  if (summary.labels != nullptr) bytes += VoxelBytes(padded, *summary.labels, derived_share);
   return bytes + BytesOfCells(padded, summary);
 }
 
@@ -151,7 +156,7 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
   const double derived_share = DerivedShare(plan.setup);
   const auto at_most = [&](const Box& padded, std::uint8_t level) {
-    const double bytes = double(padded.voxel_count()) * double(summary.types().bytes_per_voxel());
+    const double bytes = double(padded.voxel_count()) * double(BytesPerSample(summary.description.type));
     return std::uint64_t((1 + derived_share) * bytes) + (level == 0 ? BytesOfCells(padded, summary) : 0);
   };
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, at_most);

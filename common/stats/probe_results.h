@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "common/math/vec.h"
-#include "common/volume/layers.h"
+#include "common/volume/labels.h"
 
 namespace slabstream {
 
 // ---- at a point
 
 struct LabelAt {
-  std::uint32_t value = 0;  // as in the file; 0: none
+  std::uint64_t value = 0;  // as in the file; 0: none
   std::string name = {};    // "": none is known
   friend bool operator==(const LabelAt&, const LabelAt&) = default;
 };

@@ -96,7 +96,7 @@ void BrickedVoxels::WriteRun(const Index3& voxel, const T* samples, std::int32_t
 
 void BrickedVoxels::Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
   CHECK(grid_.box.Contains(box));
-  VisitScalarType(type_, [&]<class T>(const T*) {
+  VisitStoredType(type_, [&]<class T>(const T*) {
     ForEachRun<const T>(box, begin, samples, [&](const Index3& voxel, const T* from, std::int32_t count) { WriteRun(voxel, from, count); });
   });
 }
@@ -112,7 +112,7 @@ BrickedVoxels::BrickedVoxels(const VoxelBlock& block) : BrickedVoxels(block.box,
 
 void VoxelBricks::Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const {
   CHECK(grid_.box.Contains(box));
-  VisitScalarType(type_, [&]<class T>(const T*) {
+  VisitStoredType(type_, [&]<class T>(const T*) {
     ForEachRun<T>(box, begin, samples, [&](const Index3& voxel, T* to, std::int32_t count) {
       const BrickView<T> view = View<T>(voxel / kBrick);
       CopyRun(to, view.Row(voxel.y, voxel.z) + (voxel.x - view.begin.x), count);

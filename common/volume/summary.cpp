@@ -86,15 +86,19 @@ class StoredCounts {
   std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(kWays * kValues);
 };
 
+// Floats are counted once their range is known; labels never, since a label says nothing of those beside it.
 struct NoCounts {
-  void Add(const float*, std::int32_t) {}
+  template <class T>
+  void Add(const T*, std::int32_t) {}
 };
+template <class T>
+constexpr bool kIsCounted = std::is_integral_v<T> && sizeof(T) <= 2;
 
 // What one thread finds.
 template <class T>
 struct Part {
   StoredRange<T> range;
-  std::conditional_t<std::is_integral_v<T>, StoredCounts<T>, NoCounts> counts;
+  std::conditional_t<kIsCounted<T>, StoredCounts<T>, NoCounts> counts;
 };
 struct FloatPart {
   std::array<std::uint64_t, kHistogramBins> histogram{};
@@ -133,7 +137,7 @@ class PiecesOf {
     StoredRange<T> whole;
     parts_.ForEach([&](const Part<T>& part) { whole.Include(part.range); });
     summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
-    if constexpr (std::is_integral_v<T>) {
+    if constexpr (kIsCounted<T>) {
       for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
         std::uint64_t& bin = summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))];
         parts_.ForEach([&](const Part<T>& part) { bin += part.counts[stored]; });
@@ -174,12 +178,13 @@ ValueRange AnyValueOf(const ValueMapping& mapping) {
 }  // namespace
 
 ValueRange AnyValue(const VolumeDescription& description) {
-  return VisitScalarType(description.type, [&]<class T>(const T*) { return AnyValueOf<T>(description.mapping); });
+  return VisitStoredType(description.type, [&]<class T>(const T*) { return AnyValueOf<T>(description.mapping); });
 }
 
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
   VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
   summary.non_finite = surveyed.non_finite;
+  summary.labels = surveyed.labels;
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
   return summary;
 }
@@ -189,7 +194,7 @@ ValueRange DataRange(const VolumeDescription& description, const ValueRange& sam
 }
 
 void FindBrickRanges(const VoxelBlock& piece, const Index3& brick_counts, BrickRangeList& bricks) {
-  VisitScalarType(piece.type, [&]<class T>(const T*) {
+  VisitStoredType(piece.type, [&]<class T>(const T*) {
     ForEachRowOfBricks<T>(
         piece, [&] { return &bricks; }, [](BrickRangeList&, const T*, std::int32_t) {},
         [&](BrickRangeList& all, const Index3& brick, const StoredRange<T>& range) {
@@ -200,14 +205,14 @@ void FindBrickRanges(const VoxelBlock& piece, const Index3& brick_counts, BrickR
 
 struct PiecewiseSummary::State {
   VolumeSummary summary;
-  std::variant<PiecesOf<std::uint8_t>, PiecesOf<std::uint16_t>, PiecesOf<float>> pieces;
+  std::variant<PiecesOf<std::uint8_t>, PiecesOf<std::uint16_t>, PiecesOf<float>, PiecesOf<std::uint32_t>, PiecesOf<std::uint64_t>> pieces;
 };
 
 PiecewiseSummary::PiecewiseSummary(const VolumeDescription& description) : state_(std::make_unique<State>()) {
   VolumeSummary& summary = state_->summary;
   summary.description = description;
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
-  VisitScalarType(description.type, [&]<class T>(const T*) { state_->pieces.emplace<PiecesOf<T>>(); });
+  VisitStoredType(description.type, [&]<class T>(const T*) { state_->pieces.emplace<PiecesOf<T>>(); });
 }
 
 PiecewiseSummary::~PiecewiseSummary() = default;
@@ -236,16 +241,6 @@ VolumeSummary Summarize(const Volume& volume) {
   pieces.Add(volume.block);
   if (pieces.EndOfPieces()) pieces.AddAgain(volume.block);
   return pieces.Take();
-}
-
-VolumeSummary Summarize(const LayeredVolume& volume) {
-  VolumeSummary summary = Summarize(*volume.volume);
-  const auto of_layer = [](const std::shared_ptr<const Volume>& layer) {
-    return layer == nullptr ? nullptr : std::make_shared<const VolumeSummary>(Summarize(*layer));
-  };
-  summary.labels = of_layer(volume.layers.labels);
-  summary.label_table = volume.layers.table;
-  return summary;
 }
 
 }  // namespace slabstream

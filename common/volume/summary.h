@@ -12,7 +12,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/volume/layers.h"
+#include "common/volume/labels.h"
+#include "common/volume/sample_types.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/volume.h"
 
@@ -47,9 +48,7 @@ struct VolumeSummary {
   Index3 brick_counts;                                    // bricks along each axis
   BrickRangeList bricks;        // ranges of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
   std::int64_t non_finite = 0;  // voxels that are NaN or infinite: never visible
-  // The summary of its labels, whose values are their numbers; null: there are none.
-  std::shared_ptr<const VolumeSummary> labels = nullptr;
-  std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
+  std::shared_ptr<const LabelTable> labels = nullptr;  // of a field of labels, else null
   // Nobody holds the voxels, but they can be read there. None: they are held.
   std::optional<StoredAt> stored = {};
   // What an index knows of the bricks of a stored level, in place of `bricks`. It says which voxels need not be read,
@@ -57,13 +56,7 @@ struct VolumeSummary {
   std::shared_ptr<const BrickRangeList> indexed = nullptr;
   std::vector<std::uint32_t> cells;  // for an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
-  LayerTypes layers() const {
-    LayerTypes types;
-    if (labels != nullptr) types.labels = labels->description.type;
-    types.cells = !cells.empty();
-    return types;
-  }
-  SampleTypes types() const { return {description.type, layers()}; }
+  SampleTypes types() const { return {description.type, !cells.empty()}; }
 
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
 };
@@ -105,7 +98,5 @@ class PiecewiseSummary {
 // Reads every voxel once; those of float volumes a second time for the histogram. Parallel; the result is the same for any number of
 // threads.
 VolumeSummary Summarize(const Volume& volume);
-// With the summaries of its layers.
-VolumeSummary Summarize(const LayeredVolume& volume);
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 // [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the world (mm for scans).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -19,11 +20,16 @@ inline constexpr std::int32_t kMaxVolumeSide = 65535;  // voxels along an axis: 
 // Voxels along an axis of a brick: a cube at a global multiple of this, for ranges of values (summary.h) and for storage (bricks.h).
 inline constexpr std::int32_t kBrick = 16;
 
-enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3 };
+// kUint32 and kUint64 are of labels alone (labels.h): whoever draws or summarizes values never meets them.
+enum class ScalarType : std::uint8_t { kUint8 = 1, kUint16 = 2, kFloat32 = 3, kUint32 = 4, kUint64 = 5 };
+constexpr bool IsOfLabels(ScalarType type) { return type == ScalarType::kUint32 || type == ScalarType::kUint64; }
 
-constexpr std::size_t BytesPerSample(ScalarType type) { return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : 4; }
+constexpr std::size_t BytesPerSample(ScalarType type) {
+  return type == ScalarType::kUint8 ? 1 : type == ScalarType::kUint16 ? 2 : type == ScalarType::kUint64 ? 8 : 4;
+}
 constexpr std::string_view NameOf(ScalarType type) {
-  return type == ScalarType::kUint8 ? "uint8" : type == ScalarType::kUint16 ? "uint16" : "float32";
+  constexpr std::array<std::string_view, 5> kNames = {"uint8", "uint16", "float32", "uint32", "uint64"};
+  return kNames.at(std::size_t(type) - 1);
 }
 
 struct VolumeGeometry {
@@ -88,9 +94,28 @@ decltype(auto) VisitScalarType(ScalarType type, Function&& function) {
   switch (type) {
     case ScalarType::kUint8: return function(static_cast<const std::uint8_t*>(nullptr));
     case ScalarType::kUint16: return function(static_cast<const std::uint16_t*>(nullptr));
-    case ScalarType::kFloat32: break;
+    default: break;
   }
   return function(static_cast<const float*>(nullptr));
+}
+// The same of labels, too, with const std::uint32_t* and const std::uint64_t*.
+template <class Function>
+decltype(auto) VisitStoredType(ScalarType type, Function&& function) {
+  if (type == ScalarType::kUint32) return function(static_cast<const std::uint32_t*>(nullptr));
+  if (type == ScalarType::kUint64) return function(static_cast<const std::uint64_t*>(nullptr));
+  return VisitScalarType(type, function);
+}
+
+// The same of labels alone: whole numbers.
+template <class Function>
+decltype(auto) VisitLabelType(ScalarType type, Function&& function) {
+  switch (type) {
+    case ScalarType::kUint8: return function(static_cast<const std::uint8_t*>(nullptr));
+    case ScalarType::kUint16: return function(static_cast<const std::uint16_t*>(nullptr));
+    case ScalarType::kUint32: return function(static_cast<const std::uint32_t*>(nullptr));
+    default: break;
+  }
+  return function(static_cast<const std::uint64_t*>(nullptr));
 }
 
 struct Mesh;  // common/mesh/mesh.h

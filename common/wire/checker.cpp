@@ -13,7 +13,7 @@ std::string Number(double value) { return std::isnan(value) ? "NaN" : fmt::forma
 
 Checker::Scope Checker::In(std::string_view field, std::optional<std::size_t> index) {
   const std::size_t length = path_.size();
-  path_.append(".").append(field);
+  if (!field.empty()) path_.append(".").append(field);
   if (index) path_.append("[").append(std::to_string(*index)).append("]");
   return {path_, length};
 }

@@ -59,11 +59,12 @@ inline RefusedRequests& operator+=(RefusedRequests& refused, const RefusedReques
                     refused.too_large + more.too_large, refused.over_quota + more.over_quota};
 }
 
-// Bytes of the file, or of the samples of the volume and of its layers.
+// Bytes of the file, or of the samples of the volume, its labels and its overlay.
 inline std::uint64_t BytesToSend(const AddVolume& order) {
   if (order.file) return order.file->bytes;
-  return std::uint64_t(order.description.geometry.bounds().voxel_count()) *
-         SampleTypes(order.description.type, order.layers).bytes_per_voxel();
+  const std::size_t of_voxel =
+      BytesPerSample(order.description.type) + order.label_bytes + (order.overlay ? BytesPerSample(ScalarType::kFloat32) : 0);
+  return std::uint64_t(order.description.geometry.bounds().voxel_count()) * of_voxel;
 }
 
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service

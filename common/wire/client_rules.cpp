@@ -73,9 +73,9 @@ void Rules(const SentFile& m, Checker& check) {
 }
 
 void Rules(const AddVolume& m, Checker& check) {
-  if (m.layers.cells) check.Fail("layers.cells", "cells cannot be sent");
-  const std::size_t most = !m.layers.labels ? 0 : *m.layers.labels == ScalarType::kUint8 ? 255 : kMaxLabels;
-  if (m.labels.size() > most) check.Fail("labels", "more than numbers of the layer's samples");
+  check.That(!IsOfLabels(m.description.type), "description.type", "one of labels");
+  const std::size_t most = m.label_bytes == 0 ? 0 : m.label_bytes == 1 ? 255 : kMaxLabels;
+  if (m.labels.size() > most) check.Fail("labels", "more than numbers of label_bytes");
   CheckRising(
       m.labels, [](const NewLabel& label) { return label.value; }, check);
 }

@@ -39,7 +39,7 @@ struct SlotPlace {
 
 // A label of a dataset that a client sends.
 struct NewLabel {
-  std::uint32_t value = 1;                         // [1, kMaxLabelValue]
+  std::uint64_t value = 1;                         // at least 1
   std::string name = {};                           // at most kMaxLabelNameBytes
   std::optional<std::array<float, 3>> color = {};  // straight, [0, 1]; none: StandardColor
   friend bool operator==(const NewLabel&, const NewLabel&) = default;

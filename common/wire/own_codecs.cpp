@@ -41,18 +41,6 @@ void Read(const v1::PixelBounds& in, PixelBounds& out, Checker& check) {
   if (out.empty()) out = {};
 }
 
-void Write(const LayerTypes& in, v1::LayerTypes& out) {
-  if (in.labels) out.set_label_bytes(std::uint32_t(BytesPerSample(*in.labels)));
-  out.set_overlay(in.overlay.has_value());
-  out.set_cells(in.cells);
-}
-void Read(const v1::LayerTypes& in, LayerTypes& out, Checker& check) {
-  const std::uint32_t label_bytes = check.Range("label_bytes", in.label_bytes(), 0, 2);
-  if (label_bytes > 0) out.labels = label_bytes == 1 ? ScalarType::kUint8 : ScalarType::kUint16;
-  if (in.overlay()) out.overlay = ScalarType::kFloat32;
-  out.cells = in.cells();
-}
-
 void Write(const NewLabel& in, v1::NewLabel& out) {
   out.set_value(in.value);
   out.set_name(WireText(in.name, kMaxLabelNameBytes));
@@ -63,7 +51,8 @@ void Write(const NewLabel& in, v1::NewLabel& out) {
   out.set_blue((*in.color)[2]);
 }
 void Read(const v1::NewLabel& in, NewLabel& out, Checker& check) {
-  out.value = check.Range("value", in.value(), 1, kMaxLabelValue);
+  check.That(in.value() >= 1, "value", "0, which is no label");
+  out.value = in.value();
   out.name = check.Text("name", in.name(), 0, kMaxLabelNameBytes);
   const auto channel = [&](std::string_view field, float value) { return float(check.Between(field, double(value), 0, 1)); };
   const std::array<float, 3> color = {channel("red", in.red()), channel("green", in.green()), channel("blue", in.blue())};
@@ -73,6 +62,7 @@ void Read(const v1::NewLabel& in, NewLabel& out, Checker& check) {
 void Write(const FieldInfo& in, v1::FieldInfo& out) {
   out.set_name(in.name);
   out.set_channel(in.channel);
+  out.set_labels(in.labels);
   out.set_shown(in.shown);
   if (in.window) Write(*in.window, *out.mutable_window());
   if (in.color) Write(Rgb{(*in.color)[0], (*in.color)[1], (*in.color)[2]}, *out.mutable_color());
@@ -80,6 +70,7 @@ void Write(const FieldInfo& in, v1::FieldInfo& out) {
 void Read(const v1::FieldInfo& in, FieldInfo& out, Checker& check) {
   out.name = check.Text("name", in.name(), 0, kMaxNameBytes);
   out.channel = in.channel();
+  out.labels = in.labels();
   out.shown = in.shown();
   if (in.has_window()) ReadPart("window", true, in.window(), out.window.emplace(), check);
   if (!in.has_color()) return;

@@ -39,9 +39,7 @@ void CheckClip(const FrameSetup& setup, Checker& check) {
   }
 }
 
-bool HasValuesOf(const VolumeDescription& description, const FrameSetup& setup) {
-  return description.type == setup.description.type && description.mapping == setup.description.mapping;
-}
+bool HasValuesOf(const VolumeDescription& a, const VolumeDescription& b) { return a.type == b.type && a.mapping == b.mapping; }
 
 void CheckCoarser(const FrameSetup& setup, Checker& check) {
   if (setup.coarser.empty()) return;
@@ -50,44 +48,46 @@ void CheckCoarser(const FrameSetup& setup, Checker& check) {
   for (std::size_t i = 0; i < setup.coarser.size(); ++i) {
     const auto level = check.In("", i);
     const VolumeDescription& description = setup.coarser[i].description;
-    check.That(HasValuesOf(description, setup), "description", "of other values than the volume");
+    check.That(HasValuesOf(description, setup.description), "description", "of other values than the volume");
     check.That(CanStandIn(description.geometry, setup.description.geometry), "description", "not of the same part of the world");
   }
 }
 
-void CheckLight(const FrameSetup& setup, Checker& check) {
+// `light`: of the volume, or of a field, which has values as `values`.
+void CheckLight(const std::optional<CoarserLevel>& light, const VolumeDescription& values, const FrameSetup& setup, Checker& check) {
   const auto scope = check.In("light");
-  if (!setup.light) return check.That(!setup.shading.needs_light_volume(), "", "missing");
-  check.That(setup.renderer->Can(Ability::kShadows), "", "not expected by this renderer");
-  const VolumeDescription& description = setup.light->description;
-  check.That(IsLightSized(description.geometry), "description", "more voxels than a light volume has");
-  check.That(HasValuesOf(description, setup), "description", "of other values than the volume");
+  if (!light) return check.That(!setup.shading.needs_light_volume(), "", "missing");
+  check.That(setup.shading.needs_light_volume() && setup.renderer->Can(Ability::kShadows), "", "not expected");
+  check.That(IsLightSized(light->description.geometry), "description", "more voxels than a light volume has");
+  check.That(HasValuesOf(light->description, values), "description", "of other values than the voxels");
 }
 
-void CheckLayers(const FrameSetup& setup, Checker& check) {
+void CheckCellsAndLabels(const FrameSetup& setup, Checker& check) {
   const RendererKind& renderer = *setup.renderer;
-  if (renderer.Can(Ability::kCells)) check.That(setup.layers.cells, "renderer", "one of cells, which the dataset does not have");
-  if (!setup.looks.labels) return;
-  check.That(setup.layers.labels.has_value(), "labels", "of a dataset without labels");
-  check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
+  if (renderer.Can(Ability::kCells)) check.That(setup.cells, "renderer", "one of cells, which the dataset does not have");
+  check.That(!IsOfLabels(setup.description.type), "description.type", "one of labels");
+  if (LabelsOf(setup) != nullptr) check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
 }
 
 void CheckFields(const FrameSetup& setup, Checker& check) {
-  if (setup.fields.empty()) return;
   const auto scope = check.In("fields");
-  check.That(setup.renderer->Can(Ability::kFields), "", "not expected by this renderer");
+  const std::size_t values = setup.fields.size() - (LabelsOf(setup) == nullptr ? 0 : 1);
+  check.That(values == 0 || setup.renderer->Can(Ability::kFields), "", "not expected by this renderer");
+  check.That(values < kMaxShownFields, "", "too many");
   for (std::size_t i = 0; i < setup.fields.size(); ++i) {
     const auto of_field = check.In("", i);
-    const auto& [levels, of_volume, look] = setup.fields[i];
+    const auto& [levels, of_volume, look, light, labels] = setup.fields[i];
     check.That(!levels.empty(), "levels", "missing");
     check.That(of_volume.size() == setup.coarser.size() + 1, "of_volume", "not one for each level of the volume");
     check.That(std::ranges::all_of(of_volume, [&](std::uint32_t level) { return level < levels.size(); }), "of_volume",
                "a level that is missing");
     for (const CoarserLevel& level : levels) {
-      const bool alike =
-          level.description.type == levels.front().description.type && level.description.mapping == levels.front().description.mapping;
-      check.That(alike, "levels", "of other values than the first one");
+      check.That(HasValuesOf(level.description, levels.front().description), "levels", "of other values than the first one");
     }
+    check.That(!labels || i + 1 == setup.fields.size(), "labels", "not the last field");
+    if (labels) continue;
+    check.That(!IsOfLabels(levels.front().description.type), "levels", "of labels");
+    if (!levels.empty()) CheckLight(light, levels.front().description, setup, check);
     const TransferFunction& transfer = look.transfer;
     check.That(transfer.curves_alone(), "look.transfer", "not of curves over values alone");
     check.That(look.blend != Blend::kAuto, "look.blend", "not settled");
@@ -178,8 +178,8 @@ void Rules(const FrameSetup& m, Checker& check) {
     check.Adopt(CheckFits(m.front, m));
   }
   CheckCoarser(m, check);
-  CheckLight(m, check);
-  CheckLayers(m, check);
+  CheckLight(m.light, m.description, m, check);
+  CheckCellsAndLabels(m, check);
   CheckFields(m, check);
   if (check.ok()) check.Adopt(Validate(m.transfer));
   if (check.ok()) check.Adopt(Validate(m.shading));

@@ -10,11 +10,8 @@
 namespace slabstream {
 namespace {
 
-// For the widest sample types and all layers, because only the dataset knows the actual ones.
-std::uint32_t LastChunk(const Box& box) {
-  const SampleTypes widest(ScalarType::kFloat32, {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32});
-  return std::max(ChunkCount(box, widest), 1U) - 1;
-}
+// For the widest samples, because only the dataset knows the actual ones.
+std::uint32_t LastChunk(const Box& box) { return std::max(ChunkCount(box, ScalarType::kUint64), 1U) - 1; }
 
 void CheckChunkNumber(const Box& box, std::uint32_t chunk, Checker& check) {
   const bool of_cells = IsCellChunk(chunk) && chunk - kFirstCellChunk < CellChunkCount(kMaxCellBytes);

@@ -199,8 +199,16 @@ Status DatasetMachine::State::SeekVoxels(Use& use) {
     field.of_volume = std::move(of.of_volume);
     seek_levels(sources[i].name, of.levels);
   }
-  use.has_light = levels != nullptr && use.request->shading.needs_light_volume();
-  if (use.has_light) seek_levels(use.volume, {LightLevelOf(*levels)});
+  if (!use.request->shading.needs_light_volume()) return Status::Ok();
+  sources.resize(use.fields.values());  // labels take no light
+  for (const Use::Entry& source : sources) {
+    const std::shared_ptr<const VolumeLevels> of_field = datasets.Find(source.name)->levels;
+    if (of_field == nullptr) {
+      use.entries.push_back(source);
+    } else {
+      seek_levels(source.name, {LightLevelOf(*of_field)});
+    }
+  }
   return Status::Ok();
 }
 
@@ -244,7 +252,10 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
     field.levels.assign(next, next + count);
     next += count;
   }
-  if (use.has_light) ready.light = voxels.back();
+  if (next != voxels.end()) {
+    ready.light = *next;
+    for (std::size_t i = 0; i + 1 < ready.fields.values(); ++i) ready.fields.others[i].light = *++next;
+  }
   if (use.map != nullptr) {
     ready.levels = datasets.Find(use.volume)->levels;
     ready.drawn = use.map->levels;
@@ -293,7 +304,7 @@ bool DatasetMachine::State::InUse(DatasetId dataset) const {
     return std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
   };
   return std::ranges::any_of(uses, uses_it) || std::ranges::any_of(questions, [&](const auto& open) {
-           return !open.second.asked && (is_of(open.second.entry) || is_of(open.second.overlay));
+           return !open.second.asked && (is_of(open.second.entry) || is_of(open.second.overlay.name) || is_of(open.second.labels.name));
          });
 }
 
@@ -381,7 +392,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     open.entry = name;
     open.check = 0;
     open.fields = {};
-    open.overlay.clear();
+    open.overlay = open.labels = {};
   }
   datasets.Reset(name, now);
   if (IsWanted(name)) LoadData(name);

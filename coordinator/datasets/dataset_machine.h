@@ -167,9 +167,12 @@ struct AnswerQuestion {
   // the levels, for a ViewQuery about such a dataset; its summary is the overview's
   std::shared_ptr<const VolumeLevels> levels = nullptr;
   ShownFields fields = {};  // the field that it is about
-  // Of a question about points of a dataset with an overlay: its voxels; 0: there is none.
-  DatasetId overlay = 0;
-  std::shared_ptr<const VolumeSummary> overlay_summary = nullptr;
+  // Fields that it is about, too; `summary` is null of one that is not there, or that the question does not need.
+  struct Other {
+    DatasetId dataset = 0;  // 0: a SummaryQuery, which needs no voxels
+    std::shared_ptr<const VolumeSummary> summary = nullptr;
+  };
+  Other overlay = {}, labels = {};
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "coordinator/datasets/dataset_machine_state.h"
@@ -60,13 +61,18 @@ Status DatasetMachine::State::FindField(OpenQuestion& open) {
   if (!shown.ok()) return shown.status();
   open.fields = std::move(shown->fields);
   open.fields.others.clear();  // the question is about the first one
-  const auto& fields = open.fields.dataset->fields;
-  const auto overlay = std::ranges::find(fields, false, &FieldInfo::channel);
+  const DatasetFields& fields = *open.fields.dataset;
+  const auto other = [&](int number) {
+    const std::string source = SourceOf(picture.dataset, number, shown->time);
+    return Use::Entry{source, Seek(source)};
+  };
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
-  if (of_points && overlay != fields.end()) {
-    open.overlay = SourceOf(picture.dataset, int(overlay - fields.begin()), shown->time);
-    open.overlay_check = Seek(open.overlay);
-  }
+  const int last = fields.values() - 1;
+  if (of_points && !fields.fields[std::size_t(last)].channel) open.overlay = other(last);
+  const auto* const statistics = std::get_if<StatisticsQuery>(&open.question);
+  const bool of_labels =
+      of_points || (statistics != nullptr && statistics->labels) || picture.labels || std::holds_alternative<SummaryQuery>(open.question);
+  if (of_labels && fields.labels()) open.labels = other(*fields.labels());
   const std::string source = SourceOf(picture.dataset, open.fields.volume, shown->time);
   if (source == open.entry) return Status::Ok();
   open.entry = source;
@@ -83,7 +89,9 @@ void DatasetMachine::State::AskExecutor() {
       return entry.state == DatasetState::kReady && entry.checks.IsOver(check);
     };
     const auto can_be_asked = [&](const OpenQuestion& question) {
-      return is_there(question.entry, question.check) && (question.overlay.empty() || is_there(question.overlay, question.overlay_check));
+      return is_there(question.entry, question.check) &&
+             std::ranges::all_of(std::array{question.overlay, question.labels},
+                                 [&](const Use::Entry& of) { return of.name.empty() || is_there(of.name, of.check); });
     };
     if (open.asked || !can_be_asked(open)) continue;
     if (open.fields.dataset == nullptr) {
@@ -93,15 +101,17 @@ void DatasetMachine::State::AskExecutor() {
       }
       if (!can_be_asked(open)) continue;
     }
-    if (!open.overlay.empty() && datasets.Find(open.overlay)->levels != nullptr) {
-      open.overlay = LevelName(open.overlay, 0);
-      open.overlay_check = Seek(open.overlay);
-      if (!can_be_asked(open)) continue;
+    const bool of_summary = std::holds_alternative<SummaryQuery>(open.question);
+    for (Use::Entry* const other : {&open.overlay, &open.labels}) {
+      if (of_summary || other->name.empty() || datasets.Find(other->name)->levels == nullptr) continue;
+      other->name = LevelName(other->name, 0);
+      other->check = Seek(other->name);
     }
+    if (!can_be_asked(open)) continue;
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
     const bool about_view = std::holds_alternative<ViewQuery>(open.question);
     std::shared_ptr<const VolumeSummary> summary;
-    if (levels != nullptr && std::holds_alternative<SummaryQuery>(open.question)) {
+    if (levels != nullptr && of_summary) {
       summary = std::make_shared<const VolumeSummary>(StatisticsOf(*levels));
     } else if (levels != nullptr && about_view) {
       summary = levels->overview;
@@ -116,9 +126,19 @@ void DatasetMachine::State::AskExecutor() {
     open.asked = true;
     AnswerQuestion ask{id,         open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
                        open.fields};
-    if (!open.overlay.empty()) {
-      ask.overlay = datasets.Find(open.overlay)->id;
-      ask.overlay_summary = datasets.Find(open.overlay)->summary;
+    const auto other = [&](const Use::Entry& of) -> AnswerQuestion::Other {
+      if (of.name.empty()) return {};
+      const DatasetTable::Entry& found = *datasets.Find(of.name);
+      if (found.levels != nullptr) return {0, found.levels->overview};
+      return {found.id, found.summary};
+    };
+    ask.overlay = other(open.overlay);
+    ask.labels = other(open.labels);
+    const FrameRequest* const frame = FrameOf(open.question);
+    if (frame != nullptr && frame->labels) {
+      const FieldVolume labels = {
+          .number = *open.fields.dataset->labels(), .labels = true, .levels = {{ask.labels.dataset, ask.labels.summary}}, .of_volume = {0}};
+      ask.fields.others.push_back(labels);
     }
     actions.emplace_back(std::move(ask));
   }

@@ -29,7 +29,8 @@ struct DatasetMachine::State {
     std::shared_ptr<const FrameRequest> request;
     std::int64_t most_level_bytes = 0;  // SeekDataset::most_level_bytes
     // The entries of the table that it waits for: the dataset; then the sources of the fields that it shows, the volume's first; then the
-    // levels that it draws of each, finest first, or the source if it has one level, and at last that of the light volume.
+    // levels that it draws of each, finest first, or the source if it has one level; and at last, if the picture has shadows or ambient
+    // occlusion, what the light volume of each is made from.
     struct Entry {
       std::string name;
       CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
@@ -42,7 +43,6 @@ struct DatasetMachine::State {
     std::shared_ptr<const LevelMap> map = {};  // kVoxels: of a volume with levels
     std::string volume = {};                   // kVoxels: the source of the volume
     std::optional<ViewParameters> view = {};   // kVoxels: of a volume with levels (DatasetReady::view)
-    bool has_light = false;                    // kVoxels: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
     bool begun() const { return !kept.empty(); }
@@ -59,14 +59,14 @@ struct DatasetMachine::State {
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    std::string entry;         // the entry of the table that it waits for
-    CheckId check = 0;         // the check of its files, which must be over first; 0: none
-    bool asked = false;        // whether the executor was asked
-    ShownFields fields = {};   // once it waits for the field that it is about: that field alone
-    std::string overlay = {};  // the entry of the overlay that it waits for, too; empty: none
-    CheckId overlay_check = 0;
+    std::string entry;        // the entry of the table that it waits for
+    CheckId check = 0;        // the check of its files, which must be over first; 0: none
+    bool asked = false;       // whether the executor was asked
+    ShownFields fields = {};  // once it waits for the field that it is about: that field alone
+    // Other entries that it waits for; without a name: none.
+    Use::Entry overlay = {}, labels = {};
 
-    bool WaitsFor(const std::string& name) const { return entry == name || overlay == name; }
+    bool WaitsFor(const std::string& name) const { return entry == name || overlay.name == name || labels.name == name; }
   };
   // A dataset on its way from a client.
   struct OpenUpload {

@@ -230,14 +230,12 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
       status.memory_bytes = entry.source.held_bytes + entry.bytes;
-      if (entry.summary->label_table != nullptr) status.labels = std::uint32_t(entry.summary->label_table->labels.size());
       status.cells = std::accumulate(entry.summary->cells.begin(), entry.summary->cells.end(), std::uint64_t{0});
     }
     if (entry.state == DatasetState::kReady) {
       for (const auto& [part, of_part] : parts_) status.memory_bytes += DatasetOfPart(part) == name ? of_part.bytes : 0;
     }
     if (entry.state == DatasetState::kReady && entry.fields != nullptr) status.fields = *entry.fields;
-    status.overlay = entry.state == DatasetState::kReady && entry.source.overlay != nullptr;
     report.push_back(std::move(status));
   }
   std::ranges::sort(report, {}, [](const DatasetStatus& status) { return InNaturalOrder(status.name); });

@@ -70,6 +70,7 @@ struct OpenRequest {
       std::vector<DatasetId> all;
       for (const FieldVolume& field : fields.others) {
         for (const CoarserVolume& level : field.levels) all.push_back(level.dataset);
+        if (field.light) all.push_back(field.light->dataset);
       }
       return all;
     }

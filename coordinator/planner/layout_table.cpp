@@ -173,7 +173,7 @@ bool LayoutTable::LearnCosts(const Request& request, const Key& key, const Frame
   learnt->cost.Learn(boxes, weight);
   if (!present) return false;
   if (entry->frames_seen == 1) {
-    const MoveSeconds seen = MoveSecondsOf(*plan.layout, std::int64_t(request.summary->types().bytes_per_voxel()), reports);
+    const MoveSeconds seen = MoveSecondsOf(*plan.layout, std::int64_t(BytesPerSample(request.summary->description.type)), reports);
     Follow(learnt->move.fetch, seen.fetch);
     Follow(learnt->move.prepare, seen.prepare);
   }

@@ -1,6 +1,9 @@
 #include "coordinator/probe/box_statistics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -130,32 +133,33 @@ Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& 
   });
 }
 
-Result<std::vector<BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box, const BrickedVoxels& labels,
-                                                     std::size_t label_count) {
+Result<std::map<std::uint64_t, BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box,
+                                                                 const ReadLabels& labels) {
   const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.description.geometry);
   if (!region.ok()) return region.status();
-  return WithSamples(volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) {
-    std::vector<Moments> moments(label_count + 1);  // the first: of no label
-    VisitScalarType(labels.type(), [&]<class L>(const L*) {
-      const auto views_of = [&](const Index3& brick) { return std::pair(view_of(brick), labels.View<L>(brick)); };
-      EachRow(volume.voxels.grid(), *region, views_of,
-              [&](const auto& views, std::int32_t y, std::int32_t z, std::int32_t first, std::size_t count) {
-                const auto* const samples = views.first.Row(y, z) + first;
-                const L* const numbers = views.second.Row(y, z) + first;
-                for (std::size_t begin = 0; begin < count;) {  // runs of one label
-                  std::size_t end = begin + 1;
-                  while (end < count && numbers[end] == numbers[begin]) ++end;
-                  const auto number = std::size_t(numbers[begin]);
-                  if (number > 0 && number <= label_count) moments[number].Add(std::span(samples + begin, end - begin));
-                  begin = end;
-                }
-              });
-    });
-    std::vector<BoxStatistics> statistics;
-    statistics.reserve(label_count);
-    for (std::size_t number = 1; number <= label_count; ++number) statistics.push_back(moments[number].Under(mapping, whole));
-    return statistics;
-  });
+  return WithSamples(
+      volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) -> Result<std::map<std::uint64_t, BoxStatistics>> {
+        std::map<std::uint64_t, Moments> moments;
+        EachRow(volume.voxels.grid(), *region, view_of,
+                [&](const auto& view, std::int32_t y, std::int32_t z, std::int32_t first, std::size_t count) {
+                  if (moments.size() > kMaxLabels) return;
+                  const auto* const samples = view.Row(y, z) + first;
+                  std::array<std::uint64_t, kBrick> row;
+                  labels({view.begin.x + first, y, z}, std::span(row).first(count));
+                  for (std::size_t begin = 0; begin < count;) {  // runs of one label
+                    std::size_t end = begin + 1;
+                    while (end < count && row[end] == row[begin]) ++end;
+                    if (row[begin] > 0) moments[row[begin]].Add(std::span(samples + begin, end - begin));
+                    begin = end;
+                  }
+                });
+        if (moments.size() > kMaxLabels) {
+          return Status::ResourceExhausted(fmt::format("more than {} labels have voxels in the box: measure a smaller one", kMaxLabels));
+        }
+        std::map<std::uint64_t, BoxStatistics> statistics;
+        for (const auto& [label, of] : moments) statistics.emplace(label, of.Under(mapping, whole));
+        return statistics;
+      });
 }
 
 }  // namespace slabstream

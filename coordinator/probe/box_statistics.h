@@ -2,16 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <variant>
-#include <vector>
 
 #include "common/base/status.h"
 #include "common/stats/probe_results.h"
 #include "common/view/clip.h"
 #include "common/volume/bricks.h"
-#include "common/volume/layers.h"
+#include "common/volume/labels.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
@@ -32,9 +33,10 @@ struct MeasuredVolume {
 // Means of whole numbers are right to one rounding. InvalidArgument: the box cannot be laid into this volume. Pure; takes about a
 // nanosecond a voxel.
 Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& box);
-// The same of the voxels of each label: those of the label with number i are at i - 1. `labels`: numbers up to `label_count`, on the
-// volume's grid.
-Result<std::vector<BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box, const BrickedVoxels& labels,
-                                                     std::size_t label_count);
+// The labels of a row of the volume's voxels, from `first` along x on; 0: none.
+using ReadLabels = std::function<void(const Index3& first, std::span<std::uint64_t> labels)>;
+// The same of the voxels of each label, by label. ResourceExhausted: more than kMaxLabels labels have voxels in the box.
+Result<std::map<std::uint64_t, BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box,
+                                                                 const ReadLabels& labels);
 
 }  // namespace slabstream

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "common/frame/label_use.h"
+#include "common/frame/label_look.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
@@ -61,9 +61,10 @@ struct Entry {
 std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
                                       const std::vector<Stretch>& stretches) {
   const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
-  const std::vector<LabelUse> uses = setup.looks.labels ? UsesOf(*setup.looks.labels) : std::vector<LabelUse>{LabelUse::kAsVolume};
+  const FieldSetup* const labels = LabelsOf(setup);
   const auto is_opaque = [&](const Index3& voxel) {
-    const LabelUse use = uses[std::min(std::size_t(setup.looks.labels ? volume.LabelNumberAt(voxel) : 0), uses.size() - 1)];
+    const LabelUse use =
+        labels == nullptr ? LabelUse::kAsVolume : UseOf(labels->labels->mode, StyleOf(*labels->labels, volume.label(voxel)));
     if (use != LabelUse::kAsVolume) return use == LabelUse::kOpaque;
     const double stored = volume.StoredAt(voxel);
     return std::isfinite(stored) && table.opacity[std::size_t(table.BinOf(stored))] > 0;
@@ -131,16 +132,12 @@ class Matter {
 
   // Of a least spacing at p, where the interpolated sample is `stored`; infinite: opaque.
   double Extinction(const Vec3& p, double stored) const {
-    const LabelLook* const look = setup_.looks.labels ? &*setup_.looks.labels : nullptr;
     double factor = 1;
-    if (look != nullptr) {
+    if (const FieldSetup* const labels = LabelsOf(setup_)) {
       const Box bounds = setup_.description.geometry.bounds();
-      const std::size_t number = volume_.LabelNumberAt(Max(bounds.begin, Min(VoxelAt(p), bounds.end - Uniform(1))));
-      if (number > 0 && number <= look->entries.size()) {
-        const LabelLook::Entry& entry = look->entries[number - 1];
-        if (entry.shown && look->mode == LabelMode::kSurface) return -std::log1p(-double(entry.opacity));
-        if (entry.shown) factor = double(entry.opacity);
-      }
+      const LabelStyle style = StyleOf(*labels->labels, volume_.label(Max(bounds.begin, Min(VoxelAt(p), bounds.end - Uniform(1)))));
+      if (style.shown && labels->labels->mode == LabelMode::kSurface) return -std::log1p(-double(style.opacity));
+      if (style.shown) factor = double(style.opacity);
     }
     if (!std::isfinite(stored)) return 0;
     double opacity = factor * double(table_.opacity[std::size_t(table_.BinOf(stored))]);

@@ -4,28 +4,12 @@
 #include <cmath>
 
 namespace slabstream {
-namespace {
-
-double SampleOf(const VoxelBricks& voxels, const Index3& voxel) {
-  return VisitScalarType(voxels.type(), [&]<class T>(const T*) {
-    const BrickView<T> brick = voxels.View<T>(voxel / kBrick);
-    return double(brick.Row(voxel.y, voxel.z)[voxel.x - brick.begin.x]);
-  });
-}
-
-}  // namespace
 
 Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at) {
   return geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing;
 }
 
-double ProbedVoxels::At(const Index3& voxel) const { return held_ ? SampleOf(*held_, voxel) : find_(voxel); }
-
-double ProbeVolume::StoredAt(const Index3& voxel) const { return voxels.At(voxel); }
-
-std::uint32_t ProbeVolume::LabelNumberAt(const Index3& voxel) const {
-  return labels == nullptr ? 0 : std::uint32_t(SampleOf(VoxelBricks(*labels), voxel));
-}
+double ProbedVoxels::At(const Index3& voxel) const { return held_ ? SampleOf<double>(*held_, voxel) : find_(voxel); }
 
 double ProbeVolume::Interpolated(const Vec3& p) const {
   const Index3 last = voxels.size() - Uniform(1);
@@ -71,12 +55,7 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
   sample.value = finite(value.value);
   sample.rest = value.rest;
   sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
-  if (volume.labels != nullptr && summary.label_table != nullptr) {
-    const std::uint32_t number = volume.LabelNumberAt(voxel);
-    const std::vector<Label>& labels = summary.label_table->labels;
-    sample.label.emplace();
-    if (number > 0 && number <= labels.size()) *sample.label = {labels[number - 1].value, labels[number - 1].name};
-  }
+  if (volume.label) sample.label = LabelAt{volume.label(voxel), {}};
   return sample;
 }
 

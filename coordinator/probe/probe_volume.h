@@ -1,6 +1,7 @@
-// ProbeVolume: the voxels of a dataset and of its layers, one by one and between voxels. For few points: renderers read rows.
+// ProbeVolume: the voxels of a dataset, and their labels, one by one and between voxels. For few points: renderers read rows.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -8,10 +9,18 @@
 #include "common/stats/probe_results.h"
 #include "common/volume/bricks.h"
 #include "common/volume/exact_value.h"
-#include "common/volume/layers.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
+
+// A stored sample as a double, which holds those of values exactly, or as std::uint64_t, which holds labels.
+template <class Value>
+Value SampleOf(const VoxelBricks& voxels, const Index3& voxel) {
+  return VisitStoredType(voxels.type(), [&]<class T>(const T*) {
+    const BrickView<T> brick = voxels.View<T>(voxel / kBrick);
+    return Value(brick.Row(voxel.y, voxel.z)[voxel.x - brick.begin.x]);
+  });
+}
 
 // The stored samples of a whole volume: in memory, or found one by one.
 class ProbedVoxels {
@@ -33,13 +42,11 @@ class ProbedVoxels {
 
 struct ProbeVolume {
   ProbedVoxels voxels;
-  const BrickedVoxels* labels = nullptr;  // null: there are none
+  std::function<std::uint64_t(const Index3& voxel)> label = nullptr;  // of a voxel inside the volume; 0: none. Null: there are no labels
   // The data value of a voxel inside the volume, where its stored sample may be rounded. Null: it never is.
   std::function<ExactValue(const Index3& voxel)> exact = nullptr;
 
-  // The stored sample of a voxel inside the volume. Samples of layers are numbers of labels and data values.
-  double StoredAt(const Index3& voxel) const;
-  std::uint32_t LabelNumberAt(const Index3& voxel) const;  // 0: none, or no labels
+  double StoredAt(const Index3& voxel) const { return voxels.At(voxel); }  // the stored sample of a voxel inside the volume
 
   // Trilinear between the voxels around p (data space); beyond the outermost centres the nearest voxel counts. NaN: one of them is.
   double Interpolated(const Vec3& p) const;
@@ -51,7 +58,7 @@ Index3 VoxelAt(const Vec3& p);
 // Where a point of the world lies in data space.
 Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at);
 
-// `at` is a point of the world. `summary` is that of the dataset.
+// `at` is a point of the world. `summary` is that of the dataset. A label gets its name later: the labels' own summary has it.
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at);
 // What the voxel, which may lie outside, holds, as the sample at this point.
 VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at, const Index3& voxel);

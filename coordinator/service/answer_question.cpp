@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -13,6 +15,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/planning/levels.h"
 #include "common/planning/shown_zones.h"
+#include "common/volume/affine_map.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/joint_histogram.h"
@@ -27,7 +30,8 @@ struct Dataset {
   std::shared_ptr<const VolumeSummary> summary;
   DatasetId id;
   std::optional<WholeNumbers> exact = {};  // where stored samples round them
-  ShownFields fields = {};                 // AnswerQuestion::fields
+  const AnswerQuestion& asked;
+  const ReadLabels& labels;  // null: there are none, or the question does not need them
 };
 
 WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
@@ -38,6 +42,11 @@ WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
     if constexpr (requires { found.samples = samples; }) found.samples = samples;
   });
   return found;
+}
+
+// What is known of the labels; null: nothing.
+const LabelTable* TableOf(const AnswerQuestion& asked) {
+  return asked.labels.summary == nullptr ? nullptr : asked.labels.summary->labels.get();
 }
 
 // What the picture is shown with.
@@ -54,8 +63,8 @@ Result<TransferFunction> TransferOf(const SummaryQuery& query, const VolumeSumma
   return std::move(look->transfer);
 }
 
-Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary, const ShownFields& fields) {
-  Result<TransferFunction> transfer = TransferOf(query, summary, fields);
+Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary, const AnswerQuestion& asked) {
+  Result<TransferFunction> transfer = TransferOf(query, summary, asked.fields);
   if (!transfer.ok()) return transfer.status();
   SummaryReply reply{.nonce = query.nonce,
                      .description = summary.description,
@@ -65,13 +74,16 @@ Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSumma
                      .percentiles = {},
                      .transfer = *std::move(transfer),
                      .labels = {}};
-  if (summary.label_table != nullptr) reply.labels = summary.label_table->labels;
+  if (const LabelTable* const table = TableOf(asked)) {
+    reply.labels = table->labels;
+    reply.all_labels = table->complete;
+  }
   for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
   return QuestionReply(std::move(reply));
 }
 
 Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) {
-  return AnswerSummary(query, *dataset.summary, dataset.fields);
+  return AnswerSummary(query, *dataset.summary, dataset.asked);
 }
 
 Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
@@ -91,11 +103,18 @@ Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& datase
   if (!statistics.ok()) return statistics.status();
   StatisticsReply reply{.nonce = query.nonce, .statistics = *statistics, .description = dataset.summary->description};
   if (!query.labels) return QuestionReply(std::move(reply));
-  if (dataset.volume.labels == nullptr) return NoLabels(query);
-  const std::vector<Label>& labels = dataset.summary->label_table->labels;
-  const Result<std::vector<BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, *dataset.volume.labels, labels.size());
+  const LabelTable* const table = TableOf(dataset.asked);
+  if (table == nullptr || dataset.labels == nullptr) return NoLabels(query);
+  Result<std::map<std::uint64_t, BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, dataset.labels);
   if (!of_labels.ok()) return of_labels.status();
-  for (std::size_t i = 0; i < labels.size(); ++i) reply.labels.push_back({labels[i], (*of_labels)[i]});
+  if (table->complete) {
+    for (const Label& label : table->labels) of_labels->try_emplace(label.value);
+  }
+  for (const auto& [value, of_label] : *of_labels) {
+    const auto known = std::ranges::lower_bound(table->labels, value, {}, &Label::value);
+    const bool is_known = known != table->labels.end() && known->value == value;
+    reply.labels.push_back({is_known ? *known : Label{value, StandardColor(value)}, of_label});
+  }
   return QuestionReply(std::move(reply));
 }
 
@@ -115,7 +134,7 @@ Result<QuestionReply> Answer(const JointHistogramQuery& query, const Dataset& da
 }
 
 Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
-  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary, dataset.fields);
+  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary, dataset.asked.fields);
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
@@ -136,7 +155,7 @@ Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& f
   return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
 }
 Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
-  return AnswerView(query, dataset.summary->description.geometry, dataset.summary, dataset.fields);
+  return AnswerView(query, dataset.summary->description.geometry, dataset.summary, dataset.asked.fields);
 }
 
 // ---- voxels that nobody holds are read for the answer
@@ -168,11 +187,16 @@ class ReadVoxels {
     return ExactValueOf(of, sample.data());
   }
 
+  // 0 once a read has failed.
+  std::uint64_t LabelAt(const Index3& voxel) { return SampleAt<std::uint64_t>(voxel, 0); }
+
  private:
-  double At(const Index3& voxel) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  double At(const Index3& voxel) { return SampleAt<double>(voxel, std::numeric_limits<double>::quiet_NaN()); }
+
+  template <class Value>
+  Value SampleAt(const Index3& voxel, Value if_failed) {
     constexpr std::size_t kMostKept = 16;
-    if (!status_.ok()) return kNone;
+    if (!status_.ok()) return if_failed;
     const Index3 begin = voxel / piece_ * piece_;
     auto piece = pieces_.find(Tuple(begin));
     if (piece == pieces_.end()) {
@@ -180,12 +204,12 @@ class ReadVoxels {
       Result<VoxelBlock> read = ReadBox(from_, Intersection({begin, begin + piece_}, from_.description().geometry.bounds()));
       if (!read.ok()) {
         status_ = read.status();
-        return kNone;
+        return if_failed;
       }
       piece = pieces_.emplace(Tuple(begin), *std::move(read)).first;
     }
     const VoxelBlock& block = piece->second;
-    return VisitScalarType(block.type, [&]<class T>(const T*) { return double(block.samples<T>()[block.Offset(voxel)]); });
+    return VisitStoredType(block.type, [&]<class T>(const T*) { return Value(block.samples<T>()[block.Offset(voxel)]); });
   }
   static std::array<std::int32_t, 3> Tuple(const Index3& index) { return {index.x, index.y, index.z}; }
 
@@ -195,13 +219,24 @@ class ReadVoxels {
   Status status_;
 };
 
+// Of a volume without labels: none.
+std::function<std::uint64_t(const Index3&)> OneLabel(const ReadLabels& labels) {
+  if (!labels) return nullptr;
+  return [&labels](const Index3& voxel) {
+    std::uint64_t label = 0;
+    labels(voxel, {&label, 1});
+    return label;
+  };
+}
+
 // A question about a few points.
 template <class Query>
-Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
+                                 const ReadLabels& labels) {
   ReadVoxels read(from);
-  ProbeVolume volume{.voxels = read.voxels()};
+  ProbeVolume volume{.voxels = read.voxels(), .label = OneLabel(labels)};
   if (MayBeRounded(from.source->info().exact.type)) volume.exact = [&](const Index3& voxel) { return read.ExactAt(voxel); };
-  Result<QuestionReply> answer = Answer(query, {volume, asked.summary, asked.dataset});
+  Result<QuestionReply> answer = Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, labels});
   return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
 
@@ -221,9 +256,9 @@ void AddKept(const ClipRegion& region, const Box& box, Box& kept) {
   AddKept(region, high, kept);
 }
 
-Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
+                                 const ReadLabels& labels) {
   const VolumeDescription& description = asked.summary->description;
-  if (query.labels) return NoLabels(query);  // who reads in parts has no layers
   const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
   if (!region.ok()) return region.status();
   Box needed;
@@ -232,25 +267,28 @@ Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuest
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
   const ProbeVolume volume{.voxels = VoxelBricks(*block)};
-  return Answer(query, {volume, asked.summary, asked.dataset});
+  return Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, labels});
 }
 
-Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
+                                 const ReadLabels& /*labels*/) {
   return AnswerJointHistogram(query, *asked.summary, [&](const Box& box) { return ReadBox(from, box); });
 }
 
-Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
-  return AnswerSummary(query, *asked.summary, asked.fields);
+Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& /*from*/,
+                                 const ReadLabels& /*labels*/) {
+  return AnswerSummary(query, *asked.summary, asked);
 }
 
-Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
+Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& /*from*/,
+                                 const ReadLabels& /*labels*/) {
   return AnswerView(query, asked.summary->description.geometry, asked.summary, asked.fields);
 }
 
 // The values of the overlay at the voxels that samples tell of.
 Status AddOverlay(const AnswerQuestion& asked, const VoxelServer::Samples& overlay, std::span<VolumeSample> samples) {
   const VolumeGeometry& grid = asked.summary->description.geometry;
-  const VolumeDescription& of = asked.overlay_summary->description;
+  const VolumeDescription& of = asked.overlay.summary->description;
   std::optional<ReadVoxels> read;
   if (overlay.in_parts.source != nullptr) read.emplace(overlay.in_parts);
   const ProbeVolume volume{.voxels = read ? read->voxels() : ProbedVoxels(overlay.view())};
@@ -263,35 +301,63 @@ Status AddOverlay(const AnswerQuestion& asked, const VoxelServer::Samples& overl
   return read ? read->status() : Status::Ok();
 }
 
-Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
+// The labels of the volume's voxels. `status`: the first failure of a read. It must outlive this, and so must `of`.
+ReadLabels LabelsBesideVolume(const AnswerQuestion& asked, const VoxelServer::Samples& of, Status& status) {
+  const VolumeGeometry &grid = asked.summary->description.geometry, &labels = asked.labels.summary->description.geometry;
+  const AffineMap map = AffineMapBetween(grid, labels);
+  const auto read = of.in_parts.source != nullptr ? std::make_shared<ReadVoxels>(of.in_parts) : nullptr;
+  return [map, read, &of, &status, bounds = labels.bounds()](const Index3& first, std::span<std::uint64_t> row) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const Index3 voxel = VoxelAt(map.To(ToVec3(first + Index3{std::int32_t(i), 0, 0})));
+      row[i] = !bounds.Contains(voxel) ? 0 : read != nullptr ? read->LabelAt(voxel) : SampleOf<std::uint64_t>(of.view(), voxel);
+    }
+    if (read != nullptr && status.ok()) status = read->status();
+  };
+}
+
+Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const ReadLabels& labels) {
   if (asked.levels != nullptr) {
     return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary, asked.fields);
   }
-  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary, asked.fields);
+  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary, asked);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
-    return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
+    return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts, labels); }, asked.question);
   }
-  ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get()};
+  ProbeVolume volume{.voxels = samples.view(), .label = OneLabel(labels)};
   if (const ExactSamples* const exact = samples.exact.get()) {
     volume.exact = [exact, size = samples.box().size()](const Index3& voxel) {
       return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
     };
   }
-  Dataset dataset{.volume = volume, .summary = asked.summary, .id = asked.dataset, .fields = asked.fields};
+  Dataset dataset{volume, asked.summary, asked.dataset, {}, asked, labels};
   if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
 }
 
+// The labels in a sample get their names.
+void NameLabels(const AnswerQuestion& asked, std::span<VolumeSample> samples) {
+  const std::vector<Label>& labels = TableOf(asked)->labels;
+  for (VolumeSample& sample : samples) {
+    if (!sample.label) continue;
+    const auto known = std::ranges::lower_bound(labels, sample.label->value, {}, &Label::value);
+    if (known != labels.end() && known->value == sample.label->value) sample.label->name = known->name;
+  }
+}
+
 }  // namespace
 
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay) {
-  Result<QuestionReply> reply = AnswerOf(asked, samples);
-  if (!reply.ok() || !overlay.any()) return reply;
-  Status added = Status::Ok();
-  if (auto* const points = std::get_if<SampleReply>(&*reply)) added = AddOverlay(asked, overlay, points->samples);
-  if (auto* const pick = std::get_if<PickReply>(&*reply); pick != nullptr && pick->sample)
-    added = AddOverlay(asked, overlay, {&*pick->sample, 1});
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay,
+                               const VoxelServer::Samples& labels) {
+  Status read_labels = Status::Ok();
+  Result<QuestionReply> reply = AnswerOf(asked, samples, labels.any() ? LabelsBesideVolume(asked, labels, read_labels) : ReadLabels());
+  if (!read_labels.ok()) return read_labels;
+  if (!reply.ok()) return reply;
+  std::span<VolumeSample> points;
+  if (auto* const samples_of = std::get_if<SampleReply>(&*reply)) points = samples_of->samples;
+  if (auto* const pick = std::get_if<PickReply>(&*reply); pick != nullptr && pick->sample) points = {&*pick->sample, 1};
+  if (labels.any()) NameLabels(asked, points);
+  const Status added = overlay.any() ? AddOverlay(asked, overlay, points) : Status::Ok();
   return added.ok() ? std::move(reply) : added;
 }
 

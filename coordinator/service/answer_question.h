@@ -8,7 +8,8 @@ namespace slabstream {
 
 // Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
 // Any thread.
-// `overlay`: of AnswerQuestion::overlay.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay = {});
+// `overlay`, `labels`: of the fields of these names in `asked`.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay = {},
+                               const VoxelServer::Samples& labels = {});
 
 }  // namespace slabstream

@@ -142,8 +142,9 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 // A volume that was read as a whole.
 Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
   const std::shared_ptr<const Volume>& volume = loaded.volume;
-  const Layers& layers = loaded.layers;
-  auto summary = std::make_shared<const VolumeSummary>(SummaryOf(LayeredVolume{volume, layers}));
+  VolumeSummary found = SummaryOf(*volume);
+  found.labels = loaded.labels;
+  auto summary = std::make_shared<const VolumeSummary>(std::move(found));
   VoxelServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
   if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
@@ -153,9 +154,8 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
     samples.volume = volume;
   }
   samples.exact = loaded.exact;
-  if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
   samples.description = volume->description;
-  const DatasetId id = IdOf(action.name, *volume, layers, loaded.exact.get());
+  const DatasetId id = IdOf(action.name, *volume, loaded.labels.get(), loaded.exact.get());
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file)},
               id, std::move(samples)};
@@ -219,6 +219,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     summary.range = at.surveyed->range;
     summary.histogram = at.surveyed->histogram;
     summary.non_finite = at.surveyed->non_finite;
+    summary.labels = at.surveyed->labels;
   } else {
     samples.in_parts = {at.source, at.stored.level};
     summary = at.surveyed_level ? *at.surveyed : UnreadSummary(description, *at.surveyed);
@@ -244,8 +245,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   };
   const auto failed = EndOf<DatasetFailed>(action.name, action.load);
   const DataSource& source = action.source;
-  FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
-  server = server != 0 ? server : ServerOf(source.layers.labels);
+  const FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
   if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
   return Post(loads_, barrier.c_str(), load, failed);
 }
@@ -279,9 +279,8 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   const std::optional<StoredAt>& stored = action.summary->stored;
   return PostResult(
       answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset), overlay = voxels_.Find(action.overlay)] {
-        return AnswerTo(action, samples, overlay);
-      },
+      [action, samples = voxels_.Find(action.dataset), overlay = voxels_.Find(action.overlay.dataset),
+       labels = voxels_.Find(action.labels.dataset)] { return AnswerTo(action, samples, overlay, labels); },
       EndOf<QuestionAnswered>(action.id));
 }
 

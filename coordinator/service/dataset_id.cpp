@@ -35,16 +35,14 @@ DatasetId IdOf(const std::string& name, const VolumeDescription& description, co
   return IdOf(fmt::format("{} {} {} {:x} {}", OfDescription(description), stored.source, stored.level, stored.version, name));
 }
 
-DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers, const ExactSamples* exact) {
-  std::string of_layers;
-  if (const Volume* const labels = layers.labels.get())
-    of_layers = fmt::format(" {} {:x}", int(labels->block.type), Digest(labels->block.bytes));
-  for (const Label& label : layers.table == nullptr ? std::vector<Label>() : layers.table->labels) {
-    of_layers += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
+DatasetId IdOf(const std::string& name, const Volume& volume, const LabelTable* labels, const ExactSamples* exact) {
+  std::string of_labels;
+  for (const Label& label : labels == nullptr ? std::vector<Label>() : labels->labels) {
+    of_labels += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
   }
   const std::string text =
       fmt::format("{} {} {:x} {}", OfDescription(volume.description), volume.block.bytes.size(), Digest(volume.block.bytes), name) +
-      (exact == nullptr ? "" : fmt::format(" {:x}", Digest(exact->bytes))) + (layers.types().any() ? of_layers : "") +
+      (exact == nullptr ? "" : fmt::format(" {:x}", Digest(exact->bytes))) + of_labels +
       (volume.cells == nullptr ? "" : OfCells(*volume.cells));
   return IdOf(text);
 }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/memory/aligned_buffer.h"
@@ -26,9 +28,12 @@ class UploadBuffer {
  private:
   explicit UploadBuffer(AddVolume order) : order_(std::move(order)) {}
 
+  Result<std::shared_ptr<const Volume>> ValuesOf(const Volume& numbers) const;
+
   const AddVolume order_;
-  std::shared_ptr<Volume> parts_[kLayers.size()];  // by Layer; null: there is none
-  AlignedVector<std::byte> file_;                  // instead of them
+  // The volume, the numbers of labels if there are any, and the overlay if there is one.
+  std::vector<std::shared_ptr<Volume>> parts_;
+  AlignedVector<std::byte> file_;  // instead of them
 };
 
 }  // namespace slabstream

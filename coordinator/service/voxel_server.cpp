@@ -109,12 +109,9 @@ std::vector<std::string> VoxelServer::TakeUnwanted() {
 }
 
 Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& part) {
-  if (part.layer == Layer::kVolume && samples.volume != nullptr) {
-    return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
-  }
-  const BrickedVoxels& bricks = part.layer == Layer::kVolume ? *samples.bricks : *samples.labels;
+  if (samples.volume != nullptr) return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
   UnwrittenVector<std::byte> cut(part.bytes);
-  VoxelBricks(bricks).Read(box, part.begin, cut);
+  VoxelBricks(*samples.bricks).Read(box, part.begin, cut);
   return Bytes(std::move(cut));
 }
 
@@ -139,7 +136,7 @@ Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
   if (IsCellChunk(request.chunk)) {
     return samples.cells != nullptr ? Status::Ok() : Status::InvalidArgument("chunk request: cells of a dataset that has none");
   }
-  if (const std::uint32_t count = ChunkCount(request.box, samples.types()); request.chunk >= count) {
+  if (const std::uint32_t count = ChunkCount(request.box, samples.types().samples); request.chunk >= count) {
     return Status::InvalidArgument(fmt::format("chunk request: chunk {} is not below {}", request.chunk, count));
   }
   return Status::Ok();
@@ -194,7 +191,7 @@ void VoxelServer::Answer(const Incoming& incoming) {
           if (samples.read_from != nullptr) chunk.stored_bytes = samples.read_from->TakeStoredBytes();
           Result<Bytes> cut = IsCellChunk(request.chunk)
                                   ? CutCells(samples, request, chunk)
-                                  : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
+                                  : Cut(samples, request.box, PartOfChunk(request.box, samples.types().samples, request.chunk));
           if (!cut.ok()) return cut.status();
           Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
           return std::pair(chunk, std::move(payload));
@@ -208,9 +205,7 @@ void VoxelServer::ReadNext(DatasetId dataset) {
     reads.waiting.pop_front();
     ++reads.begun;
     const ChunkRequest& request = asked->request;
-    // Of zeros, also where there is no layer: g++ 12 says of any other that it may be read before it is set.
-    const SampleTypes types(asked->from.description().type, LayerTypes());
-    const ChunkPart part = PartOfChunk(request.box, types, request.chunk);
+    const ChunkPart part = PartOfChunk(request.box, asked->from.description().type, request.chunk);
     const auto done = [inbox = read_, codec = codec_, epoch = epoch_, asked](Result<Bytes> samples) {
       const ChunkRequest& of = asked->request;
       auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {

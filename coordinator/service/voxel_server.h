@@ -25,7 +25,7 @@
 #include "common/transport/mailbox.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
-#include "common/volume/layers.h"
+#include "common/volume/sample_types.h"
 #include "common/wire/any_message.h"
 #include "coordinator/service/cell_bytes.h"
 #include "data/sources/volume_source.h"
@@ -36,12 +36,10 @@ inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's cr
 
 class VoxelServer {
  public:
-  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers,
-  // and its cells.
+  // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And its cells.
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
-    std::shared_ptr<const BrickedVoxels> labels = nullptr;
     std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
     std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
@@ -62,16 +60,12 @@ class VoxelServer {
     }
     std::uint64_t bytes() const {
       if (in_parts.source != nullptr) return 0;
-      const std::uint64_t of_layers = labels == nullptr ? 0 : labels->bytes();
       const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes(), of_exact = exact == nullptr ? 0 : exact->bytes.size();
-      return of_layers + of_cells + of_exact + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
+      return of_cells + of_exact + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
     SampleTypes types() const {
       if (in_parts.source != nullptr) return in_parts.description().type;
-      LayerTypes layers;
-      if (labels != nullptr) layers.labels = labels->type();
-      layers.cells = cells != nullptr;
-      return {volume != nullptr ? volume->block.type : bricks->type(), layers};
+      return {volume != nullptr ? volume->block.type : bricks->type(), cells != nullptr};
     }
     // Not in_parts.
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }

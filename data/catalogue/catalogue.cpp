@@ -20,6 +20,7 @@
 #include "common/wire/limits.h"
 #include "data/brick_store/brick_store.h"
 #include "data/catalogue/client_file.h"
+#include "data/layers/label_table.h"
 #include "data/open/open_source.h"
 #include "data/open/read_volume.h"
 #include "data/open/source_name.h"
@@ -161,15 +162,15 @@ void LeaveOutMost(FoundData& found) {
   found.complaints.push_back(fmt::format("{} volumes of folders are left out: the catalogue has at most {}", left_out, kMaxListed));
 }
 
-// By its headers.
 Status CheckHeaders(const DataSource& data) {
   Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   source->options.describe = true;
   if (const auto files = CheckVolumeHeaders(source->path, source->options); !files.ok()) return files.status();
-  if (const auto files = CheckLayerHeaders(data.layers); !files.ok()) return files.status();
-  const Status overlay = data.overlay != nullptr ? CheckHeaders(*data.overlay) : Status::Ok();
-  return overlay.ok() ? overlay : Status(overlay.code(), "overlay: " + overlay.message());
+  if (source->options.labels) {
+    if (const auto colors = ReadLabelColors(source->path, data.label_colors); !colors.ok()) return colors.status();
+  }
+  return CheckFields(data);
 }
 
 // Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.
@@ -231,14 +232,20 @@ struct WayToRead {
   std::function<Result<ReadableSource>()> read;
 };
 
+// `labels`: null: it has values.
 Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
-                                ReadProgress& progress) {
+                                ReadProgress& progress, std::shared_ptr<const LabelTable> labels = nullptr) {
   Result<Survey> survey = SurveySource(*source, !SchemeOf(place).empty() ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
+  if (labels != nullptr) {
+    VolumeSummary with_labels = *survey->summary;
+    with_labels.labels = std::move(labels);
+    survey->summary = std::make_shared<const VolumeSummary>(std::move(with_labels));
+  }
   const ValueRange& range = survey->summary->range;
   const SampleType type = source->info().exact.type;
   constexpr double kExactFloats = 1 << 24;  // float32 holds all whole numbers up to here
-  if (MayRoundLabels(type) && std::max(std::abs(range.min), std::abs(range.max)) > kExactFloats) {
+  if (survey->summary->labels == nullptr && MayRoundLabels(type) && std::max(std::abs(range.min), std::abs(range.max)) > kExactFloats) {
     LogWarning(place + ": " + RoundingText(type));
   }
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
@@ -251,15 +258,17 @@ void WarnOfComponents(const SourceText& text, const SourceInfo& info) {
   if (info.components > 1) WarnOfPart(text.path, options, info);
 }
 
-// The voxels, those of layers too.
-Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const LayerFiles& layers) {
+// `colors`: of labels.
+Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const ColorTable& colors) {
   Result<LoadedVolume> read = ReadVolume(source, text.path, text.options);
   if (!read.ok()) return read.status();
   if (!read->rounding.empty()) LogWarning(text.path + ": " + read->rounding);
   WarnOfComponents(text, read->info);
-  Result<Layers> with = ReadLayers(layers, read->info.finest().geometry);
-  if (!with.ok()) return with.status();
-  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr, std::move(read->exact)});
+  std::shared_ptr<const LabelTable> labels;
+  if (text.options.labels) {
+    labels = std::make_shared<const LabelTable>(MakeLabelTable(ValuesOfLabels(*read->volume), colors, read->info.looks));
+  }
+  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), std::move(labels), nullptr, std::move(read->exact)});
 }
 
 // Other processes may run in other folders.
@@ -290,17 +299,20 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   WayToRead way{source, info.files, {}};
   const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
   const bool is_large = info.levels.size() > 1 || info.finest().voxel_bytes() > most;
-  if (info.whole || !is_large || data.layers.any()) {
-    const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
-    if (!of_layers.ok()) return of_layers.status();
-    way.files.insert(way.files.end(), of_layers->begin(), of_layers->end());
-    way.read = [source, text = *std::move(text), layers = data.layers] { return ReadWhole(*source, text, layers); };
+  const bool labels = text->options.labels;
+  Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
+  if (!colors.ok()) return colors.status();
+  way.files.insert(way.files.end(), colors->files.begin(), colors->files.end());
+  if (info.whole || !is_large || (labels && info.slices)) {
+    way.read = [source, text = *std::move(text), table = std::move(colors->table)] { return ReadWhole(*source, text, table); };
   } else if (info.slices) {
     way.read = [path = data.path, most_bytes, &progress] { return ReadStream(path, most_bytes, progress); };
   } else {
-    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, &progress] {
+    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, table = std::move(colors->table), &progress] {
       WarnOfComponents(text, source->info());
-      return Surveyed(source, place, FindIndex(source_text, source->info()), progress);
+      std::shared_ptr<const LabelTable> known;
+      if (text.options.labels) known = std::make_shared<const LabelTable>(MakeLabelTable(std::nullopt, table, source->info().looks));
+      return Surveyed(source, place, FindIndex(source_text, source->info()), progress, known);
     };
   }
   return way;
@@ -316,6 +328,25 @@ Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, con
 }
 
 }  // namespace
+
+Status CheckFields(const DataSource& source) {
+  for (const auto& [field, of] : {std::pair("overlay", source.overlay), std::pair("labels", source.labels)}) {
+    const Status status = of != nullptr ? CheckHeaders(*of) : Status::Ok();
+    if (!status.ok()) return {status.code(), fmt::format("{}: {}", field, status.message())};
+  }
+  return Status::Ok();
+}
+
+DataSource::DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers)
+    : path(std::move(from_path)), folder(std::move(of_folder)) {
+  if (!layers.overlay.empty()) overlay = std::make_shared<const DataSource>(layers.overlay, folder);
+  if (layers.labels.empty()) return;
+  const Result<SourceText> text = ParseSourceText(layers.labels);
+  const bool given = text.ok() && text->options.labels;
+  DataSource of_labels(given ? layers.labels : WithReadOption(layers.labels, "ids", "yes"), folder);
+  of_labels.label_colors = layers.label_colors;
+  labels = std::make_shared<const DataSource>(std::move(of_labels));
+}
 
 const std::string* DataArgument::RelativePath() const {
   for (const std::string* file : {&path, &layers.labels, &layers.label_colors, &layers.overlay}) {
@@ -426,7 +457,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
   if (source.load) {
     Result<LoadedData> loaded = source.load(tell);
     if (!loaded.ok()) return loaded.status();
-    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr, std::move(loaded->exact)});
+    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->labels), nullptr, std::move(loaded->exact)});
   }
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

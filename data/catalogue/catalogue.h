@@ -7,7 +7,7 @@
 //               a volume for each time of a file that holds several: NAME@FIRST ... NAME@LAST (NameAtTime)
 //   PATH        the same, named after its file (NameOfSource, data/open/source_name.h), for anything but a folder to watch
 //   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
-//               the same with layers (data/layers/layer_reader.h); either one may be left out
+//               the same with labels and an overlay (data/layers/layer_files.h); either one may be left out
 //   DIR         a watched folder: every volume file in it, named after the file, also those that come later, and every folder in it that
 //               is a volume; a watched folder of nothing but slices, or DICOM, is one volume and has its name; in one of nothing but
 //               folders each may be a volume. What has a name that begins with a dot is left out
@@ -67,6 +67,9 @@ Result<FoundData> ListFolder(const std::string& folder);
 // a complaint and stays.
 void CheckFiles(FoundData& found);
 
+// The same of the overlay and the labels of one dataset: the first error, behind the name of the field.
+Status CheckFields(const DataSource& source);
+
 // A volume that is read in parts.
 struct OpenedSource {
   std::shared_ptr<VolumeSource> source;
@@ -80,7 +83,7 @@ struct OpenedSource {
 struct LoadedSource {
   SourceInfo file;  // its finest level is the volume; nothing if a function has loaded it
   std::shared_ptr<const Volume> volume;
-  Layers layers;
+  std::shared_ptr<const LabelTable> labels = {};   // of labels
   std::shared_ptr<const FileStamp> stamp;          // the state of its files when they were read; null: they never change
   std::shared_ptr<const ExactSamples> exact = {};  // the whole numbers that the volume rounds; null: it rounds none
 };
@@ -88,11 +91,11 @@ struct LoadedSource {
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;
 
 // Opens and surveys a volume that has several levels, or more voxels than `most_bytes` or kExactBytes, if its format can be read in parts;
-// a compressed stream of that size becomes so (data/brick_store). Anything else, and whatever has layers, is read as a whole.
+// a compressed stream of that size becomes so (data/brick_store), unless it is one of labels. Anything else is read as a whole.
 //
 // Files that change meanwhile are read a second time, so the voxels are never those of two files. `tell`, if any, hears how much of the
-// samples has been read, on any thread, one call at a time. Errors: of OpenSource, SurveySource, OpenStored, ReadVolume and ReadLayers;
-// Unavailable: they change again.
+// samples has been read, on any thread, one call at a time. Errors: of OpenSource, SurveySource, OpenStored, ReadVolume and
+// ReadLabelColors; Unavailable: they change again.
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell = {});
 
 // Where the index of a source that is read in parts is kept. Errors: of ParseSourceText and IndexFile::Of.

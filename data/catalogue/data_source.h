@@ -13,10 +13,10 @@
 
 #include "common/base/status.h"
 #include "common/files/file_stamp.h"
-#include "common/volume/layers.h"
+#include "common/volume/labels.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/summary.h"
-#include "data/layers/layer_reader.h"
+#include "data/layers/layer_files.h"
 #include "data/sources/volume_source.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/read_progress.h"
@@ -37,7 +37,9 @@ struct SourceAtLevel {
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
-struct LoadedData : LayeredVolume {
+struct LoadedData {
+  std::shared_ptr<const Volume> volume;
+  std::shared_ptr<const LabelTable> labels = nullptr;   // of labels
   std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that the volume rounds
 };
 using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
@@ -45,29 +47,25 @@ using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 // Paths, or a function whose volume never changes.
 struct DataSource {
   DataSource() = default;
-  DataSource(std::string from_path, std::string of_folder, LayerFiles with_layers = {})
-      : path(std::move(from_path)), folder(std::move(of_folder)), layers(std::move(with_layers)) {
-    if (layers.overlay.empty()) return;
-    overlay = std::make_shared<const DataSource>(std::move(layers.overlay), folder);
-    layers.overlay.clear();
-  }
+  DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers = {});
   template <std::convertible_to<DataLoader> Loader>
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
-  DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one whose volume has no layers
+  DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one of a volume alone
       : load([loader = VolumeLoader(std::move(loader))](const TellRead&) -> Result<LoadedData> {
           Result<std::shared_ptr<const Volume>> volume = loader();
           if (!volume.ok()) return volume.status();
-          return LoadedData{{.volume = *std::move(volume)}};
+          return LoadedData{.volume = *std::move(volume)};
         }) {}
 
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;   // the files of its labels; only a named dataset has them
-  std::shared_ptr<const DataSource> overlay = {};  // a field with a grid of its own; null: there is none
+  // Fields with a grid of their own; null: there is none. Only a named dataset has them.
+  std::shared_ptr<const DataSource> overlay = {}, labels = {};
+  std::string label_colors = {};  // of labels: the table of their colours (label_table.h)
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
-  DataLoader load;                         // set: `path` and `layers` are not used
+  DataLoader load;                         // set: `path` is not used
   std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it
   std::uint64_t held_bytes = 0;            // memory that the source itself takes, loaded or not, since a client has sent it
 };

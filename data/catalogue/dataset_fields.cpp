@@ -35,18 +35,21 @@ std::shared_ptr<const DatasetFields> FieldsOf(const DataSource& source, const So
     fields.field = info.channel;
     if (info.components > 1) DescribeComponents(info, fields);
   }
-  if (source.overlay != nullptr) {
-    if (fields.fields.size() == kMaxFields) fields.fields.pop_back();
-    fields.fields.push_back({.name = std::string(kOverlayField), .channel = false, .shown = false});
+  const std::size_t others = (source.overlay != nullptr ? 1 : 0) + (source.labels != nullptr ? 1 : 0);
+  if (fields.fields.size() + others > kMaxFields) fields.fields.resize(kMaxFields - others);
+  if (source.overlay != nullptr) fields.fields.push_back({.name = std::string(kOverlayField), .channel = false, .shown = false});
+  if (source.labels != nullptr) {
+    fields.fields.push_back({.name = std::string(kLabelsField), .channel = false, .labels = true, .shown = false});
   }
   if (fields == DatasetFields()) return nullptr;
   return std::make_shared<const DatasetFields>(std::move(fields));
 }
 
 DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time) {
-  if (!fields.fields[std::size_t(field)].channel) return *source.overlay;
+  const FieldInfo& info = fields.fields[std::size_t(field)];
+  if (!info.channel) return info.labels ? *source.labels : *source.overlay;
   DataSource at = source;
-  at.overlay = nullptr;
+  at.overlay = at.labels = nullptr;
   if (field != fields.field) at.path = WithReadOption(at.path, "channel", std::to_string(field));
   if (fields.times.count > 1) at.path = AtTime(at.path, time);  // named even if it is the standard one: nobody needs to be told of a choice
   return at;

@@ -14,7 +14,7 @@ Result<ColorTable> ReadByteLut(std::string_view file) {
   for (std::size_t value = 0; value < kColors; ++value) {
     LabelColor color{};
     for (std::size_t i = 0; i < color.size(); ++i) color.at(i) = float(static_cast<unsigned char>(file[i * kColors + value])) / 255;
-    if (color != LabelColor{}) table.entries[std::uint32_t(value)] = {.color = color};
+    if (color != LabelColor{}) table.entries[std::uint64_t(value)] = {.color = color};
   }
   return table;
 }

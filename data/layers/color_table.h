@@ -2,7 +2,6 @@
 // ColorTableFormat, and its line there. A table is a small file: it is read as a whole, within a limit, and recognised by what is in it.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -10,14 +9,12 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/volume/layers.h"
+#include "common/volume/labels.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMaxColorTableBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxColorTableEntries = std::size_t{1} << 16;
-
-using LabelColor = std::array<float, 3>;  // straight red, green, blue, [0, 1]
 
 struct ColorTable {
   struct Entry {
@@ -25,7 +22,7 @@ struct ColorTable {
     std::string name = {};  // "": none
     friend bool operator==(const Entry&, const Entry&) = default;
   };
-  std::map<std::uint32_t, Entry> entries;  // by the value of a label; that of 0, no label, does not matter
+  std::map<std::uint64_t, Entry> entries;  // by the value of a label; that of 0, no label, does not matter
   // Colours for labels without an entry: for the values 1, 2, 3 and so on, over and over again.
   std::vector<LabelColor> sequence = {};
   friend bool operator==(const ColorTable&, const ColorTable&) = default;
@@ -43,8 +40,5 @@ const std::vector<ColorTableFormat>& ColorTableFormats();
 Result<ColorTable> ParseColorTable(std::string_view file, const std::string& path);
 // NotFound: no such file; ResourceExhausted: longer than kMaxColorTableBytes; InvalidArgument as of ParseColorTable.
 Result<ColorTable> ReadColorTable(const std::string& path);
-
-// The colour of a label for which nobody has chosen one: the same for the same value everywhere, and unlike those of values near it.
-LabelColor StandardColor(std::uint32_t value);
 
 }  // namespace slabstream

@@ -33,11 +33,12 @@ Result<std::vector<LabelColor>> ColorsOf(const Json& preset) {
 }
 
 // "12" and "12.0" are label 12.
-std::optional<std::uint32_t> LabelNamed(const Json& text) {
+constexpr std::uint64_t kMaxNamed = std::uint64_t{1} << 53;  // double holds all whole numbers up to here
+std::optional<std::uint64_t> LabelNamed(const Json& text) {
   if (!text.is_string()) return std::nullopt;
   const auto value = ParseNumber<double>(text.text());
-  if (!value || !(*value >= 0 && *value <= kMaxLabelValue) || *value != double(std::uint32_t(*value))) return std::nullopt;
-  return std::uint32_t(*value);
+  if (!value || !(*value >= 0 && *value <= kMaxNamed) || *value != double(std::uint64_t(*value))) return std::nullopt;
+  return std::uint64_t(*value);
 }
 
 Result<ColorTable> ReadPreset(const Json& preset) {
@@ -56,8 +57,7 @@ Result<ColorTable> ReadPreset(const Json& preset) {
   }
   for (std::size_t i = 0; i < pairs.size(); i += 2) {
     const auto value = LabelNamed(pairs[i]);
-    if (!value)
-      return Status::InvalidArgument(fmt::format("Annotations[{}] is not a whole number in [0, {}] as a text", i, kMaxLabelValue));
+    if (!value) return Status::InvalidArgument(fmt::format("Annotations[{}] is not a whole number in [0, {}] as a text", i, kMaxNamed));
     if (!pairs[i + 1].is_string()) return Status::InvalidArgument(fmt::format("Annotations[{}] is not a text", i + 1));
     const bool added = table.entries.emplace(*value, ColorTable::Entry{(*colors)[i / 2 % colors->size()], pairs[i + 1].text()}).second;
     if (!added) return Status::InvalidArgument(fmt::format("Annotations[{}]: label {} is given before", i, *value));

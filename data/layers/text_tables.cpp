@@ -58,11 +58,11 @@ class TableLines {
   // InvalidArgument, naming the line.
   Status Wrong(const std::string& why) const { return Status::InvalidArgument(fmt::format("line {}: {}", number_, why)); }
 
-  // The value of a label: a whole number in [0, kMaxLabelValue].
-  Result<std::uint32_t> Value(std::size_t word) const {
-    const auto value = ParseNumber<std::uint32_t>(words_.at(word));
-    if (value && *value <= kMaxLabelValue) return *value;
-    return Wrong(fmt::format("the label '{}' is not a whole number in [0, {}]", Shown(words_[word]), kMaxLabelValue));
+  // The value of a label.
+  Result<std::uint64_t> Value(std::size_t word) const {
+    const auto value = ParseNumber<std::uint64_t>(words_.at(word));
+    if (value) return *value;
+    return Wrong(fmt::format("the label '{}' is not a whole number of at least 0", Shown(words_[word])));
   }
 
   // The colour that words `first` to `first` + 2 state, each in [0, greatest].
@@ -82,7 +82,7 @@ class TableLines {
   // Adds the line's label: its value is the first word, its colour the three from `color_word` on, each in [0, greatest]. InvalidArgument:
   // of Value or Color, or there is one of this value already, or there are too many.
   Status AddLabel(ColorTable& table, std::size_t color_word, float greatest, std::string name) const {
-    const Result<std::uint32_t> value = Value(0);
+    const Result<std::uint64_t> value = Value(0);
     if (!value.ok()) return value.status();
     const Result<LabelColor> color = Color(color_word, greatest);
     if (!color.ok()) return color.status();

@@ -13,6 +13,7 @@
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/positional/file_source.h"
+#include "data/sources/label_source.h"
 #include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
 #include "data/volume_io/formats.h"
@@ -79,7 +80,9 @@ Status CheckVolume(const std::string& path, const ReadOptions& options) {
 
 bool LooksLikeVolume(const std::string& path) { return CheckVolume(path).ok(); }
 
-Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+namespace {
+
+Result<std::shared_ptr<VolumeSource>> OpenValues(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   if (!IsUrl(path)) {
     if (Status status = CheckVolume(path, options); !status.ok()) return status;
     const VolumeFormat& format = *FindFormat(path, options);
@@ -95,6 +98,14 @@ Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const 
   if (!found.ok()) return found.status();
   if (Status status = CheckOptions(*found->format, path, options); !status.ok()) return status;
   return OpenRemote(found->version, options.query, [&] { return OpenAs(*found->format, path, with_store, context); });
+}
+
+}  // namespace
+
+Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  Result<std::shared_ptr<VolumeSource>> source = OpenValues(path, options, context);
+  if (source.ok() && options.labels) source = AsLabels(*std::move(source));
+  return source;
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, const SourceContext& context) {

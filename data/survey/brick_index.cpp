@@ -144,7 +144,7 @@ Result<std::vector<std::byte>> EncodeIndex(const BrickIndex& index, const Source
   Append(bytes, std::as_bytes(std::span(name)));
   for (std::size_t i = 0; i < index.levels.size(); ++i) {
     const Result<std::vector<std::byte>> packed =
-        VisitScalarType(source.levels[i].description.type, [&]<class T>(const T*) { return PackLevel<T>(index.levels[i]); });
+        VisitStoredType(source.levels[i].description.type, [&]<class T>(const T*) { return PackLevel<T>(index.levels[i]); });
     if (!packed.ok()) return packed.status();
     AppendInteger(bytes, std::uint64_t(packed->size()));
     Append(bytes, *packed);
@@ -169,7 +169,7 @@ Result<BrickIndex> DecodeIndex(std::span<const std::byte> bytes, const SourceInf
     const auto packed = reader.Take(*size);
     if (!packed) return ends;
     const Status unpacked =
-        VisitScalarType(source.levels[i].description.type, [&]<class T>(const T*) { return UnpackLevel<T>(*packed, index->levels[i]); });
+        VisitStoredType(source.levels[i].description.type, [&]<class T>(const T*) { return UnpackLevel<T>(*packed, index->levels[i]); });
     if (!unpacked.ok()) return unpacked;
   }
   if (!reader.empty()) return Status::DataLoss("there is something behind its end");

@@ -125,7 +125,7 @@ std::string WhatIsLost(const VolumeFormat& format, const VolumeGeometry& geometr
 
 Status CheckOptions(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
   for (const ReadOption& option : ReadOptionList()) {
-    const bool taken = option.of_addresses ? IsUrl(path) : std::ranges::count(format.options, option.name) > 0;
+    const bool taken = option.of_all || (option.of_addresses ? IsUrl(path) : std::ranges::count(format.options, option.name) > 0);
     if (!option.given(options) || taken) continue;
     const std::string takes = format.options.empty() ? "takes none" : "takes " + Joined(format.options);
     return Status::InvalidArgument(fmt::format("{}: {} is no option of {}, which {}", path, option.name, format.name, takes));

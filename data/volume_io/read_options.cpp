@@ -105,9 +105,10 @@ Status SetDataset(ReadOptions& options, std::string_view option, std::string_vie
   return Status::Ok();
 }
 
-Status SetFollowLinks(ReadOptions& options, std::string_view option, std::string_view text) {
-  options.follow_links = text == "yes" || text == "true";
-  return options.follow_links || text == "no" || text == "false" ? Status::Ok() : Wrong(option, text, "yes or no");
+template <bool ReadOptions::*kMember>
+Status SetYes(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.*kMember = text == "yes" || text == "true";
+  return options.*kMember || text == "no" || text == "false" ? Status::Ok() : Wrong(option, text, "yes or no");
 }
 
 Status SetHeader(ReadOptions& options, std::string_view option, std::string_view text) {
@@ -169,7 +170,9 @@ const std::vector<ReadOption>& ReadOptionList() {
        IsGiven<&ReadOptions::lattice>},
       {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
       {"follow-links", "", "Follow links that lead out of a folder of Zarr, N5 or precomputed, such as those of git-annex and DataLad",
-       SetFollowLinks, IsGiven<&ReadOptions::follow_links>},
+       SetYes<&ReadOptions::follow_links>, IsGiven<&ReadOptions::follow_links>},
+      {"ids", "", "Values are labels: names of structures, which are kept to the last digit and never mixed", SetYes<&ReadOptions::labels>,
+       IsGiven<&ReadOptions::labels>, false, true},
       {"header", "NAME:@FILE", "A header of each request to a web server, with its value in a file; may be given several times", SetHeader,
        IsGiven<&ReadOptions::headers>, true},
   };

@@ -54,6 +54,7 @@ struct ReadOptions {
   std::optional<SampleType> type;
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
+  bool labels = false;                 // samples are labels, which are kept as they are (data/sources/label_source.h)
   bool follow_links = false;           // in folders of objects: links that lead out of the folder, such as those of git-annex, are followed
   // For addresses.
   std::vector<std::string> headers;  // headers that go with each request: "NAME:VALUE", or "NAME:@FILE" with the value in a file
@@ -61,7 +62,6 @@ struct ReadOptions {
   // What users cannot say.
   std::shared_ptr<Store> store;      // the store at the address, opened with these options; null: the path tells
   bool describe = false;             // without `time`, a source of several volumes opens the first one
-  bool labels = false;               // samples are numbers of structures, even if the file does not say so
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
   ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };
@@ -74,6 +74,7 @@ struct ReadOption {
   Status (*set)(ReadOptions& options, std::string_view option, std::string_view text);
   bool (*given)(const ReadOptions& options);
   bool of_addresses = false;  // every volume behind an address takes it, and no other; it may be given several times
+  bool of_all = false;        // every volume takes it
 };
 const std::vector<ReadOption>& ReadOptionList();
 

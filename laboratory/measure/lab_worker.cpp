@@ -21,9 +21,9 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   const Box padded_box = PaddedBox(box, setup);
   std::unique_ptr<BoxData>& padded = boxes_[padded_box];
   if (padded == nullptr) {
-    BoxLayers layers;
-    if (cells_ != nullptr) layers.cells = std::make_shared<const Mesh>(cells_->Cut(padded_box));
-    padded = std::make_unique<BoxData>(BrickedVoxels(CutBlock(volume_.block, padded_box)), std::move(layers));
+    std::shared_ptr<const Mesh> cells;
+    if (cells_ != nullptr) cells = std::make_shared<const Mesh>(cells_->Cut(padded_box));
+    padded = std::make_unique<BoxData>(BrickedVoxels(CutBlock(volume_.block, padded_box)), std::move(cells));
   }
   RenderControl control;
   BoxRendering rendering;

@@ -22,6 +22,7 @@ class Field:
     color: tuple[float, float, float] | None = None  # straight red, green, blue, from 0 to 1
     window: tuple[float, float] | None = None        # data values that are dark and bright
     shown: bool = True
+    labels: bool = False                             # its values are labels
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Dataset:
     dtype: str | None = None                        # of a stored sample
     value_range: tuple[float, float] | None = None
     memory_bytes: int = 0                           # of the coordinator
-    labels: int = 0                                 # different ones
+    labels: bool = False                            # it has some
     overlay: bool = False
     cells: int = 0                                  # tetrahedra of an unstructured grid; 0: it is a volume
     levels: tuple[DatasetLevel, ...] = ()           # finest first, at least one
@@ -98,9 +99,10 @@ def dataset_of(message: Any) -> Dataset:
     known = message.fields
     fields = tuple(
         Field(each.name, each.channel, (each.color.r, each.color.g, each.color.b) if each.HasField("color") else None,
-              (each.window.min, each.window.max) if each.HasField("window") else None, each.shown) for each in known.fields)
+              (each.window.min, each.window.max) if each.HasField("window") else None, each.shown, each.labels) for each in known.fields)
     levels = tuple(DatasetLevel(schema.zyx(level.size), schema.zyx(level.spacing)) for level in message.levels or [about])
-    return schema.read(Dataset, message, state=state, shape=schema.zyx(about.size), spacing=schema.zyx(about.spacing),
+    apart = [field for field in fields if not field.channel]
+    return schema.read(Dataset, message, state=state, labels=any(field.labels for field in apart), overlay=any(not field.labels for field in apart), shape=schema.zyx(about.size), spacing=schema.zyx(about.spacing),
                        dtype=schema.word(about, "type") or None, value_range=(message.range.min, message.range.max), levels=levels,
                        fields=fields or (Field(),), times=max(known.times, 1), time_unit=known.time_unit, field=known.field, time=known.time,
                        time_step=known.time_step if known.HasField("time_step") else None)

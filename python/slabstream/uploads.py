@@ -19,7 +19,7 @@ from .volumes import Volume, file_type_of, slabs_of
 # How samples are stored, by the type that they have in files: the type on the wire, and what is added to get their values.
 _STORED = {"uint8": ("UINT8", 0), "int8": ("UINT8", -128), "uint16": ("UINT16", 0), "int16": ("UINT16", -32768), "float32": ("FLOAT32", 0)}
 _WORLDS = {"voxels": schema.WORLD_VOXELS, "scene": schema.WORLD_SCENE, "patient": schema.WORLD_PATIENT}
-_MOST_LABELS, _MOST_LABEL = 4096, 1 << 24
+_MOST_LABELS = 4096
 _RIGHT_ANGLES = 1e-3  # of unit vectors
 
 
@@ -97,8 +97,8 @@ def _numbered(labels: Volume) -> tuple[Volume, list[int]]:
     """The number of each voxel's label, from 1, and the labels."""
     array = numpy.asarray(labels.samples)
     values = numpy.unique(array)
-    if (values != values.astype(numpy.int64)).any() or values.min() < 0 or values.max() > _MOST_LABEL:
-        raise InvalidArgument(f"labels hold {values[-1]}, must be whole numbers in [0, {_MOST_LABEL}]")
+    if values.dtype.kind == "f" and not (values == numpy.floor(values)).all() or values.min() < 0:
+        raise InvalidArgument(f"labels hold {values[-1]}, must be whole numbers of at least 0")
     known = values[values > 0]
     if len(known) > _MOST_LABELS:
         raise InvalidArgument(f"there are {len(known)} different labels, at most {_MOST_LABELS} are taken")
@@ -123,12 +123,12 @@ def upload_of(name: str, volume: Volume, labels: Volume | None, overlay: Volume 
     if labels is not None:
         _check_grid("labels", labels, volume)
         numbers, values = _numbered(labels)
-        order.layers.label_bytes = numbers.samples.dtype.itemsize
+        order.label_bytes = numbers.samples.dtype.itemsize
         order.labels.extend(schema.NewLabel(value=value) for value in values)
         layers.append(_place(numbers))
     if overlay is not None:
         _check_grid("overlay", overlay, volume)
-        order.layers.overlay = True
+        order.overlay = True
         layers.append(_place(Volume(_Floats(overlay.samples), overlay.grid, rounds=True)))
     return order, itertools.chain.from_iterable(map(_bytes_of, layers))
 

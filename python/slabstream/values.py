@@ -23,7 +23,7 @@ Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the 
 MOST_COORDINATE = 1e300  # of the world: practically any; a bound of a clip box that is left out
 MOST_SCALAR = 1e300
 MOST_SIDE = 16384      # pixels
-MOST_LABEL = 1 << 24
+MOST_LABEL = (1 << 64) - 1
 MOST_NAME_BYTES = 256
 MOST_ISOSURFACES = 8
 

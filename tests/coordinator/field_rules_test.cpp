@@ -81,6 +81,63 @@ TEST_F(FieldRules, AFrameShowsAllChannelsOnceTheyAreThere) {
   EXPECT_NE(setup.transfer.colors, setup.fields[0].look.transfer.colors);
 }
 
+TEST_F(FieldRules, EachFieldHasALightVolumeIfThereAreShadows) {
+  SubmitFrame submit = Showing(1, {"0", "2"});
+  submit.frame.shading.ambient_occlusion = 1;
+  script.Client(kClient, submit);
+  const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());
+  ASSERT_THAT(groups, SizeIs(1));
+  const FrameSetup& setup = groups[0].setup;
+  ASSERT_TRUE(setup.light);
+  EXPECT_EQ(setup.light->dataset, LightVolumeOf(setup.dataset));
+  ASSERT_THAT(setup.fields, SizeIs(1));
+  ASSERT_TRUE(setup.fields[0].light);
+  EXPECT_EQ(setup.fields[0].light->dataset, LightVolumeOf(script.loads[1].load));
+}
+
+// What the light volumes are made from is read, too: of the volume, which has levels, and of a channel with levels of its own.
+TEST_F(FieldRules, AFieldOfSeveralLevelsHasACoarseOneAsItsLightVolume) {
+  SubmitFrame submit = Showing(1, {"0", "1"});
+  submit.frame.shading.shadows = 1;
+  submit.frame.level = "0";
+  script.Client(kClient, submit);
+  const auto levels = std::make_shared<VolumeLevels>();
+  for (const std::int32_t side : {300, 100}) {
+    VolumeDescription level = BlockSummary()->description;
+    level.geometry.size = {side, side, side};
+    level.geometry.spacing = {300.0 / side, 300.0 / side, 300.0 / side};
+    levels->levels.push_back(level);
+  }
+  const auto overview = std::make_shared<VolumeSummary>(*BlockSummary());
+  overview->description = levels->levels[1];
+  levels->overview = overview;
+  Actions actions;
+  for (std::size_t i = 0; i < script.loads.size(); ++i) {
+    const LoadDataset load = script.loads[i];
+    if (!IsLevelName(load.name)) {
+      CoordinatorScript::Append(
+          actions, script.Step(DatasetOpened{
+                       load.name, load.load, levels, {load.source, load.source}, stamp_, IsPart(load.name) ? nullptr : ThreeChannels()}));
+      continue;
+    }
+    auto summary = std::make_shared<VolumeSummary>(*BlockSummary());
+    summary->description = levels->levels[load.name.ends_with('1') ? 1 : 0];
+    summary->stored = StoredAt{.source = "/named/block.zarr", .level = 0, .version = 1, .block = {{0, 0, 0}, {64, 64, 64}}};
+    CoordinatorScript::Append(actions, script.Step(DatasetLoaded{load.name, load.load, load.load, summary, 0, stamp_}));
+  }
+  const std::vector<GroupAssignment> groups = HandedOut(NothingChanged(std::move(actions)));
+  const std::string part = PartName("block", 1, 0);
+  ASSERT_THAT(LoadedNames(), testing::UnorderedElementsAre("block", part, LevelName("block", 0), LevelName("block", 1), LevelName(part, 0),
+                                                           LevelName(part, 1)));
+  const auto id = [&](const std::string& name) { return std::ranges::find(script.loads, name, &LoadDataset::name)->load; };
+  ASSERT_THAT(groups, SizeIs(1));
+  const FrameSetup& setup = groups[0].setup;
+  EXPECT_EQ(setup.dataset, id(LevelName("block", 0)));
+  EXPECT_EQ(setup.light.value().dataset, id(LevelName("block", 1)));
+  EXPECT_EQ(setup.fields.at(0).levels.at(0).dataset, id(LevelName(part, 0)));
+  EXPECT_EQ(setup.fields.at(0).light.value().dataset, id(LevelName(part, 1)));
+}
+
 TEST_F(FieldRules, TheFirstChannelThatShowsIsTheVolume) {
   script.Client(kClient, Showing(1, {"GFP", "1"}));
   const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());

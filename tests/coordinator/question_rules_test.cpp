@@ -233,7 +233,7 @@ TEST_F(UploadRules, MemoryAdmitsThem) {
 class FileRules : public UploadRules {
  protected:
   static AddVolume File(std::uint64_t nonce, const std::string& name) {
-    return {.nonce = nonce, .name = name, .description = {}, .layers = {}, .labels = {}, .file = SentFile{name + ".nii", kMebi}};
+    return {.nonce = nonce, .name = name, .description = {}, .labels = {}, .file = SentFile{name + ".nii", kMebi}};
   }
   Actions Arrive(PeerToken from, std::uint64_t nonce, const std::string& name) {
     const UploadId upload = Begin(from, File(nonce, name));

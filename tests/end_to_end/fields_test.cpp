@@ -13,6 +13,7 @@ namespace slabstream {
 namespace {
 
 constexpr int kSide = 24, kChannels = 2, kTimes = 3;
+const std::vector<std::string> kShadows = {"--shadows", "1", "--ambient-occlusion", "1"};
 
 // The sample at x, y, z of a channel at a time.
 using Sample = std::function<int(int channel, int time, double x, double y, double z)>;
@@ -65,7 +66,7 @@ TEST_F(FieldsTest, ChannelsThatAreExchangedWithTheirColoursAreTheSamePicture) {
   MakeStore("a.zarr", Blob, red_ + "," + green_);
   MakeStore(
       "b.zarr", [](int channel, int time, double x, double y, double z) { return Blob(1 - channel, time, x, y, z); }, green_ + "," + red_);
-  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{}, {"--renderer", "mip"}, {"--time", "2"}}) {
+  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{}, {"--renderer", "mip"}, {"--time", "2"}, kShadows}) {
     EXPECT_LE(LargestDifference(Rendered("a.zarr", more), Rendered("b.zarr", more)), 1.01 / 255);
   }
   EXPECT_GT(LargestDifference(Rendered("a.zarr"), Rendered("a.zarr", {"--channel", "0"})), 0.1);
@@ -73,7 +74,12 @@ TEST_F(FieldsTest, ChannelsThatAreExchangedWithTheirColoursAreTheSamePicture) {
 
 TEST_F(FieldsTest, WorkersAndBoxesDoNotMatter) {
   MakeStore("a.zarr", Blob, red_ + "," + green_);
-  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{}, {"--renderer", "mip"}, {"--blend", "over"}}) {
+  for (const std::vector<std::string>& more :
+       std::vector<std::vector<std::string>>{{},
+                                             {"--renderer", "mip"},
+                                             {"--blend", "over"},
+                                             kShadows,
+                                             {"--channel", "0", "--overlay", "a.zarr?channel=1,time=2", "--shadows", "1"}}) {
     const auto one = Rendered("a.zarr", more);
     EXPECT_LE(LargestDifference(one, Rendered("a.zarr", more, "--local=3")), 1.01 / 255);
     EXPECT_LE(LargestDifference(one, Rendered("a.zarr", more, "--local=8")), 1.01 / 255);
@@ -122,6 +128,20 @@ TEST_F(FieldsTest, AnOverlayCoversTheVolumeWhereItIsOpaque) {
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(covered.At(24, 24, c), alone.At(24, 24, c), 0.02);
   EXPECT_GT(LargestDifference(covered, Rendered("a.zarr", {"--renderer", "raycast", "--no-fit", "--shading", "none", "--channel", "0"})),
             0.1);
+}
+
+TEST_F(FieldsTest, OptionsOfChannelsSayHowAnOverlayOfAFileLooks) {
+  MakeStore("a.zarr", Blob, red_ + "," + green_);
+  const std::vector<std::string> file = {"--overlay", "a.zarr?channel=1,time=0", "--channel", "0", "--renderer", "raycast"};
+  const auto rendered = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), file.begin(), file.end());
+    return Rendered("a.zarr", more);
+  };
+  const auto expected = rendered({"--overlay-transfer", "hot", "--overlay-range", "50:150", "--overlay-weight", "0.5"});
+  const auto found =
+      rendered({"--channel-transfer", "overlay=hot", "--channel-range", "overlay=50:150", "--channel-opacity", "overlay=0.5"});
+  EXPECT_EQ(LargestDifference(found, expected), 0);
+  EXPECT_GT(LargestDifference(found, rendered({})), 0.05);
 }
 
 }  // namespace

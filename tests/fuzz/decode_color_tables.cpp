@@ -19,7 +19,6 @@ bool DecodeColorTable(std::span<const std::byte> bytes) {
     for (const float channel : color) CHECK(channel >= 0 && channel <= 1) << channel;
   };
   for (const auto& [value, entry] : table->entries) {
-    CHECK_LE(value, kMaxLabelValue);
     check(entry.color);
   }
   for (const LabelColor& color : table->sequence) check(color);

@@ -397,7 +397,7 @@ class HttpTest(WithService):
             profile = self.ask("profile", **{"dataset": "times", "time": time, "from": "0,0,0", "to": "1,0,0", "samples": 2})
             self.assertEqual(profile["values"], [value, value])
         channels = self.datasets_with("channels")["channels"]
-        self.assertEqual(channels["fields"], 2 * [{"name": "", "channel": True, "shown": True}])
+        self.assertEqual(channels["fields"], 2 * [{"name": "", "channel": True, "labels": False, "shown": True}])
         self.assertEqual((channels["times"], channels["field"], channels["time"]), ({"count": 1}, 0, 0))
         self.assertEqual(self.datasets_with("times")["times"]["times"]["count"], 3)
         listed = self.programs.run("data", "list", "--endpoint", self.endpoint).stdout
@@ -408,8 +408,8 @@ class HttpTest(WithService):
 
     def test_labels_have_their_names_and_colours(self):
         self.assertEqual(self.ask("labels", dataset="c"), {"dataset": "c", "labels": [
-            {"value": 3, "name": "Corner \"low\"", "color": "#ff8000"}, {"value": 70, "name": "Größte Ecke", "color": "#0000ff"}]})
-        self.assertEqual(self.ask("labels", dataset="a"), {"dataset": "a", "labels": []})
+            {"value": 3, "name": "Corner \"low\"", "color": "#ff8000"}, {"value": 70, "name": "Größte Ecke", "color": "#0000ff"}], "complete": True})
+        self.assertEqual(self.ask("labels", dataset="a"), {"dataset": "a", "labels": [], "complete": False})
         self.assertEqual(self.ask("value", dataset="c", at="19,19,19")["label"], {"value": 70, "name": "Größte Ecke"})
 
     def test_values_at_points(self):

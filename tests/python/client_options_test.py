@@ -385,7 +385,7 @@ class Requests(unittest.TestCase):
             ({"label_tint": 2}, "label_tint 2 is out of range [0, 1]"),
             ({"labels_shown": ["x" * 257]}, "labels_shown has a name of 257 bytes, at most 256 are possible"),
             ({"labels_shown": "1,"}, "labels_shown '' is not a whole number"),
-            ({"labels_shown": "9-5"}, "labels_shown 5 is out of range [9, 16777216]"),
+            ({"labels_shown": "9-5"}, "labels_shown 5 is out of range [9, 18446744073709551615]"),
             ({"size": 0}, "size 0 is out of range [1, 16384]"),
             ({"size": (1, 2, 3)}, "size (1, 2, 3) is neither WIDTHxHEIGHT nor one number"),
             ({"shading": "toon"}, "shading 'toon' is not one of phong, none, depth-gradient"),

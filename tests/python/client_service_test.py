@@ -269,7 +269,7 @@ class AtAService(WithAService):
         self.assertEqual((status.pid, len(status.workers), status.endpoint), (self.running.coordinator, 2, self.running.endpoint))
         head = {dataset.name: dataset for dataset in self.service.datasets()}["head"]
         self.assertEqual((head.state, head.shape, head.spacing, head.dtype), ("ready", (20, 24, 28), (2, 1.5, 1.25), "uint8"))
-        self.assertEqual((head.labels, head.overlay), (3, True))
+        self.assertEqual((head.labels, head.overlay), (True, True))
 
     def test_channels_and_times_are_told_and_asked_about(self) -> None:
         self.service.add_data(cells=write_cells(self.folder))
@@ -290,7 +290,8 @@ class AtAService(WithAService):
                 self.assertIn(sentence, str(caught.exception))
             self.service.histogram("head")
             head = {dataset.name: dataset for dataset in self.service.datasets()}["head"]
-            self.assertEqual((head.fields, head.times), ((ss.Field(), ss.Field(name="overlay", channel=False, shown=False)), 1))
+            self.assertEqual((head.fields, head.times), ((ss.Field(), ss.Field(name="overlay", channel=False, shown=False),
+                                                             ss.Field(name="labels", channel=False, shown=False, labels=True)), 1))
         finally:
             self.service.remove_data("cells")
 

@@ -186,7 +186,7 @@ class Uploads(WithAService):
         labels.description.CopyFrom(schema.VolumeDescription(size=schema.Index3(x=1, y=1, z=1), spacing=schema.Vec3(x=1, y=1, z=1), type=1, scale=1))
         labels.description.orientation.CopyFrom(schema.Orientation(world=1, origin=schema.Vec3(), x_axis=schema.Vec3(x=1),
                                                                    y_axis=schema.Vec3(y=1), z_axis=schema.Vec3(z=1)))
-        labels.layers.label_bytes = 1
+        labels.label_bytes = 1
         labels.labels.add(value=3)
         send(add_volume=labels)
         receive("order_refused")  # of the one before

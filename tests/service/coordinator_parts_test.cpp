@@ -41,15 +41,15 @@ TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   VolumeSummary summary = Summarize(*sphere);
   AnswerQuestion asked{.question = SummaryQuery{.nonce = 7, .dataset = "ball", .transfer = {}}, .dataset = 5};
-  const auto answer = [&](const VolumeSummary& of) {
-    asked.summary = std::make_shared<const VolumeSummary>(of);
-    return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}).value());
-  };
-  EXPECT_EQ(answer(summary).labels, std::vector<Label>());
-  EXPECT_EQ(answer(summary).nonce, 7U);
+  asked.summary = std::make_shared<const VolumeSummary>(summary);
+  const auto answer = [&] { return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}).value()); };
+  EXPECT_EQ(answer().labels, std::vector<Label>());
+  EXPECT_EQ(answer().nonce, 7U);
   const std::vector<Label> labels = {{3, {1, 0.5F, 0}, "Corner"}, {70, {0, 0, 1}, ""}};
-  summary.label_table = std::make_shared<const LabelTable>(LabelTable{labels});
-  EXPECT_EQ(answer(summary).labels, labels);
+  summary.labels = std::make_shared<const LabelTable>(LabelTable{labels, true});
+  asked.labels.summary = std::make_shared<const VolumeSummary>(summary);
+  EXPECT_EQ(answer().labels, labels);
+  EXPECT_TRUE(answer().all_labels);
   EXPECT_EQ(AnswerTo(asked, {}).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
   asked.dataset = 0;
   EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
@@ -206,32 +206,26 @@ TEST_F(VoxelServerTest, ChunksPutTogetherAreTheBox) {
   }
 }
 
-// The chunks of a dataset with layers are those of its volume, then those of each layer.
-TEST_F(VoxelServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
+TEST_F(VoxelServerTest, LabelsOf64BitsArriveAsTheyAre) {
   const Box box = volume_->block.box;
-  VoxelBlock labels = MakeVoxelBlock(box, ScalarType::kUint16);
+  const auto labels = std::make_shared<Volume>(Volume{volume_->description, MakeVoxelBlock(box, ScalarType::kUint64)});
+  labels->description.type = ScalarType::kUint64;
   for (std::int64_t i = 0; i < box.voxel_count(); ++i) {
-    labels.samples<std::uint16_t>()[i] = std::uint16_t(random_.Real(0, 3000));
+    labels->block.samples<std::uint64_t>()[i] = std::uint64_t(random_.Real(0, 0x1p63)) * 2 + 1;
   }
-  server_->Publish(7, {.volume = volume_, .labels = std::make_shared<const BrickedVoxels>(labels)});
-  const SampleTypes types(volume_->block.type, {.labels = ScalarType::kUint16});
-  const std::array<const VoxelBlock*, 2> expected = {&volume_->block, &labels};
-  std::array<std::vector<std::byte>, 2> samples;
-  for (std::uint32_t i = 0; i < ChunkCount(box, types); ++i) {
-    const ChunkPart part = PartOfChunk(box, types, i);
-    std::vector<std::byte>& of_layer = samples.at(std::size_t(part.layer));
-    ASSERT_EQ(part.begin, of_layer.size()) << "chunk " << i << " does not follow the one before";
-    of_layer.resize(of_layer.size() + part.bytes);
+  server_->Publish(7, {.volume = labels});
+  std::vector<std::byte> samples;
+  for (std::uint32_t i = 0; i < ChunkCount(box, ScalarType::kUint64); ++i) {
+    const ChunkPart part = PartOfChunk(box, ScalarType::kUint64, i);
+    ASSERT_EQ(part.begin, samples.size()) << "chunk " << i << " does not follow the one before";
+    samples.resize(samples.size() + part.bytes);
     Bytes payload;
     const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = 7, .box = box, .chunk = i}, &payload);
     const auto* chunk = std::get_if<Chunk>(&answer);
     ASSERT_NE(chunk, nullptr) << NameOf(answer);
-    ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), std::span(of_layer).subspan(part.begin)).ok());
+    ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), std::span(samples).subspan(part.begin)).ok());
   }
-  for (std::size_t layer = 0; layer < expected.size(); ++layer) {
-    ASSERT_EQ(samples.at(layer).size(), expected.at(layer)->bytes.size());
-    EXPECT_EQ(std::memcmp(samples.at(layer).data(), expected.at(layer)->bytes.data(), samples.at(layer).size()), 0) << "layer " << layer;
-  }
+  EXPECT_TRUE(std::ranges::equal(samples, labels->block.bytes));
 }
 
 TEST_F(VoxelServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
@@ -435,7 +429,7 @@ TEST_F(CatalogueTest, WhatHasNoNameIsNamedAfterItsFile) {
   EXPECT_THAT(NamesOf(found), testing::ElementsAre("brain", "head", "head-2", "last"));
   EXPECT_THAT(found.folders, testing::IsEmpty()) << "a store is one volume";
   EXPECT_EQ(found.datasets.at("head").path, head + "?spacing=1,1,2");
-  EXPECT_EQ(found.datasets.at("head").layers.labels, layer);
+  EXPECT_EQ(found.datasets.at("head").labels->path, layer + "?ids=yes");
   EXPECT_THAT(found.complaints, testing::ElementsAre(HasSubstr("named \"head-2\"")));
   ExpectError({(directory_ / "other").string() + ",labels=" + layer}, StatusCode::kInvalidArgument, "a folder to watch");
 }
@@ -534,18 +528,18 @@ TEST_F(CatalogueTest, LayersFollowANamedVolume) {
     EXPECT_EQ(ParseDataArgument(wrong).status().code(), StatusCode::kInvalidArgument) << wrong.substr(0, 40);
   }
   // Other labels, other ids; a layer that is replaced is noticed.
-  const DataSource source(volume, "", {.labels = layer});
+  const DataSource source = *DataSource(volume, "", {.labels = layer}).labels;
   const Result<LoadedSource> loaded = LoadWhole(source);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  ASSERT_NE(loaded->layers.labels, nullptr);
-  EXPECT_NE(IdOf("a", *loaded->volume, loaded->layers), IdOf("a", *loaded->volume));
+  ASSERT_NE(loaded->labels, nullptr);
+  EXPECT_NE(IdOf("a", *loaded->volume, loaded->labels.get()), IdOf("a", *loaded->volume));
   EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
   Write("layer.nrrd", 6);
   EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
-  EXPECT_NE(IdOf("a", *loaded->volume, LoadWhole(source)->layers), IdOf("a", *loaded->volume, loaded->layers));
+  const Result<LoadedSource> again = LoadWhole(source);
+  EXPECT_NE(IdOf("a", *again->volume, again->labels.get()), IdOf("a", *loaded->volume, loaded->labels.get()));
   // An overlay is a field that is read from its own file.
   const DataSource with_overlay(volume, "", {.overlay = layer});
-  EXPECT_FALSE(with_overlay.layers.any());
   const auto fields = FieldsOf(with_overlay, {});
   ASSERT_NE(fields, nullptr);
   ASSERT_EQ(fields->fields.size(), 2U);

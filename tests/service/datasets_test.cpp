@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "data/layers/layer_reader.h"
+#include "data/catalogue/catalogue.h"
 #include "data/volume_io/volume_writer.h"
 #include "tests/service/multi_process_fixture.h"
 #include "tests/support/whole_file.h"
@@ -97,13 +97,18 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   request.shading.model = ShadingModel::kNone;
   // What the picture is, by definition: from the same files, in one box.
   const auto expected = [&] {
-    const Layers layers = ReadLayers({.labels = labels.string(), .label_colors = table.string()}, volume_->description.geometry).value();
-    const FramePlan plan = PlanFrame(request, 1, Summarize(LayeredVolume{volume_, layers}), Roster{{1}}).value();
-    BoxData data(CutBlock(volume_->block, volume_->block.box), BoxLayers{BrickedVoxels(layers.labels->block), {}});
+    const DataSource files("", "", {.labels = labels.string(), .label_colors = table.string()});
+    const LoadedSource read = std::get<LoadedSource>(ReadSource(*files.labels, std::uint64_t{1} << 30).value());
+    auto summary = std::make_shared<VolumeSummary>(Summarize(*read.volume));
+    summary->labels = read.labels;
+    const ShownFields fields{.others = {{.number = 1, .labels = true, .levels = {{2, summary}}, .of_volume = {0}}}};
+    const auto of_volume = std::make_shared<const VolumeSummary>(Summarize(*volume_));
+    const FrameSetup setup = MakeFrameSetup(ResolveRequest(request, 1, of_volume, fields).value()).value();
+    BoxData data(CutBlock(volume_->block, volume_->block.box)), of_labels{BrickedVoxels(read.volume->block)};
+    data.SetFields({&of_labels});
     RankReport report;
-    LocalImage frame =
-        MakeRenderer(*plan.setup.renderer)->Render(data, volume_->block.box, plan.setup, {}, RenderControl(), report).value();
-    return FinishPicture(frame, plan.setup);
+    LocalImage frame = MakeRenderer(*setup.renderer)->Render(data, volume_->block.box, setup, {}, RenderControl(), report).value();
+    return FinishPicture(frame, setup);
   };
   const auto expect_shows = [&](const LocalImage& image) {
     const Result<Picture> picture = client_->Render(request);
@@ -113,7 +118,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   const LocalImage first = expected();
   expect_shows(first);
   const std::vector<DatasetStatus> datasets = client_->OrderData({}).value();
-  for (const DatasetStatus& dataset : datasets) EXPECT_EQ(dataset.labels, dataset.name == "layered" ? 2U : 0U);
+  for (const DatasetStatus& dataset : datasets) EXPECT_EQ(dataset.fields && dataset.fields->labels(), dataset.name == "layered");
 
   // Another file, then other colours: the next frame has them.
   Replace(labels, labels_of(16));

@@ -490,7 +490,7 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {
       return done.report;
     };
     const auto key = [&](const Box& box, std::uint64_t generation) {
-      return BoxKey{.dataset = 1, .box = box, .types = {volume->block.type, plan.setup.layers}, .generation = generation};
+      return BoxKey{.dataset = 1, .box = box, .types = {volume->block.type, plan.setup.cells}, .generation = generation};
     };
     const BoxKey direct = key(whole, 1), lower = key({{0, 0, 0}, {60, 60, 30}}, 2), side = key({{20, 0, 0}, {60, 60, 50}}, 3),
                  put_together = key(whole, 4);

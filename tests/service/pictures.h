@@ -46,9 +46,9 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   CHECK(plan.ok()) << plan.status().message();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
-  BoxLayers layers;
-  if (volume.cells != nullptr) layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(volume.block.box));
-  BoxData data(std::move(copy), std::move(layers));
+  std::shared_ptr<const Mesh> cells;
+  if (volume.cells != nullptr) cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(volume.block.box));
+  BoxData data(std::move(copy), std::move(cells));
   RenderControl control;
   RankReport report;
   Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(data, volume.block.box, plan->setup, {}, control, report);

@@ -48,7 +48,7 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
   const std::uint32_t bytes = IsCellChunk(request.chunk) ? BytesOfCellChunk(cells_.BytesOf(request.dataset, request.box), request.chunk)
-                                                         : BytesOfChunk(request.box, kVoxelType, request.chunk);
+                                                         : PartOfChunk(request.box, kVoxelType, request.chunk).bytes;
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 
@@ -76,7 +76,7 @@ double ModelWorker::Begin(Job&, const StoreChunk& action) {
   EXPECT_EQ(boxes_.count(action.padded), 1U) << "a chunk is stored in a padded box that is not open";
   EXPECT_TRUE(action.padded.box.Contains(action.chunk.box));
   if (IsCellChunk(action.chunk.chunk)) {
-    EXPECT_TRUE(action.padded.types.layers.cells) << "cells of a dataset that has none";
+    EXPECT_TRUE(action.padded.types.cells) << "cells of a dataset that has none";
     EXPECT_EQ(action.chunk.box, action.padded.box) << "cells are those of the whole padded box";
   }
   return speed_.store;
@@ -102,11 +102,11 @@ bool ModelWorker::Complete(const BoxKey& key) const {
   if (open == boxes_.end()) return false;
   std::vector<Box> boxes;
   for (const auto& [box, chunks] : open->second.chunks) {
-    if (chunks.size() != ChunkCount(box, key.types)) return false;
+    if (chunks.size() != ChunkCount(box, key.types.samples)) return false;
     boxes.push_back(box);
   }
   for (const OpenBox::Copy& copy : open->second.copied) boxes.push_back(copy.box);
-  if (key.types.layers.cells && open->second.cell_chunks.size() != CellChunkCount(cells_.BytesOf(key.dataset, key.box))) return false;
+  if (key.types.cells && open->second.cell_chunks.size() != CellChunkCount(cells_.BytesOf(key.dataset, key.box))) return false;
   return Assemble(key.box, boxes).missing.empty();
 }
 

@@ -255,17 +255,17 @@ TEST(SimulateFrames, VoxelsComeBeforeRendering) {
   EXPECT_EQ(result.voxel_bytes, 1000);
 }
 
-// What layers and cells weigh is in the boxes' bytes: their chunks are not simulated one by one.
+// What cells and the voxels of other fields weigh is in the boxes' bytes: their chunks are not simulated one by one.
 TEST(SimulateFrames, TheVoxelsOfABoxTravelAtOnceWhateverTheDatasetHas) {
-  for (const LayerTypes& layers : {LayerTypes{.labels = ScalarType::kUint16}, LayerTypes{.cells = true}}) {
-    MadeFrame frame(2, 1, kSide, 0, 1, "fan-in");
-    for (RenderCost& cost : frame.costs()) cost.voxel_bytes = 500;
-    const double alone = Simulate({frame.input()}, WithoutDelays()).frames[0].latency();
-    frame.plan().setup.layers = layers;
-    const SimulatedFrame result = Simulate({frame.input()}, WithoutDelays()).frames[0];
-    EXPECT_EQ(result.latency(), alone);
-    EXPECT_EQ(result.voxel_bytes, 1000);
-  }
+  MadeFrame frame(2, 1, kSide, 0, 1, "fan-in");
+  for (RenderCost& cost : frame.costs()) cost.voxel_bytes = 500;
+  const double alone = Simulate({frame.input()}, WithoutDelays()).frames[0].latency();
+  frame.plan().setup.cells = true;
+  const VolumeDescription labels = {{{64, 64, 64}}, ScalarType::kUint64, {}};
+  frame.plan().setup.fields.push_back({.levels = {{2, labels, {}}}, .of_volume = {0}, .look = {}, .labels = LabelLook()});
+  const SimulatedFrame result = Simulate({frame.input()}, WithoutDelays()).frames[0];
+  EXPECT_EQ(result.latency(), alone);
+  EXPECT_EQ(result.voxel_bytes, 1000);
 }
 
 // A random run: several frames and groups, workers with several ranks or none, empty groups, any scheme, any machine.

@@ -560,7 +560,7 @@ Chunk Simulation::ChunkOf(const ChunkRequest& request) {
     EXPECT_LT(request.chunk - kFirstCellChunk, CellChunkCount(chunk.cell_bytes)) << "a chunk of cells that there is not";
     chunk.raw_bytes = BytesOfCellChunk(chunk.cell_bytes, request.chunk);
   } else {
-    chunk.raw_bytes = BytesOfChunk(request.box, kVoxelType, request.chunk);
+    chunk.raw_bytes = PartOfChunk(request.box, kVoxelType, request.chunk).bytes;
   }
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;

@@ -17,7 +17,7 @@ Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const Value& 
   volume.description = {geometry, type, {}};
   volume.block = MakeVoxelBlock(geometry.bounds(), type);
   const Index3& size = geometry.size;
-  VisitScalarType(type, [&]<class T>(const T*) {
+  VisitStoredType(type, [&]<class T>(const T*) {
     T* sample = volume.block.samples<T>();
     for (std::int32_t z = 0; z < size.z; ++z) {
       for (std::int32_t y = 0; y < size.y; ++y) {
@@ -39,7 +39,7 @@ inline Volume RandomVolume(Random& random, const Index3& size, ScalarType type) 
     switch (type) {
       case ScalarType::kUint8: return random.Integer(0, 255);
       case ScalarType::kUint16: return random.Integer(0, 65535);
-      case ScalarType::kFloat32: break;
+      default: break;
     }
     return random.Real(-1000, 1000);
   });

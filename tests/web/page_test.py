@@ -96,7 +96,11 @@ class PageTest(unittest.TestCase):
         (cls.programs.folder / "big.nrrd").write_bytes(big + gzip.compress(bytes(1 << 20), 1) * BIG_MEGABYTES)
         cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "v.nrrd")
         cls.programs.run("convert", "v.nrrd", "v.ome.zarr")
-        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
+        # Two channels at three times.
+        dyes = "NRRD0004\ntype: uint8\ndimension: 5\nsizes: 22 26 18 3 2\nkinds: domain domain domain time vector\nencoding: raw\n\n"
+        dyes = dyes.encode() + bytes(ball(i + 2 * t, j, k) if c == 0 else 9 * k for c in range(2) for t in range(3) for k in range(18) for j in range(26) for i in range(22))
+        (cls.programs.folder / "dyes.nrrd").write_bytes(dyes)
+        cls.data = ("--data", "dyes=dyes.nrrd", "--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -1135,6 +1139,16 @@ class PageTest(unittest.TestCase):
         viewer.focus()
         viewer.driver.find_element(By.XPATH, "//button[contains(., 'As the file says')]").click()
         viewer.final("!Object.keys(o).some(name => /^channel|^blend/.test(name))")
+
+    def test_a_link_shows_channels_and_times_as_the_command_line_does(self):
+        looks = {"channel_color": "0=#ff8000,1=#0040ff", "channel_range": "0=80:200,1=10:120", "channel_gamma": "1=0.7", "channel_opacity": "0=0.6"}
+        viewer = self.viewer(dataset="dyes", channel="0,1", blend="over", time="2", **looks)
+        asked = " && ".join(f"o['{name.replace('_', '-')}'] === '{value}'" for name, value in looks.items())
+        self.assertFinal(viewer, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
+        other = self.at_the_same_address(viewer)
+        self.assertFinal(other, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
+        viewer = self.viewer(dataset="dyes", channel="1", time="last")
+        self.assertFinal(viewer, "o.channel === '1' && o.time === '2'")
 
     def test_one_channel_alone_may_have_a_transfer_function(self):
         viewer = self.viewer(**self.more(fields=CHANNELS), channel_color="1=#123456")

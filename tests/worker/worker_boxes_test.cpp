@@ -7,6 +7,7 @@
 #include "common/planning/worker_memory.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/volume/light_volume.h"
 #include "common/volume/memory_budget.h"
 #include "tests/worker/worker_machine_fixture.h"
 
@@ -69,7 +70,7 @@ TEST_F(WorkerBoxesTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
 // How many chunks the cells of a box have is known when the first one comes.
 TEST_F(WorkerBoxesTest, AsksForCellsAsTheirFirstChunkSays) {
   GroupAssignment assignment = Assignment(1, {kSelf});
-  assignment.setup.layers.cells = true;
+  assignment.setup.cells = true;
   const auto first = All<SendChunkRequest>(Tell(assignment));
   ASSERT_THAT(first, SizeIs(3));
   EXPECT_EQ(first[2].request.chunk, kFirstCellChunk);
@@ -102,7 +103,7 @@ TEST_F(WorkerBoxesTest, AsksForCellsAsTheirFirstChunkSays) {
 
 TEST_F(WorkerBoxesTest, FetchesTheCellsOfAResizedBoxAnew) {
   GroupAssignment assignment = Assignment(1, {kSelf});
-  assignment.setup.layers.cells = true;
+  assignment.setup.cells = true;
   Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
   assignment.key.frame = 2;
   EXPECT_THAT(All<SendChunkRequest>(Tell(assignment)), IsEmpty()) << "they are kept";
@@ -366,7 +367,7 @@ class FieldBoxesTest : public WorkerBoxesTest {
   }
   static Chunk AnswerOf(const SendChunkRequest& sent) {
     Chunk chunk = Answer(sent.request);
-    chunk.raw_bytes = BytesOfChunk(sent.request.box, sent.padded.types, sent.request.chunk);
+    chunk.raw_bytes = PartOfChunk(sent.request.box, sent.padded.types.samples, sent.request.chunk).bytes;
     return chunk;
   }
 };
@@ -395,13 +396,36 @@ TEST_F(FieldBoxesTest, ARenderBeginsOnceTheBoxesOfAllFieldsAreThere) {
   ASSERT_THAT(render.fields, SizeIs(2));
   EXPECT_EQ(render.fields.at(0)->dataset, 2U);
   EXPECT_EQ(render.fields.at(1)->dataset, 3U);
-  EXPECT_EQ(render.fields.at(1)->types.volume, ScalarType::kFloat32);
+  EXPECT_EQ(render.fields.at(1)->types.samples, ScalarType::kFloat32);
 
   constexpr std::uint64_t kVoxels = 128U * 128 * 72;
   const std::uint64_t coarse = 4 * std::uint64_t(asked[3].voxel_count());
   Tell(RenderDone{render.key, render.rank, render.image, {}, {}, kVoxels, {3 * kVoxels, coarse}});
   EXPECT_EQ(Sent<Heartbeat>(After(seconds(2))).back().cached_bytes, 4 * kVoxels + coarse) << "with what was derived of a field";
   EXPECT_THAT(All<SendChunkRequest>(Tell(OfFields(2))), IsEmpty()) << "they are kept";
+}
+
+// Also that of a field that does not reach the box: it may shade what is there.
+TEST_F(FieldBoxesTest, ARenderHasTheLightVolumesOfAllFields) {
+  GroupAssignment assignment = OfFields(1);
+  FrameSetup& setup = assignment.setup;
+  setup.fields[1] = setup.fields[0];
+  setup.fields[1].levels[0].description.geometry.orientation.origin = {0, 0, 300};
+  const auto light = [](DatasetId dataset, VolumeDescription of) {
+    of.geometry = LightGeometry(of.geometry);
+    return CoarserLevel{LightVolumeOf(dataset), of};
+  };
+  setup.shading.shadows = 1;
+  setup.light = light(1, setup.description);
+  setup.fields[0].light = light(2, setup.description);
+  setup.fields[1].light = light(3, setup.fields[1].levels[0].description);
+  const auto renders = All<StartRender>(Feed(Tell(assignment)));
+  ASSERT_THAT(renders, SizeIs(1));
+  ASSERT_THAT(renders[0].lights, SizeIs(3));
+  for (DatasetId i = 0; i < 3; ++i) {
+    EXPECT_EQ(renders[0].lights[i].dataset, LightVolumeOf(i + 1));
+    EXPECT_EQ(renders[0].lights[i].box, LightVolumesOf(setup)[i]->description.geometry.bounds());
+  }
 }
 
 TEST_F(FieldBoxesTest, AFieldThatDoesNotReachABoxIsNotAskedFor) {

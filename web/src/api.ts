@@ -20,7 +20,7 @@ export interface Level { size: [number, number, number]; spacing: [number, numbe
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
-  layers?: { labels: number; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
+  layers?: { labels: number | boolean; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
   fields?: Field[]; times?: Times; field?: number; time?: number; // absent: one field, one time
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
@@ -70,7 +70,7 @@ export class Api {
   histogram = (source: Source): Promise<Histogram | null> => this.maybe("histogram", source);
   jointHistogram = (source: Source): Promise<JointHistogram | null> => this.maybe("joint-histogram", source);
   transfer = (source: Source, transfer: string): Promise<unknown> => this.maybe("transfer", { ...source, transfer });
-  labels = (dataset: string): Promise<{ labels: LabelName[] } | null> => this.maybe("labels", { dataset });
+  labels = (dataset: string): Promise<{ labels: LabelName[]; complete?: boolean } | null> => this.maybe("labels", { dataset });
   value = (source: Source, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { ...source, at: at.join(",") }, undefined, signal);
   profile = (source: Source, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { ...source, from: from.join(","), to: to.join(",") });
   statistics = (source: Source, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { ...source, box });

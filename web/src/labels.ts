@@ -39,13 +39,18 @@ export function listOf(shown: readonly LabelName[], all: readonly LabelName[]): 
 export const labelText = ({ name, value }: LabelName): string => name || `Label ${value}`;
 
 export class Labels {
-  names: readonly LabelName[] = []; // all of the dataset if the gateway tells them, else those that were pointed at
+  names: readonly LabelName[] = []; // those that the gateway tells, and those that were pointed at
+  complete = false; // the dataset has no others
   private readonly listeners: (() => void)[] = [];
 
   constructor(private readonly context: Context) {
     context.onVolume(volume => {
+      this.complete = false;
       this.set([]);
-      if (volume && volume.labels > 0) context.api.labels(volume.name).then(answer => this.set(answer?.labels ?? [])).catch(() => undefined);
+      if (volume && volume.labels > 0) context.api.labels(volume.name).then(answer => {
+        this.complete = answer?.complete ?? answer?.labels.length === volume.labels;
+        this.set(answer?.labels ?? []);
+      }).catch(() => undefined);
     });
   }
 

@@ -9,7 +9,7 @@ import { LOOK, ONE_COLOR } from "./state";
 import { rounded } from "./vec";
 
 // A row for each label: whether it shows, its colour, its name, its opacity.
-function labelList({ store, volume }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
+function labelList({ store }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
   const element = h("div", { class: "labels", role: "group", "aria-label": "Labels" });
   let made: readonly LabelName[] = [];
   // A list names what is shown. Where not all labels are known, it would hide the others, too: there the opacity 0 hides one of them, but
@@ -17,7 +17,7 @@ function labelList({ store, volume }: Context, labels: Labels): { element: HTMLE
   const setShown = (label: LabelName, on: boolean): void => {
     const { labels: mode, labelsShown, labelOpacities } = store.state;
     if (!isListed(labelsShown, label)) return store.update({ labelsShown: `${labelsShown},${label.value}` }, "label");
-    if (!on && (mode === "highlight" || labels.names.length === volume()?.labels)) {
+    if (!on && (mode === "highlight" || labels.complete)) {
       const rest = listOf(labels.names.filter(known => known !== label && isListed(labelsShown, known)), labels.names);
       return store.update(rest ? { labelsShown: rest } : { labels: "off" }, "label");
     }
@@ -85,7 +85,7 @@ export function layersSection(context: Context, labels: Labels): HTMLElement {
     tint.element.hidden = !any || (state.labels !== "tint" && state.labels !== "highlight");
     which.element.hidden = list.element.hidden = legend.element.hidden = !on;
     hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
-    hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;
+    hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : "Point at a label in the picture to list it here.";
     overlay.element.hidden = !volume?.overlay;
     overlayPreset.element.hidden = rangeRow.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
     colorRow.hidden = overlayPreset.element.hidden || state.overlayPreset !== ONE_COLOR;

@@ -18,7 +18,7 @@ export function volumeOf(dataset: Dataset, centre: Vec3, world: string, unit: st
   return {
     name: dataset.name, size, spacing, extent, centre, low: add(centre, scale(extent, -0.5)), high: add(centre, scale(extent, 0.5)),
     range: [range.min, range.max], type: dataset.type ?? "", memoryBytes: dataset.memory_bytes ?? 0, world, unit,
-    labels: dataset.layers?.labels ?? 0, overlay: dataset.layers?.overlay ?? false, cells: dataset.cells ?? 0,
+    labels: Number(dataset.layers?.labels ?? 0), overlay: dataset.layers?.overlay ?? false, cells: dataset.cells ?? 0,
     levels: dataset.levels ?? [], channels: channelsOf(dataset),
   };
 }

@@ -21,7 +21,7 @@ struct FaceShading {
   const float* colors = nullptr;         // [bin][4]: straight colour, and one more
   // Labels; null: not shown. With the share s of the label, a face has the colour (1 - s) * (colour of its bin) + s * (colour of its
   // label).
-  const std::uint16_t* labels = nullptr;  // by number of the face
+  const std::uint32_t* labels = nullptr;  // by number of the face
   const float* label_colors = nullptr;    // [label][4]: s * straight colour, s
 
   // hit = origin + x * origin_x + y * origin_y + depth * (direction + x * direction_x + y * direction_y) at pixel centre (x, y). data

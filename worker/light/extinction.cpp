@@ -11,12 +11,15 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/classification/region_table.h"
 #include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/volume/affine_map.h"
+#include "common/volume/indices.h"
 
 #ifndef SLABSTREAM_WORKER_LIGHT_EXTINCTION_CPP_  // shared by all instruction sets
 #define SLABSTREAM_WORKER_LIGHT_EXTINCTION_CPP_
@@ -133,8 +136,9 @@ ExtinctionTable MakeExtinctionTable(const ClassificationTable& table, double per
 // The extinction by the regions of a transfer function, of values between two others at one slope.
 class RegionExtinction {
  public:
-  RegionExtinction(const FrameSetup& setup, const ClassificationTable& classification, double per_voxel_length)
-      : table_(MakeRegionTable(setup.transfer, classification, setup.description.mapping)) {
+  RegionExtinction(const TransferFunction& transfer, const ValueMapping& mapping, const ClassificationTable& classification,
+                   double per_voxel_length)
+      : table_(MakeRegionTable(transfer, classification, mapping)) {
     table_.ReplaceOpacities(
         [&](double opacity) { return ExtinctionOfOpacity(opacity, classification.opacity_distance) * per_voxel_length; });
   }
@@ -191,20 +195,20 @@ class KeptShare {
   double half_ = 0;  // a voxel
 };
 
-}  // namespace
-
-Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
-  const VolumeGeometry& light = setup.light->description.geometry;
-  const VolumeGeometry& frame = setup.description.geometry;
+// The extinction of one field on the grid of its light volume, which `values` is.
+Extinction ExtinctionOfField(const VoxelBlock& values, const VolumeDescription& description, const FieldLook& look,
+                             const RendererKind& renderer, double voxel_length) {
+  const VolumeGeometry& light = description.geometry;
   const Index3& size = light.size;
-  const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
-  const ExtinctionTable of_values = MakeExtinctionTable(table, 1 / Least(frame.spacing));
+  ClassificationTable table = renderer.Table(look.transfer, description, look.range);
+  table.opacity_distance /= look.weight;  // weight w: the opacity is 1 - (1 - a)^w
+  const ExtinctionTable of_values = MakeExtinctionTable(table, 1 / voxel_length);
   std::optional<RegionExtinction> of_regions;
-  if (!setup.transfer.regions.empty()) of_regions.emplace(setup, table, 1 / Least(frame.spacing));
+  if (!look.transfer.regions.empty()) of_regions.emplace(look.transfer, description.mapping, table, 1 / voxel_length);
   std::vector<SurfaceExtinction> surfaces;
   const double voxel = std::cbrt(light.spacing.x * light.spacing.y * light.spacing.z);
-  for (const Isosurface& surface : setup.transfer.isosurfaces) {
-    const float value = StoredIsovalue(surface.value, setup.description.mapping);
+  for (const Isosurface& surface : look.transfer.isosurfaces) {
+    const float value = StoredIsovalue(surface.value, description.mapping);
     if (std::isfinite(value)) surfaces.push_back({value, -std::log1p(-std::min(surface.opacity, kMostOpacity)) / voxel});
   }
   // The square of a slope: squares of differences of two voxels' values, times these.
@@ -215,7 +219,6 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
     return float(std::sqrt(square(row.at[x - 1], row.at[x + 1]) * per_square.x + square(row.beside[0][x], row.beside[1][x]) * per_square.y +
                            square(row.beside[2][x], row.beside[3][x]) * per_square.z));
   };
-  const KeptShare kept(setup, MapBetween(light, frame));
 
   Extinction extinction{.size = size, .spacing = light.spacing, .each = UnwrittenVector<float>(CountIn(size))};
   VisitScalarType(values.type, [&]<class T>(const T*) {
@@ -251,15 +254,99 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
             if (near.low < surface.value && surface.value <= near.high) sum += float(surface.each);
           }
         }
-        for (std::int32_t x = 0; x < size.x && !setup.clip.empty(); ++x) {
-          float& sum = found[std::size_t(x)];
-          if (sum > 0) sum *= float(kept.Of({x, y, z}));
-        }
         std::copy_n(found.data(), size.x, extinction.each.data() + NumberIn(size, {0, y, z}));
       }
     });
   });
   return extinction;
+}
+
+// Interpolated at p; 0 outside the grid.
+double At(const Extinction& extinction, const Vec3& p) {
+  const float* at = extinction.each.data();
+  Vector3<std::ptrdiff_t> next;  // from a voxel to the one behind it, by axis
+  Vec3 share;                    // of that one
+  std::ptrdiff_t stride = 1;
+  for (const Axis axis : kAxes) {
+    const std::int32_t last = extinction.size[axis] - 1;
+    if (!(p[axis] >= -0.5 && p[axis] < last + 0.5)) return 0;
+    const double place = std::clamp(p[axis], 0.0, double(last));
+    const auto below = std::int32_t(place);
+    share[axis] = place - below;
+    next[axis] = below < last ? stride : 0;
+    at += below * stride;
+    stride *= last + 1;
+  }
+  const auto mixed = [](double a, double b, double of_b) { return a + of_b * (b - a); };
+  const auto along_x = [&](const float* row) { return mixed(double(row[0]), double(row[next.x]), share.x); };
+  const auto in_plane = [&](const float* slice) { return mixed(along_x(slice), along_x(slice + next.y), share.y); };
+  return mixed(in_plane(at), in_plane(at + next.z), share.z);
+}
+
+// Blends a field with those before it. `cover`: the field covers the share of them that it is opaque for such a length.
+void AddBlended(const Extinction& own, const VolumeGeometry& own_grid, double cover, const VolumeGeometry& grid, Extinction& all) {
+  const AffineMap map = AffineMapBetween(grid, own_grid);
+  const bool same = map.is_identity() && own.size == all.size;
+  constexpr double kMostPlaces = 8;  // along an axis of a voxel
+  const Vec3 half = {0.5, 0.5, 0.5};
+  Index3 places;  // as many as the voxel has voxels of the field
+  for (const Axis axis : kAxes) {
+    const double length = Length(map.steps.at(std::size_t(Number(axis))));
+    places[axis] = std::int32_t(std::clamp(std::ceil(length - 1e-6), 1.0, kMostPlaces));
+  }
+  const auto mean_in = [&](const Index3& voxel) {
+    double sum = 0;
+    for (const Index3& place : IndicesIn(places)) sum += At(own, map.To(ToVec3(voxel) - half + (ToVec3(place) + half) / ToVec3(places)));
+    return float(sum / double(CountIn(places)));
+  };
+  const Box touched = CoveringVoxels(own_grid.bounds(), AffineMapBetween(own_grid, grid), all.size, 0);
+  ParallelFor(touched.begin.z, touched.end.z, [&](std::int32_t z) {
+    for (const Index3& voxel : IndicesIn(Box{{touched.begin.x, touched.begin.y, z}, {touched.end.x, touched.end.y, z + 1}})) {
+      const std::size_t number = NumberIn(all.size, voxel);
+      const float added = same ? own.each[number] : mean_in(voxel);
+      float& sum = all.each[number];
+      if (cover > 0 && sum > 0 && added > 0) sum = float(double(sum) * std::exp(-cover * double(added)));
+      sum += added;
+    }
+  });
+}
+
+}  // namespace
+
+std::vector<FieldLook> LooksInLight(const FrameSetup& setup) {
+  std::vector<FieldLook> looks = {{setup.transfer, setup.range, setup.weight}};
+  for (const FieldSetup& field : setup.fields) {
+    if (!field.labels) looks.push_back(field.look);
+  }
+  return looks;
+}
+
+Extinction ExtinctionOf(const LightValues& values, const FrameSetup& setup) {
+  const std::vector<const CoarserLevel*> lights = LightVolumesOf(setup);
+  const std::vector<FieldLook> looks = LooksInLight(setup);
+  const VolumeGeometry& frame = setup.description.geometry;
+  const VolumeGeometry& light = setup.light->description.geometry;
+  const double voxel_length = Least(frame.spacing);
+  Extinction all;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const VolumeDescription& description = lights[i]->description;
+    Extinction own = ExtinctionOfField(values(i), description, looks[i], *setup.renderer, voxel_length);
+    if (i == 0) {
+      all = std::move(own);
+      continue;
+    }
+    const double cover = looks[i].blend == Blend::kOver ? looks[i].transfer.opacity_distance * voxel_length : 0;
+    AddBlended(own, description.geometry, cover, light, all);
+  }
+  if (setup.clip.empty()) return all;
+  const KeptShare kept(setup, MapBetween(light, frame));
+  ParallelFor(0, all.size.z, [&](std::int32_t z) {
+    for (const Index3& voxel : IndicesIn(Box{{0, 0, z}, {all.size.x, all.size.y, z + 1}})) {
+      float& sum = all.each[NumberIn(all.size, voxel)];
+      if (sum > 0) sum *= float(kept.Of(voxel));
+    }
+  });
+  return all;
 }
 
 }  // namespace slabstream

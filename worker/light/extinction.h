@@ -1,4 +1,5 @@
-// Extinction: how much light the matter of a volume takes, on the grid of its light volume (common/volume/light_volume.h).
+// Extinction: how much light the matter of all fields that show takes, on the grid of the volume's light volume
+// (common/volume/light_volume.h).
 //
 // Opacity is no linear function of the value, so the mean value of a block of voxels does not tell its opacity. What is classified is the
 // interpolated light volume: between the centre of a voxel and its border, halfway to the least and to the greatest of its six neighbours,
@@ -9,7 +10,14 @@
 // Isosurfaces take their opacity once where the value passes theirs. Matter that is clipped away takes nothing. Regions of a
 // two-dimensional transfer function count with the slope in the light volume, which is coarser. Layers do not count, nor does gradient
 // opacity without regions.
+//
+// Each field is classified on its own light volume. On another grid than the volume's its extinction, interpolated linearly, has its mean
+// in each voxel. Then fields are blended as in a sample of the picture (docs/rendering.md).
 #pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
 
 #include "common/frame/frame_setup.h"
 #include "common/memory/pooled_vector.h"
@@ -22,8 +30,13 @@ struct Extinction {
   UnwrittenVector<float> each;  // by voxel, x fastest: -ln of the transmittance of a unit of length, finite, >= 0
 };
 
-// `values`: the whole light volume of the setup (setup.light). Parallel; the result is the same for any number of threads and any
-// instruction set.
-Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup);
+// The whole light volume with this number of LightVolumesOf the setup. Each is asked for at most once, one after the other.
+using LightValues = std::function<VoxelBlock(std::size_t)>;
+
+// How the volume looks, and each other field: by LightVolumesOf.
+std::vector<FieldLook> LooksInLight(const FrameSetup& setup);
+
+// Parallel; the result is the same for any number of threads and any instruction set.
+Extinction ExtinctionOf(const LightValues& values, const FrameSetup& setup);
 
 }  // namespace slabstream

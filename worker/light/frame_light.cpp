@@ -11,7 +11,6 @@
 #include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
-#include "worker/light/extinction.h"
 #include "worker/light/occlusion.h"
 #include "worker/light/transmittance.h"
 
@@ -22,17 +21,20 @@ using Bytes255 = UnwrittenVector<std::uint8_t>;
 
 // What an Extinction is made from.
 struct MatterKey {
-  DatasetId dataset = 0, light = 0;
+  DatasetId dataset = 0;
   const RendererKind* renderer = nullptr;
-  TransferFunction transfer;
-  ValueRange range;
   ClipRegion clip;
+  std::vector<FieldLook> looks;
+  std::vector<DatasetId> lights = {};
   friend bool operator==(const MatterKey&, const MatterKey&) = default;
 };
 
 MatterKey KeyOf(const FrameSetup& setup) {
-  MatterKey key = {setup.dataset, setup.light->dataset, setup.renderer, setup.transfer, setup.range, setup.clip};
-  for (ColorPoint& point : key.transfer.colors) point.color = {};  // colours take no light
+  MatterKey key = {setup.dataset, setup.renderer, setup.clip, LooksInLight(setup)};
+  for (FieldLook& look : key.looks) {
+    for (ColorPoint& point : look.transfer.colors) point.color = {};  // colours take no light
+  }
+  for (const CoarserLevel* const light : LightVolumesOf(setup)) key.lights.push_back(light->dataset);
   return key;
 }
 
@@ -44,12 +46,12 @@ struct Lit {
   friend bool operator==(const Lit&, const Lit&) = default;
 };
 
-// Of one volume under one transfer function. One thread at a time makes something of it.
+// Of the fields under their transfer functions. One thread at a time makes something of it.
 class Matter {
  public:
-  std::shared_ptr<const FrameLight> Of(const std::function<VoxelBlock()>& values, const FrameSetup& setup) {
+  std::shared_ptr<const FrameLight> Of(const LightValues& values, const FrameSetup& setup) {
     const std::lock_guard lock(mutex_);
-    if (!extinction_) extinction_ = ExtinctionOf(values(), setup);
+    if (!extinction_) extinction_ = ExtinctionOf(values, setup);
     const Shading& shading = setup.shading;
     const Lit lit = {shading.shadows > 0 ? Phong(shading, setup.camera.view_direction).lights() : std::vector<Vec3>{Vec3{}},
                      shading.shadows, shading.ambient_occlusion, shading.occlusion_radius,
@@ -202,7 +204,7 @@ FrameLight::Shares FrameLight::At(const Vec3& p) const {
   return result;
 }
 
-std::shared_ptr<const FrameLight> MakeFrameLight(const std::function<VoxelBlock()>& values, const FrameSetup& setup) {
+std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup) {
   static LightCache cache;
   return cache.Of(setup)->Of(values, setup);
 }

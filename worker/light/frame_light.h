@@ -1,15 +1,14 @@
 // FrameLight: what shadows and ambient occlusion leave of the light at each point of a frame's volume. All renderers read it
-// (light_at-inl.h). It depends on the dataset, the look, clipping and lights alone, so it is the same for every box and worker.
+// (light_at-inl.h). It depends on the fields, their looks, clipping and lights alone, so it is the same for every box and worker.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <memory>
 
-#include "common/frame/frame_setup.h"
 #include "common/memory/pooled_vector.h"
 #include "common/volume/grid_map.h"
+#include "worker/light/extinction.h"
 
 namespace slabstream {
 
@@ -47,9 +46,9 @@ struct FrameLight {
   Shares At(const Vec3& p) const;
 };
 
-// `values` returns the whole light volume of the setup; it is called if that is not known. What setups have in common is computed once and
+// `values` is called for what is not known. What setups have in common is computed once and
 // kept for some time, in the whole process: workers of a process share it. Any thread, within its task arena; setup.light is there. Never
 // null.
-std::shared_ptr<const FrameLight> MakeFrameLight(const std::function<VoxelBlock()>& values, const FrameSetup& setup);
+std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup);
 
 }  // namespace slabstream

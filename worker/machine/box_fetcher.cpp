@@ -13,15 +13,15 @@ namespace {
 
 // Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings, or at parts of one. So each piece is
 // one chunk. `filled`: some parts are filled; then the blocks are those that are filled together.
-std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types, bool filled) {
+std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, ScalarType type, bool filled) {
   Index3 block = stored.block.end, end;
   for (const Box& box : boxes) end = Max(end, box.end);
-  if (filled) block = BlocksTogether(block, end, types.bytes_per_voxel(), kChunkBytes);
+  if (filled) block = BlocksTogether(block, end, BytesPerSample(type), kChunkBytes);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
-    while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
+    while (2 * CountIn(block) * BytesPerSample(type) <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
   }
   for (const Axis axis : {Axis::kZ, Axis::kY, Axis::kX}) {
-    while (CountIn(block) * types.bytes_per_voxel() > kChunkBytes && block[axis] > 1) block[axis] = (block[axis] + 1) / 2;
+    while (CountIn(block) * BytesPerSample(type) > kChunkBytes && block[axis] > 1) block[axis] = (block[axis] + 1) / 2;
   }
   std::vector<Box> pieces;
   for (const Box& box : boxes) {
@@ -34,7 +34,7 @@ std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored,
 }  // namespace
 
 std::uint32_t BoxFetcher::HeldBox::BytesOf(const ChunkPlace& chunk) const {
-  if (!IsCellChunk(chunk.chunk)) return BytesOfChunk(chunk.box, key.types, chunk.chunk);
+  if (!IsCellChunk(chunk.chunk)) return PartOfChunk(chunk.box, key.types.samples, chunk.chunk).bytes;
   return cell_bytes == 0 ? kChunkBytes : BytesOfCellChunk(cell_bytes, chunk.chunk);
 }
 
@@ -100,7 +100,7 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
   std::vector<HeldBox*> sources;
   std::vector<Box> at_hand;
   // If there is no room, everything that can be dropped must be. Cells are fetched for the whole padded box.
-  const bool copies = cached_bytes() <= most_cached() && !padded.key.types.layers.cells;
+  const bool copies = cached_bytes() <= most_cached() && !padded.key.types.cells;
   for (auto& [generation, other] : boxes_) {
     if (!copies || &other == &padded || other.retired || !other.is_complete()) continue;
     if (other.key.dataset != padded.key.dataset || other.key.types != padded.key.types) continue;
@@ -119,11 +119,11 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
     padded.sources.push_back(source.key.generation);
   }
   std::vector<Box> missing = Without(std::move(assembly.missing), padded.filled);
-  if (padded.stored_at != nullptr) missing = InBlocks(missing, *padded.stored_at, padded.key.types, !padded.filled.empty());
+  if (padded.stored_at != nullptr) missing = InBlocks(missing, *padded.stored_at, padded.key.types.samples, !padded.filled.empty());
   for (const Box& box : missing) {
-    for (std::uint32_t chunk = 0; chunk < ChunkCount(box, padded.key.types); ++chunk) padded.missing.push_back({box, chunk});
+    for (std::uint32_t chunk = 0; chunk < ChunkCount(box, padded.key.types.samples); ++chunk) padded.missing.push_back({box, chunk});
   }
-  if (padded.key.types.layers.cells) padded.missing.push_back({padded.key.box, kFirstCellChunk});
+  if (padded.key.types.cells) padded.missing.push_back({padded.key.box, kFirstCellChunk});
   std::ranges::reverse(padded.missing);
   padded.chunk_count = padded.missing.size();
   padded.begun = padded.is_complete();

@@ -126,7 +126,7 @@ class BoxFetcher {
 
     bool is_complete() const { return stored == chunk_count; }
     std::uint64_t RawBytes() const {  // bytes of samples and cells
-      return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel() + cell_bytes;
+      return BytesOfBox(key.box, key.types.samples) + cell_bytes;
     }
     // Whether it can stand for a padded box in which no more than `filled` need not be read.
     bool Covers(const Box& box, std::span<const FilledBox> may_be_filled) const {

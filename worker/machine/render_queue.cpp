@@ -27,9 +27,11 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     return boxes_.key(job.boxes.emplace_back(boxes_.Acquire({client, key.frame}, dataset, box, types, stored, filled, actions)));
   };
   const auto acquire_other = [&](const CoarserLevel& volume, const Box& box) {
-    return acquire(volume.dataset, box, {volume.description.type, {}}, volume.stored, {});
+    return acquire(volume.dataset, box, volume.description.type, volume.stored, {});
   };
-  if (setup->light) job.render.light = acquire_other(*setup->light, setup->light->description.geometry.bounds());
+  for (const CoarserLevel* const light : LightVolumesOf(*setup)) {
+    job.render.lights.push_back(acquire_other(*light, light->description.geometry.bounds()));
+  }
   for (const FieldSetup& field : setup->fields) {
     const Box box = PaddedBox(placement.at(), *setup, field);
     std::optional<BoxKey>& of_field = job.render.fields.emplace_back();

@@ -1,6 +1,6 @@
 // RenderQueue: the ranks that this worker has yet to render, and those that it is rendering. The ranks of a client are rendered one after
 // the other, in order of frame, group and rank. The next one is the first whose boxes are complete: its padded box, and those of the light
-// volume and of the other fields that the frame shows. The clients take turns of at least
+// volumes and of the other fields that the frame shows. The clients take turns of at least
 // kTurn. The next turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a
 // client's turn is over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
 //

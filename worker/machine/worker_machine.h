@@ -212,7 +212,7 @@ struct StartRender {
   std::shared_ptr<const FrameSetup> setup;
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
-  std::optional<BoxKey> light = {};                // the light volume (FrameSetup::light), whole
+  std::vector<BoxKey> lights = {};                 // LightVolumesOf the setup, whole
   std::vector<std::optional<BoxKey>> fields = {};  // by FrameSetup::fields; none: it does not reach there
 };
 // These name a started render by its image. RenderDone has not come for it. PauseRender: it stops soon, between two of

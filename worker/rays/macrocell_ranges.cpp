@@ -16,7 +16,7 @@ MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels) {
   cells.counts = CubesOver(size + Uniform(1), kCellSide);
   cells.ranges.resize(CountIn(cells.counts));
   const auto end_of = [](std::int32_t cell, std::int32_t voxels_along) { return std::min((cell + 1) * kCellSide + 1, voxels_along + 2); };
-  VisitScalarType(voxels.type, [&](auto* type) {
+  VisitStoredType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const T* const first = reinterpret_cast<const T*>(voxels.samples.get()) + voxels.slice + voxels.row + 1;
     ParallelFor(0, cells.counts.z, [&](std::int32_t cell_z) {

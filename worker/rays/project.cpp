@@ -277,7 +277,7 @@ void ProjectTile(const ProjectWork& work, const PixelBounds& tile, float* pixels
   switch (work.box->type) {
     case ScalarType::kUint8: return HWY_DYNAMIC_DISPATCH(Project8)(work, tile, pixels, floats_a_row);
     case ScalarType::kUint16: return HWY_DYNAMIC_DISPATCH(Project16)(work, tile, pixels, floats_a_row);
-    case ScalarType::kFloat32: break;
+    default: break;
   }
   HWY_DYNAMIC_DISPATCH(ProjectFloat)(work, tile, pixels, floats_a_row);
 }

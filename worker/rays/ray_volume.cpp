@@ -30,7 +30,7 @@ const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
   if (!pieces_.empty()) return pieces_;
   const VoxelBricks bricks = data.bricks();
   const PaddedVoxels* const padded = data.padded();
-  const std::vector<Box> layers = CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes);
+  const std::vector<Box> layers = CutIntoLayers(bricks.box(), bricks.type(), kMostRayBytes);
   for (const Box& layer : layers) {
     RayPiece piece;
     piece.voxels = padded != nullptr && layers.size() == 1 ? *padded : Pad(bricks, layer);

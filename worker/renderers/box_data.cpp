@@ -12,13 +12,6 @@ const VoxelBlock& BoxData::voxels() const {
   return *samples_.block;
 }
 
-ScalarType BoxData::widest_type() const {
-  ScalarType widest = bricks().type();
-  const auto& labels = layers().labels;
-  if (labels && BytesPerSample(labels->type()) > BytesPerSample(widest)) widest = labels->type();
-  return widest;
-}
-
 const BrickRanges& BoxData::ranges() {
   if (!ranges_) ranges_.emplace(bricks());
   return *ranges_;

@@ -1,4 +1,4 @@
-// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it. If several renders
+// BoxData: the voxels of a padded box, its cells, and what renderers derived from them. One thread at a time uses it. If several renders
 // use the same box at the same time, each has a BoxData of its own, and these share the voxels.
 #pragma once
 
@@ -31,9 +31,10 @@ class BoxCache {
 class BoxData {
  public:
   explicit BoxData(std::shared_ptr<BoxVoxels> voxels) : voxels_(std::move(voxels)), samples_(voxels_->samples()) {}
-  explicit BoxData(VoxelBlock voxels, BoxLayers layers = {}) : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(layers))) {}
-  explicit BoxData(BrickedVoxels voxels, BoxLayers layers = {})
-      : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(layers))) {}
+  explicit BoxData(VoxelBlock voxels, std::shared_ptr<const Mesh> cells = nullptr)
+      : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(cells))) {}
+  explicit BoxData(BrickedVoxels voxels, std::shared_ptr<const Mesh> cells = nullptr)
+      : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(cells))) {}
   BoxData(const BoxData&) = delete;
   BoxData& operator=(const BoxData&) = delete;
 
@@ -54,9 +55,7 @@ class BoxData {
   void SetFields(std::vector<BoxData*> fields) { fields_ = std::move(fields); }
   std::span<BoxData* const> fields() const { return fields_; }
 
-  const BoxLayers& layers() const { return voxels_->layers(); }
-  // The types of volume and layers: the one whose samples take most bytes.
-  ScalarType widest_type() const;
+  const std::shared_ptr<const Mesh>& cells() const { return voxels_->cells(); }
 
   // The range of samples of each brick.
   const BrickRanges& ranges();

@@ -18,8 +18,7 @@ std::size_t BoxVoxels::bytes() const {
   std::size_t total = stored.block != nullptr    ? stored.block->bytes.capacity()
                       : stored.bricks != nullptr ? stored.bricks->bytes()
                                                  : stored.padded->bytes();
-  if (layers_.labels) total += layers_.labels->bytes();
-  return total + (layers_.cells != nullptr ? layers_.cells->bytes() : 0);
+  return total + (cells_ != nullptr ? cells_->bytes() : 0);
 }
 
 }  // namespace slabstream

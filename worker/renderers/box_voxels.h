@@ -1,11 +1,10 @@
-// BoxVoxels: the voxels of a padded box and its layers. All renders of the box share them. Their values never change, but the way in which
+// BoxVoxels: the voxels of a padded box, and its cells. All renders of the box share them. Their values never change, but the way in which
 // they are stored may. Any thread may call it.
 #pragma once
 
 #include <cstddef>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <utility>
 
 #include "common/mesh/mesh.h"
@@ -13,12 +12,6 @@
 #include "worker/renderers/padded_voxels.h"
 
 namespace slabstream {
-
-// nullopt, null: the dataset has no such layer.
-struct BoxLayers {
-  std::optional<BrickedVoxels> labels;
-  std::shared_ptr<const Mesh> cells;  // those that touch the box, and perhaps others, in the order of the whole grid
-};
 
 class BoxVoxels {
  public:
@@ -33,12 +26,12 @@ class BoxVoxels {
     }
   };
 
-  BoxVoxels(VoxelBlock voxels, BoxLayers layers)
-      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr, nullptr}, layers_(std::move(layers)) {}
-  BoxVoxels(BrickedVoxels voxels, BoxLayers layers)
-      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels)), nullptr}, layers_(std::move(layers)) {}
-  BoxVoxels(PaddedVoxels voxels, BoxLayers layers)
-      : samples_{nullptr, nullptr, std::make_shared<const PaddedVoxels>(std::move(voxels))}, layers_(std::move(layers)) {}
+  BoxVoxels(VoxelBlock voxels, std::shared_ptr<const Mesh> cells)
+      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr, nullptr}, cells_(std::move(cells)) {}
+  BoxVoxels(BrickedVoxels voxels, std::shared_ptr<const Mesh> cells)
+      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels)), nullptr}, cells_(std::move(cells)) {}
+  BoxVoxels(PaddedVoxels voxels, std::shared_ptr<const Mesh> cells)
+      : samples_{nullptr, nullptr, std::make_shared<const PaddedVoxels>(std::move(voxels))}, cells_(std::move(cells)) {}
 
   Samples samples() const {
     const std::lock_guard lock(mutex_);
@@ -46,13 +39,14 @@ class BoxVoxels {
   }
   // As one block. The first call turns samples into one that are stored in another way.
   Samples Block();
-  const BoxLayers& layers() const { return layers_; }
+  // Those of an unstructured grid that touch the box, and perhaps others, in the order of the whole grid. Null: it is none.
+  const std::shared_ptr<const Mesh>& cells() const { return cells_; }
   std::size_t bytes() const;  // memory
 
  private:
   mutable std::mutex mutex_;  // guards samples_
   Samples samples_;
-  const BoxLayers layers_;
+  const std::shared_ptr<const Mesh> cells_;
 };
 
 }  // namespace slabstream

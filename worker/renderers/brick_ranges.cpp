@@ -35,7 +35,7 @@ StoredRange<T> RangeOf(const BrickView<T>& brick, const Box& box) {
 }  // namespace
 
 BrickRanges::BrickRanges(const VoxelBricks& voxels) : grid_(voxels.grid()), ranges_(grid_.size()) {
-  VisitScalarType(voxels.type(), [&]<class T>(const T*) {
+  VisitStoredType(voxels.type(), [&]<class T>(const T*) {
     ForEachRowOfBricks(grid_, [&](Index3 brick) {
       for (; brick.x < grid_.first.x + grid_.counts.x; ++brick.x) {
         const StoredRange<T> range = RangeOf(voxels.View<T>(brick), grid_.BoxOf(brick));

@@ -42,7 +42,7 @@ PaddedVoxels MakePaddedVoxels(const Box& box, ScalarType type) {
 }
 
 void FillBox(const PaddedVoxels& voxels, const Box& box, float sample) {
-  VisitScalarType(voxels.type, [&](auto* type) {
+  VisitStoredType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const T value = T(std::clamp(sample, float(std::numeric_limits<T>::lowest()), float(std::numeric_limits<T>::max())));
     if (value == 0) return;
@@ -55,7 +55,7 @@ void FillBox(const PaddedVoxels& voxels, const Box& box, float sample) {
 }
 
 void FillPadding(const PaddedVoxels& voxels) {
-  VisitScalarType(voxels.type, [&](auto* type) {
+  VisitStoredType(voxels.type, [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     const Box& box = voxels.box;
     const std::int32_t width = box.size().x;
@@ -84,7 +84,7 @@ PaddedVoxels Pad(const VoxelBricks& voxels, const Box& box) {
   CHECK(!box.empty() && voxels.box().Contains(box));
   const PaddedVoxels padded = MakePaddedVoxels(box, voxels.type());
   const Box inside = Grown(box, kPad, voxels.box());
-  VisitScalarType(voxels.type(), [&](auto* type) {
+  VisitStoredType(voxels.type(), [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
     T* const samples = reinterpret_cast<T*>(padded.samples.get());
     const auto row_of = [&](std::int32_t y, std::int32_t z) {

@@ -119,13 +119,14 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
   return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
 }
 
-std::shared_ptr<const FrameLight> LightFrom(StoredBox& light, const StartRender& action) {
+std::shared_ptr<const FrameLight> LightFrom(const std::vector<std::shared_ptr<StoredBox>>& lights, const StartRender& action) {
+  if (lights.empty()) return nullptr;
   return MakeFrameLight(
-      [&] {
-        light.Assemble();
-        const StoredBox::Lease lease = light.Lend(action.client);
+      [&](std::size_t field) {
+        lights[field]->Assemble();
+        const StoredBox::Lease lease = lights[field]->Lend(action.client);
         const VoxelBricks bricks = lease.data().bricks();
-        VoxelBlock values = MakeVoxelBlock(action.setup->light->description.geometry.bounds(), bricks.type());
+        VoxelBlock values = MakeVoxelBlock(bricks.box(), bricks.type());
         bricks.Read(values.box, 0, values.bytes);
         return values;
       },
@@ -191,7 +192,8 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  RenderedBoxes boxes = {BoxOf(action.padded), action.light ? BoxOf(*action.light) : nullptr, {}};
+  RenderedBoxes boxes = {BoxOf(action.padded), {}, {}};
+  for (const BoxKey& light : action.lights) boxes.lights.push_back(BoxOf(light));
   for (const std::optional<BoxKey>& field : action.fields) boxes.fields.push_back(field ? BoxOf(*field) : nullptr);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
@@ -214,7 +216,7 @@ RenderDone Executor::Render(const StartRender& action, const RenderedBoxes& boxe
     for (const auto& field : boxes.fields) copied = (field != nullptr && field->Assemble()) || copied;
     if (copied) AddStage(report, Stage::kFetch, begin, NowNs());
     const StoredBox::Lease lease = boxes.padded->Lend(action.client);
-    lease.data().SetLight(boxes.light == nullptr ? nullptr : LightFrom(*boxes.light, action));
+    lease.data().SetLight(LightFrom(boxes.lights, action));
     // Fields that share a box have a lease each: renderers derive other data for each.
     std::vector<std::unique_ptr<const StoredBox::Lease>> field_leases;
     std::vector<BoxData*> fields;

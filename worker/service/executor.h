@@ -104,7 +104,7 @@ class Executor {
   // The boxes that a render reads.
   struct RenderedBoxes {
     std::shared_ptr<StoredBox> padded;
-    std::shared_ptr<StoredBox> light;                // null: the frame has none
+    std::vector<std::shared_ptr<StoredBox>> lights;  // as StartRender::lights
     std::vector<std::shared_ptr<StoredBox>> fields;  // as StartRender::fields
   };
   RenderDone Render(const StartRender& action, const RenderedBoxes& boxes, const RenderControl& control, ClientLane& lane,

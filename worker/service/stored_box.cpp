@@ -20,27 +20,27 @@ Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
     return Status::DataLoss("chunk of another padded box");
   if (voxels_ != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
   if (IsCellChunk(chunk.chunk)) {
-    return key_.types.layers.cells ? cells_.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
+    return key_.types.cells ? cells_.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
   }
-  if (chunk.chunk >= ChunkCount(chunk.box, key_.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key_.types, chunk.chunk)) {
+  if (chunk.chunk >= ChunkCount(chunk.box, key_.types.samples) ||
+      chunk.raw_bytes != PartOfChunk(chunk.box, key_.types.samples, chunk.chunk).bytes) {
     return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
                             " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
   }
-  const ChunkPart part = PartOfChunk(chunk.box, key_.types, chunk.chunk);
+  const ChunkPart part = PartOfChunk(chunk.box, key_.types.samples, chunk.chunk);
   unpacked_.resize(chunk.raw_bytes);
   if (Status status = UnpackChunk(chunk, payload.span(), unpacked_); !status.ok()) return status;
-  Write(part.layer, chunk.box, part.begin, unpacked_);
+  Write(chunk.box, part.begin, unpacked_);
   return Status::Ok();
 }
 
-BrickedVoxels& StoredBox::Arriving(Layer layer) {
-  std::optional<BrickedVoxels>& stored = arriving_.at(std::size_t(layer));
-  if (!stored) stored.emplace(key_.box, *key_.types.Of(layer));
-  return *stored;
+BrickedVoxels& StoredBox::Arriving() {
+  if (!arriving_) arriving_.emplace(key_.box, key_.types.samples);
+  return *arriving_;
 }
 
 PaddedVoxels& StoredBox::ArrivingStored() {
-  if (!arriving_stored_) arriving_stored_ = MakePaddedVoxels(key_.box, key_.types.volume);
+  if (!arriving_stored_) arriving_stored_ = MakePaddedVoxels(key_.box, key_.types.samples);
   return *arriving_stored_;
 }
 
@@ -52,8 +52,8 @@ std::optional<BoxRoom> StoredBox::RoomFor(const Box& box) {
   return BoxRoom{voxels.At(box.begin), voxels.row, voxels.slice, true};
 }
 
-void StoredBox::Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
-  if (!stored_ || layer != Layer::kVolume) return Arriving(layer).Write(box, begin, samples);
+void StoredBox::Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
+  if (!stored_) return Arriving().Write(box, begin, samples);
   const PaddedVoxels& voxels = ArrivingStored();
   const std::size_t sample_bytes = BytesPerSample(voxels.type), row_bytes = std::size_t(box.size().x) * sample_bytes;
   while (!samples.empty()) {
@@ -66,35 +66,31 @@ void StoredBox::Write(Layer layer, const Box& box, std::uint64_t begin, std::spa
   }
 }
 
-void StoredBox::CopyFrom(const BoxVoxels& from, Layer layer, const Box& box) {
+void StoredBox::CopyFrom(const BoxVoxels& from, const Box& box) {
   const BoxVoxels::Samples samples = from.samples();  // holds them
-  const VoxelBricks source = layer == Layer::kVolume ? samples.view() : VoxelBricks(*from.layers().labels);
+  const VoxelBricks source = samples.view();
   const Index3 size = box.size();
   std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
   for (std::int32_t z = 0; z < size.z; ++z) {
     const std::uint64_t begin = std::uint64_t(z) * slice.size();
     source.Read(box, begin, slice);
-    Write(layer, box, begin, slice);
+    Write(box, begin, slice);
   }
 }
 
 bool StoredBox::Assemble() {
   const std::lock_guard lock(mutex_);
   if (voxels_ != nullptr) return false;
-  for (const Layer layer : kLayers) {
-    if (!key_.types.Of(layer)) continue;
-    if (!stored_ || layer != Layer::kVolume) Arriving(layer);
-    for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), layer, copy.box);
-  }
-  BoxLayers layers{std::move(arriving_[1]), cells_.cells()};
+  for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), copy.box);
   if (stored_) {
     for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
     FillPadding(ArrivingStored());
-    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), std::move(layers));
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), cells_.cells());
   } else {
-    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_[0]), std::move(layers));
+    Arriving();
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_), cells_.cells());
   }
-  arriving_ = {};
+  arriving_.reset();
   arriving_stored_.reset();
   filled_ = {};
   cells_ = {};

@@ -2,7 +2,6 @@
 // what renders need. Any thread may call it.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <list>
 #include <memory>
@@ -75,11 +74,11 @@ class StoredBox {
     std::size_t bytes = 0;
   };
 
-  BrickedVoxels& Arriving(Layer layer);  // the layer's voxels; the first call makes room for them
-  PaddedVoxels& ArrivingStored();        // the stored voxels; the first call makes room for them
-  // Part of the samples of `box` of the layer, as BrickedVoxels::Write.
-  void Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
-  void CopyFrom(const BoxVoxels& from, Layer layer, const Box& box);
+  BrickedVoxels& Arriving();       // the first call makes room for the voxels
+  PaddedVoxels& ArrivingStored();  // the stored voxels; the first call makes room for them
+  // Part of the samples of `box`, as BrickedVoxels::Write.
+  void Write(const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
+  void CopyFrom(const BoxVoxels& from, const Box& box);
   std::shared_ptr<BoxVoxels> Assembled();
   BoxData& DataFor(ClientId client);
   void Return(BoxData& data);
@@ -89,8 +88,8 @@ class StoredBox {
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Copy> copies_;
   std::vector<FilledBox> filled_;
-  std::array<std::optional<BrickedVoxels>, kLayers.size()> arriving_;  // by layer
-  std::optional<PaddedVoxels> arriving_stored_;                        // instead of the volume's, if stored_
+  std::optional<BrickedVoxels> arriving_;        // unless stored_
+  std::optional<PaddedVoxels> arriving_stored_;  // if stored_
   ArrivingCells cells_;
   std::vector<std::byte> unpacked_;    // a chunk's samples
   std::shared_ptr<BoxVoxels> voxels_;  // null: not all there

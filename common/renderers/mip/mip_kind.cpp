@@ -101,7 +101,7 @@ class MipKind : public ProjectionKind {
   // Colours of fields add.
   static LocalImage FinishFields(const LocalImage& frame, const FrameSetup& setup, const ColorTable& volume, ProjectionMode mode) {
     std::vector<ColorTable> tables = {volume};
-    for (const auto& [levels, of_volume, look] : setup.fields) tables.emplace_back(look.transfer, look.range, look.weight);
+    for (const FieldSetup& field : setup.fields) tables.emplace_back(field.look.transfer, field.look.range, field.look.weight);
     return ColorPixels(frame, setup, [&](const float* pixel, float* rgba) {
       float transmittance = 1;
       for (std::size_t i = 0; i < std::min(tables.size(), kMostFields); ++i) {

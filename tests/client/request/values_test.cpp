@@ -90,7 +90,7 @@ TEST(ParseLabelRanges, TakesNumbersAndNames) {
             (std::vector<LabelRange>{
                 {3, 3}, {5, 9}, {.name = "Precentral_L"}, {.name = "Temporal_*"}, {.name = "4th ventricle"}, {.name = "-x"}}));
   EXPECT_EQ(TextOf(std::vector<LabelRange>{{3, 3}, {5, 9}, {.name = "Gyrus, left"}}), "3,5-9,Gyrus? left");
-  for (const char* text : {"", "1,", "0", "9-5", "5-", "-5", "1-2-3", "16777217"}) {
+  for (const char* text : {"", "1,", "0", "9-5", "5-", "-5", "1-2-3", "18446744073709551616"}) {
     EXPECT_EQ(ParseLabelRanges("--labels-shown", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
   EXPECT_EQ(ParseLabelRanges("--labels-shown", std::string(257, 'x')).status().message(),

@@ -57,17 +57,10 @@ std::vector<Wish> Wishes() {
   return wishes;
 }
 
-VolumeSummary LayeredSummary(bool grid) {
-  VolumeSummary summary = grid ? FullGridSummary({20, 20, 20}) : FullSummary({20, 20, 20});
-  summary.labels = std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20}));
-  summary.label_table = std::make_shared<const LabelTable>(LabelTable{.labels = {{.value = 1}}});
-  return summary;
-}
-
 TEST(RenderersFor, AutoIsResolvedWheneverARendererCanDoIt) {
   const std::vector<Wish> wishes = Wishes();
   for (const bool grid : {false, true}) {
-    const auto summary = std::make_shared<const VolumeSummary>(LayeredSummary(grid));
+    const auto summary = std::make_shared<const VolumeSummary>(grid ? FullGridSummary({20, 20, 20}) : FullSummary({20, 20, 20}));
     for (const Wish& one : wishes) {
       for (const Wish& other : wishes) {
         SCOPED_TRACE(one.what + " and " + other.what + (grid ? " of a grid" : ""));

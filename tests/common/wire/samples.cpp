@@ -127,8 +127,15 @@ std::vector<Isosurface> ManySurfaces() {
 
 GroupAssignment WithLayers() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
-  message.setup.layers = {.labels = ScalarType::kUint16, .cells = true};
-  message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
+  message.setup.cells = true;
+  VolumeDescription ids = message.setup.description;
+  ids.type = ScalarType::kUint64;
+  const LabelLook look{.mode = LabelMode::kSurface,
+                       .tint = 0,
+                       .entries = {{1, {0, 0.5F, 1}, 0.25F}, {kMax64, {1, 1, 1}}},
+                       .shown = {{1, 7}, {kMax64, kMax64}},
+                       .hides = true};
+  message.setup.fields = {{.levels = {{77, ids}}, .of_volume = {0}, .labels = look}};
   return message;
 }
 
@@ -144,6 +151,9 @@ GroupAssignment OfFields() {
                            .of_volume = {0},
                            .look = {.transfer = Curve(), .range = {-2, 3}, .weight = 0.125, .blend = Blend::kOver}},
                           {.levels = {{kMax64, other}}, .of_volume = {0}, .look = {.transfer = Curve(), .range = {0, 1}}}};
+  message.setup.fields[0].light = message.setup.light;
+  message.setup.fields[1].light = CoarserLevel{kMax64 - 3, other};
+  message.setup.fields[1].light->description.geometry.size = {7, 1, 128};
   return message;
 }
 
@@ -378,10 +388,8 @@ std::vector<SubmitFrame> SamplesOf() {
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
   FrameRequest layers = Request();
   layers.renderer = "raycast";
-  layers.labels = LabelChoice{.mode = LabelMode::kSurface,
-                              .tint = 1,
-                              .opacities = {{1, 0}, {kMaxLabelValue, 0.25}},
-                              .shown = {{1, kMaxLabelValue}, {7, 7}, {.name = kUmlaut}}};
+  layers.labels = LabelChoice{
+      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMax64, 0.25}}, .shown = {{1, kMax64}, {7, 7}, {.name = kUmlaut}}};
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
   FrameRequest channels = Request();
   channels.channels = {"0", kUmlaut};
@@ -524,10 +532,7 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{},
-          {kMax64,
-           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64, std::uint32_t(kMaxLabels), true},
-            {"b", DatasetState::kLoading}}}};
+  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
 }
 
 template <>
@@ -548,7 +553,8 @@ std::vector<SummaryReply> SamplesOf() {
            kMax64,
            std::vector<Percentile>(kMaxPercentiles, {100, -1e300}),
            Curve(),
-           {{1, {0, 0.5F, 1}, std::string(kMaxLabelNameBytes, 'n')}, {kMaxLabelValue, {}, ""}}}};
+           {{1, {0, 0.5F, 1}, std::string(kMaxLabelNameBytes, 'n')}, {kMax64, {}, ""}},
+           true}};
 }
 
 template <>
@@ -558,7 +564,7 @@ std::vector<SampleQuery> SamplesOf() {
 
 template <>
 std::vector<SampleReply> SamplesOf() {
-  const VolumeSample full{{-1e9, 0, 1}, true,  {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
+  const VolumeSample full{{-1e9, 0, 1}, true,  {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMax64, std::string(kMaxLabelNameBytes, 'n')},
                           -2.5,         1e-300};
   return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .value = 0x1p60, .label = LabelAt{}, .rest = -1}}}};
 }
@@ -571,7 +577,7 @@ std::vector<StatisticsQuery> SamplesOf() {
 template <>
 std::vector<StatisticsReply> SamplesOf() {
   const BoxStatistics full = {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300};
-  const Label first{1, {1, 0, 0.5F}, "left"}, last{kMaxLabelValue, {}, std::string(kMaxLabelNameBytes, 'n')};
+  const Label first{1, {1, 0, 0.5F}, "left"}, last{kMax64, {}, std::string(kMaxLabelNameBytes, 'n')};
   return {{.statistics = {}, .description = Description()}, {kMax64, full, Description(), {{first, {}}, {last, full}}}};
 }
 
@@ -614,13 +620,15 @@ std::vector<ViewReply> SamplesOf() {
 
 template <>
 std::vector<AddVolume> SamplesOf() {
-  return {{.name = "a", .description = Description(), .layers = {}, .labels = {}},
+  return {{.name = "a", .description = Description(), .labels = {}},
           {kMax64,
            kLongName,
            Description(),
-           {ScalarType::kUint16, ScalarType::kFloat32},
-           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}},
-          {.name = "a", .description = {}, .layers = {}, .labels = {}, .file = SentFile{"a.nii.gz", kMaxSentFileBytes}}};
+           {{1, "", {}}, {kMax64, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}},
+           {},
+           2,
+           true},
+          {.name = "a", .description = {}, .labels = {}, .file = SentFile{"a.nii.gz", kMaxSentFileBytes}}};
 }
 
 template <>

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-LabelColor Bytes(int r, int g, int b) { return {float(r) / 255, float(g) / 255, float(b) / 255}; }
+LabelColor OfBytes(int r, int g, int b) { return {float(r) / 255, float(g) / 255, float(b) / 255}; }
 
 // Red 10, green 20, blue 30 for value 7; red 255 for value 200; black elsewhere.
 std::string ByteLut() {
@@ -62,20 +62,20 @@ ColorTable Parsed(std::string_view file) {
 TEST(ColorTable, ReadsBytesOfRedGreenAndBlue) {
   const ColorTable table = Parsed(ByteLut());
   EXPECT_EQ(table.entries.size(), 2U) << "black is no colour";
-  EXPECT_EQ(table.entries.at(7).color, Bytes(10, 20, 30));
-  EXPECT_EQ(table.entries.at(200).color, Bytes(255, 0, 0));
+  EXPECT_EQ(table.entries.at(7).color, OfBytes(10, 20, 30));
+  EXPECT_EQ(table.entries.at(200).color, OfBytes(255, 0, 0));
 }
 
 TEST(ColorTable, ReadsItkSnap) {
   const ColorTable table = Parsed(kItkSnap);
-  EXPECT_EQ(table.entries.at(1), (ColorTable::Entry{Bytes(255, 0, 0), "Left lung"}));
-  EXPECT_EQ(table.entries.at(12).color, Bytes(0, 128, 255));
+  EXPECT_EQ(table.entries.at(1), (ColorTable::Entry{OfBytes(255, 0, 0), "Left lung"}));
+  EXPECT_EQ(table.entries.at(12).color, OfBytes(0, 128, 255));
 }
 
 TEST(ColorTable, ReadsFreeSurfer) {
   const ColorTable table = Parsed(kFreeSurfer);
-  EXPECT_EQ(table.entries.at(2), (ColorTable::Entry{Bytes(245, 245, 245), "Left-Cerebral-White-Matter"}));
-  EXPECT_EQ(table.entries.at(14175), (ColorTable::Entry{Bytes(221, 60, 60), "wm_rh_S_temporal_transverse"}));
+  EXPECT_EQ(table.entries.at(2), (ColorTable::Entry{OfBytes(245, 245, 245), "Left-Cerebral-White-Matter"}));
+  EXPECT_EQ(table.entries.at(14175), (ColorTable::Entry{OfBytes(221, 60, 60), "wm_rh_S_temporal_transverse"}));
 }
 
 TEST(ColorTable, ReadsFsl) {
@@ -108,7 +108,7 @@ TEST(ColorTable, BadOnesEndInOneLineThatNamesWhatIsWrong) {
       {itk_snap + "3 256 2 3 1 1 1 \"x\"\n", "line 8: the colour '256' is not a number in [0, 255]"},
       {itk_snap + "1 25 2 3 1 1 1 \"x\"\n", "line 8: label 1 is given before"},
       {std::string(kFreeSurfer) + "5 name 1 2\n", "line 8: must be VALUE NAME RED GREEN BLUE"},
-      {std::string(kFreeSurfer) + "99999999999 name 1 2 3 0\n", "line 8: the label '99999999999'"},
+      {std::string(kFreeSurfer) + "99999999999999999999 name 1 2 3 0\n", "line 8: the label '99999999999999999999'"},
       {std::string(kFsl) + "3 nan 0 0\n", "line 3: the colour 'nan'"},
       {std::string(kFsl) + "3 1.1 0 0\n", "line 3: the colour '1.1' is not a number in [0, 1]"},
       {std::string(kFsl) + "3 1\n", "line 3: must be VALUE RED GREEN BLUE NAME"},

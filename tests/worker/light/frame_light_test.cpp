@@ -30,7 +30,7 @@ FrameSetup SetupOf(const Volume& volume, double opacity, float shadows = 1, floa
 }
 
 Extinction ExtinctionIn(const Volume& volume, const FrameSetup& setup) {
-  return ExtinctionOf(MakeLightVolume(volume.block, volume.description).block, setup);
+  return ExtinctionOf([&](std::size_t) { return MakeLightVolume(volume.block, volume.description).block; }, setup);
 }
 
 std::vector<std::uint8_t> Transmitted(const Extinction& extinction, const Vec3& to_light) {
@@ -293,6 +293,180 @@ TEST(Openness, InsideACaveIsThatOfManyRays) {
     }
   }
   EXPECT_LT(std::sqrt(squares / places), 0.02);
+}
+
+// ---- several fields
+
+// A picture whose first field is the volume.
+struct Scene {
+  Volume volume;
+  FrameSetup setup;
+  std::vector<Volume> fields = {};
+
+  void Show(Volume field, FieldLook look) {
+    look.range = Summarize(field).range;
+    setup.fields.push_back(
+        {.levels = {{1, field.description}}, .of_volume = {0}, .look = look, .light = NewLightVolume(field.description)});
+    fields.push_back(std::move(field));
+  }
+  Extinction Found() const {
+    const auto light = [&](std::size_t number) {
+      const Volume& of = number == 0 ? volume : fields[number - 1];
+      return MakeLightVolume(of.block, of.description).block;
+    };
+    return ExtinctionOf(light, setup);
+  }
+};
+
+float At(const Extinction& extinction, const Index3& voxel) { return extinction.each[NumberIn(extinction.size, voxel)]; }
+
+TEST(FieldsExtinction, AddsByWeightAndIsCoveredAsFarAsAFieldIsOpaque) {
+  constexpr double kA = 0.2, kB = 0.3, kDistance = 2;
+  const double a = -std::log1p(-kA) / kDistance, b = -std::log1p(-kB) / kDistance;
+  for (const double weight : {0.0, 0.25, 1.0}) {
+    for (const double of_field : {0.0, 0.5, 1.0}) {
+      Scene scene = {MakeBlock({{6, 5, 4}}), SetupOf(MakeBlock({{6, 5, 4}}), kA)};
+      scene.setup.weight = weight;
+      scene.setup.transfer.opacity_distance = kDistance;
+      TransferFunction transfer = Uniform(kB, {1, 0, 0});
+      transfer.opacity_distance = kDistance;
+      scene.Show(MakeBlock({{6, 5, 4}}), {.transfer = transfer, .range = {}, .weight = of_field});
+      EXPECT_NEAR(At(scene.Found(), {3, 2, 1}), weight * a + of_field * b, 1e-5) << weight << ' ' << of_field;
+      scene.setup.fields[0].look.blend = Blend::kOver;
+      const double left = std::pow(1 - kB, of_field);
+      EXPECT_NEAR(At(scene.Found(), {3, 2, 1}), weight * a * left + of_field * b, 1e-5) << weight << ' ' << of_field;
+    }
+  }
+}
+
+TEST(FieldsExtinction, OfOpaqueMatterIsThatWhateverItsWeight) {
+  Scene scene = {MakeBlock({{6, 5, 4}}), SetupOf(MakeBlock({{6, 5, 4}}), 1)};
+  const float opaque = At(scene.Found(), {3, 2, 1});
+  scene.setup.weight = 0.3;
+  EXPECT_EQ(At(scene.Found(), {3, 2, 1}), opaque);
+  scene.setup.weight = 0;
+  EXPECT_EQ(At(scene.Found(), {3, 2, 1}), 0);
+}
+
+// A slab that another field has, on a grid that is turned, and coarser or finer: as much matter at the same place.
+TEST(FieldsExtinction, LiesWhereAFieldOnAGridOfItsOwnLies) {
+  constexpr double kOpacity = 0.1;
+  const VolumeGeometry geometry = {{32, 30, 36}, {1, 1.2, 0.9}};
+  const auto empty = [](const Index3&) { return 0; };
+  for (const double spacing : {0.4, 1.0, 2.5}) {
+    for (const double angle : {0.0, 0.5}) {
+      VolumeGeometry grid;
+      grid.orientation.axes = {Vec3{0, std::cos(angle), std::sin(angle)}, Vec3{0, -std::sin(angle), std::cos(angle)}, Vec3{1, 0, 0}};
+      const auto count = std::int32_t(60 / spacing);
+      grid.size = {count, count, count};
+      grid.spacing = {spacing, spacing, spacing};
+      const Vec3 middle = {15, 17, 16};  // of both grids, in the world
+      grid.orientation.origin = middle - grid.orientation.ToWorld(spacing * 0.5 * (ToVec3(grid.size) - Vec3{1, 1, 1}));
+      // 10 long along the world's x, which is the field's z.
+      const auto slab = [&](const Index3& v) {
+        return 100 * std::clamp((5 - std::abs(spacing * (v.z - 0.5 * (count - 1)))) / spacing + 0.5, 0.0, 1.0);
+      };
+      Scene scene = {MakeVolume(geometry, ScalarType::kUint8, empty), {}};
+      scene.setup = SetupOf(scene.volume, 0);
+      TransferFunction ramp = Uniform(0, {1, 1, 1});
+      ramp.opacities = {{0, 0}, {100, kOpacity}};
+      scene.Show(MakeVolume(grid, ScalarType::kFloat32, slab), {.transfer = ramp});
+      const Extinction found = scene.Found();
+      double sum = 0, moment = 0;
+      for (std::int32_t x = 0; x < geometry.size.x; ++x) {
+        sum += double(At(found, {x, 14, 18}));
+        moment += x * double(At(found, {x, 14, 18}));
+      }
+      const double voxel = 0.9;  // the shortest side: opacities are those of such a length
+      EXPECT_NEAR(sum, -10 * std::log1p(-kOpacity) / voxel, 0.02 * sum) << spacing << ' ' << angle;
+      EXPECT_NEAR(moment / sum, middle.x, 0.02) << spacing << ' ' << angle;
+      EXPECT_NEAR(At(found, {15, 14, 18}), -std::log1p(-kOpacity) / voxel, 1e-3) << spacing << ' ' << angle;
+    }
+  }
+}
+
+TEST(FieldsExtinction, EndsWhereAFieldEndsAndWhereTheClipRegionDoes) {
+  const Volume empty = MakeVolume({{16, 16, 16}}, ScalarType::kUint8, [](const Index3&) { return 0; });
+  Scene scene = {empty, SetupOf(empty, 0)};
+  VolumeGeometry part = {{4, 16, 16}};
+  part.orientation.origin = {6, 0, 0};
+  scene.Show(MakeBlock(part), {.transfer = Uniform(0.5, {1, 1, 1})});
+  scene.setup.clip = MakeClipRegion({.planes = {{{0, 1, 0}, -8}}}, empty.description.geometry).value();
+  const Extinction found = scene.Found();
+  const double full = -std::log1p(-0.5);
+  for (std::int32_t x = 0; x < 16; ++x) {
+    EXPECT_NEAR(At(found, {x, 12, 8}), x >= 6 && x < 10 ? full : 0, 1e-3) << x;
+    EXPECT_EQ(At(found, {x, 4, 8}), 0) << x;
+  }
+}
+
+// Far finer than the volume: all of its matter counts as long as it is not lost between eight places a side.
+TEST(FieldsExtinction, OfAFinerFieldIsItsMean) {
+  const Volume empty = MakeVolume({{4, 4, 4}, {16, 16, 16}}, ScalarType::kUint8, [](const Index3&) { return 0; });
+  Scene scene = {empty, SetupOf(empty, 0)};
+  VolumeGeometry fine = {{64, 64, 64}};
+  fine.orientation.origin = {-7.5, -7.5, -7.5};
+  scene.Show(MakeVolume(fine, ScalarType::kUint8, [](const Index3& v) { return v.x % 4 < 2 ? 100 : 0; }),
+             {.transfer = Uniform(0.1, {1, 1, 1})});
+  const Extinction found = scene.Found();
+  // A voxel of light takes as much as two of four fine ones, and a bit more where values run from one to the next.
+  const double full = -std::log1p(-0.1) / 16;
+  EXPECT_GT(At(found, {1, 2, 2}), 0.5 * full);
+  EXPECT_LT(At(found, {1, 2, 2}), 0.8 * full);
+  EXPECT_NEAR(At(found, {2, 1, 2}), At(found, {1, 2, 2}), 1e-3 * full);
+}
+
+// What one field casts onto another is what it casts if both are one.
+TEST(FrameLight, OfTwoFieldsIsThatOfOneWhichHasBoth) {
+  const unsigned seed = 23;
+  std::mt19937 random(seed);
+  const VolumeGeometry geometry = {{48, 44, 40}, {1, 0.9, 1.1}};
+  const auto ball = [&](const Vec3& middle, double radius) {
+    return [=](const Index3& v) { return 100 * std::clamp(radius - Length(ToVec3(v) - middle) + 0.5, 0.0, 1.0); };
+  };
+  const auto a = ball({14, 20, 20}, 8), b = ball({34, 24, 20}, 7);
+  const Volume both = MakeVolume(geometry, ScalarType::kUint8, [&](const Index3& v) { return std::max(a(v), b(v)); });
+  FrameSetup setup = SetupOf(both, 0, 1, 1);
+  setup.transfer = Ramp(0.4);
+  setup.shading.lights = {{1, 0, 0}, {-1, 0.4, 0.3}};
+  setup.range = {0, 100};
+  const auto expected = LightOf(both, setup);
+  Scene scene = {MakeVolume(geometry, ScalarType::kUint8, a), setup};
+  const CoarserLevel light = NewLightVolume(scene.volume.description);
+  scene.setup.light = light;
+  scene.Show(MakeVolume(geometry, ScalarType::kUint8, b), {.transfer = setup.transfer});
+  const auto found = LightOf(scene.volume, scene.setup, scene.fields);
+  FrameSetup first_alone = scene.setup;
+  first_alone.fields.clear();
+  const auto alone = LightOf(scene.volume, first_alone);
+  double most = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 p = {double(random() % 48), double(random() % 44), double(random() % 40)};
+    const FrameLight::Shares of_both = expected->At(p), of_two = found->At(p), of_first = alone->At(p);
+    EXPECT_NEAR(of_two.open, of_both.open, 0.02) << "seed " << seed;
+    for (std::size_t n = 0; n < 2; ++n) {
+      EXPECT_NEAR(of_two.reached[n], of_both.reached[n], 0.02) << "seed " << seed;
+      most = std::max(most, double(of_first.reached[n] - of_two.reached[n]));
+    }
+  }
+  EXPECT_GT(most, 0.5) << "the second field casts a shadow";
+}
+
+TEST(FrameLight, IsMadeAnewIfAFieldsMatterChanges) {
+  Scene scene = {MakeBlobs({{40, 40, 40}}, ScalarType::kUint8, 7), {}};
+  scene.setup = SetupOf(scene.volume, 0.1, 1, 1);
+  scene.Show(MakeBlobs({{40, 40, 40}}, ScalarType::kUint8, 8), {.transfer = Ramp(0.1)});
+  const auto light = [&] { return LightOf(scene.volume, scene.setup, scene.fields); };
+  const auto first = light();
+  for (ColorPoint& point : scene.setup.transfer.colors) point.color = {0, 1, 0};
+  for (ColorPoint& point : scene.setup.fields[0].look.transfer.colors) point.color = {0, 1, 0};
+  const auto recoloured = light();
+  EXPECT_EQ(recoloured, first) << "colours take no light";
+  scene.setup.weight = 0.5;
+  EXPECT_NE(light(), first);
+  scene.setup.weight = 1;
+  scene.setup.fields[0].look.weight = 0.5;
+  EXPECT_NE(light(), first);
 }
 
 TEST(FrameLight, IsFoundFromVoxelsOfTheVolumeAndStaysWithinItsValues) {

@@ -287,7 +287,7 @@ TEST(Renderers, DrawPaddedVoxelsAsAnyOthers) {
       return MakeRenderer(*kind)->Render(data, blobs.block.box, setup, {}, RenderControl(), report).value();
     };
     const auto cells = std::make_shared<const Mesh>(MeshCutter(blobs.cells).Cut(blobs.block.box));
-    BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), BoxLayers{.cells = cells}));
+    BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), cells));
     const LocalImage drawn = render(data), expected = render(*BoxFor(*kind, blobs, blobs.block.box));
     ExpectSameBits(drawn, expected);
     if (kind->name() == "raycast") {

@@ -75,9 +75,9 @@ TEST(SurfaceCache, FindsNothingAnewForFortyBoxesInTurn) {
   const auto data = CutBox(volume, volume.block.box);
   auto& cache = data->CacheOf<SurfaceCache>();
   std::vector<const FaceSite*> sites;
-  for (const Box& box : FortyBoxes()) sites.push_back(cache.Of(*data, setup, box).sites.data());
+  for (const Box& box : FortyBoxes()) sites.push_back(cache.Of(*data, setup, box).value()->sites.data());
   std::vector<const FaceSite*> again;
-  for (const Box& box : FortyBoxes()) again.push_back(cache.Of(*data, setup, box).sites.data());
+  for (const Box& box : FortyBoxes()) again.push_back(cache.Of(*data, setup, box).value()->sites.data());
   EXPECT_EQ(sites, again);
   EXPECT_EQ(std::set(sites.begin(), sites.end()).size(), sites.size()) << "memory of a dropped surface was used again";
 }
@@ -104,7 +104,7 @@ TEST(SurfaceCache, FollowsAMovingBorder) {
   const FrameSetup setup = SetupFor(volume, ZBuffer());
   const auto whole = CutBox(volume, volume.block.box);
   const std::size_t empty = whole->derived_bytes();
-  const std::size_t of_whole = whole->CacheOf<SurfaceCache>().Of(*whole, setup, volume.block.box).bytes();
+  const std::size_t of_whole = whole->CacheOf<SurfaceCache>().Of(*whole, setup, volume.block.box).value()->bytes();
   for (int axis = 0; axis < 3; ++axis) {
     const auto data = CutBox(volume, volume.block.box);
     for (std::int32_t step = 0; step < 50; ++step) {
@@ -113,7 +113,8 @@ TEST(SurfaceCache, FollowsAMovingBorder) {
         Box box = volume.block.box;
         (lower ? box.end : box.begin)[axis] = border;
         const auto fresh = CutBox(volume, volume.block.box);
-        ExpectEqual(data->CacheOf<SurfaceCache>().Of(*data, setup, box), fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, box));
+        ExpectEqual(*data->CacheOf<SurfaceCache>().Of(*data, setup, box).value(),
+                    *fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, box).value());
         EXPECT_LT(data->derived_bytes(), empty + 5 * of_whole) << step;
       }
     }
@@ -125,11 +126,11 @@ TEST(SurfaceCache, ForgetsSurfacesOfOtherVoxels) {
   const Volume volume = Blobs();
   FrameSetup setup = SetupFor(volume, ZBuffer());
   const auto data = CutBox(volume, volume.block.box);
-  const std::size_t faces = data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box).normals.size();
+  const std::size_t faces = data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box).value()->normals.size();
   setup.transfer.opacities = {{150, 0, 0.5, 0}, {200, 1, 0.5, 0}};
   const auto fresh = CutBox(volume, volume.block.box);
-  const Surface& surface = data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box);
-  ExpectEqual(surface, fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, volume.block.box));
+  const Surface& surface = *data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box).value();
+  ExpectEqual(surface, *fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, volume.block.box).value());
   EXPECT_NE(surface.normals.size(), faces);
 }
 

@@ -63,18 +63,27 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.shading = options.shading;
   setup.termination = options.termination;
   if (setup.shading.needs_light_volume()) {
-    // What is kept between frames is kept by these numbers.
-    static std::atomic<DatasetId> last = 0;
-    setup.dataset = ++last;
-    setup.light = CoarserLevel{LightVolumeOf(setup.dataset), volume.description};
-    setup.light->description.geometry = LightGeometry(volume.description.geometry);
+    setup.light = NewLightVolume(volume.description);
+    setup.dataset = LightVolumeOf(setup.light->dataset);
   }
   return setup;
 }
 
-std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup) {
+CoarserLevel NewLightVolume(const VolumeDescription& description) {
+  // What is kept between frames is kept by these numbers.
+  static std::atomic<DatasetId> last = 0;
+  CoarserLevel light = {LightVolumeOf(++last), description};
+  light.description.geometry = LightGeometry(description.geometry);
+  return light;
+}
+
+std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup, const std::vector<Volume>& fields) {
   if (!setup.light) return nullptr;
-  return MakeFrameLight([&] { return MakeLightVolume(volume.block, volume.description).block; }, setup);
+  const auto values = [&](std::size_t number) {
+    const Volume& of = number == 0 ? volume : fields.at(number - 1);
+    return MakeLightVolume(of.block, of.description).block;
+  };
+  return MakeFrameLight(values, setup);
 }
 
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel, double jitter) {
@@ -164,10 +173,9 @@ Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.Can(Abil
 
 std::unique_ptr<BoxData> BoxFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
   const Box padded_box = Grown(box, halo, volume.block.box);
-  BoxLayers layers;
-  if (kind.Can(Ability::kCells) && volume.cells != nullptr)
-    layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(padded_box));
-  return std::make_unique<BoxData>(CutBlock(volume.block, padded_box), std::move(layers));
+  std::shared_ptr<const Mesh> cells;
+  if (kind.Can(Ability::kCells) && volume.cells != nullptr) cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(padded_box));
+  return std::make_unique<BoxData>(CutBlock(volume.block, padded_box), std::move(cells));
 }
 
 namespace {
@@ -198,6 +206,55 @@ LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Pa
 }
 
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
+
+FieldSetup& Scene::Add(Volume field) {
+  fields.push_back(std::move(field));
+  return setup.fields.emplace_back(FieldSetup{.levels = {{DatasetId(1 + fields.size()), fields.back().description, {}}}, .of_volume = {0}});
+}
+
+void Scene::Show(Volume field, FieldLook look) {
+  look.range = Summarize(field).range;
+  Add(std::move(field)).look = std::move(look);
+}
+
+void Scene::Show(Volume labels, LabelLook look) { Add(std::move(labels)).labels = std::move(look); }
+
+void Scene::Hide() {
+  setup.fields.clear();
+  fields.clear();
+}
+
+SceneBoxes::SceneBoxes(const Scene& scene, const Box& box) : volume(CutBox(scene.volume, PaddedBox(box, scene.setup))) {
+  std::vector<BoxData*> all;
+  for (std::size_t i = 0; i < scene.fields.size(); ++i) {
+    const Box there = PaddedBox(box, scene.setup, scene.setup.fields[i]);
+    fields.push_back(there.empty() ? nullptr : CutBox(scene.fields[i], there));
+    all.push_back(fields.back().get());
+  }
+  volume->SetFields(std::move(all));
+}
+
+LocalImage Rendered(const Scene& scene, const Box& box) {
+  const SceneBoxes boxes(scene, box);
+  RankReport report;
+  return MakeRenderer(*scene.setup.renderer)->Render(*boxes.volume, box, scene.setup, {}, RenderControl(), report).value();
+}
+
+LocalImage Rendered(const Scene& scene) { return Rendered(scene, scene.volume.description.geometry.bounds()); }
+
+VolumeGeometry RandomGridIn(const VolumeGeometry& volume, std::mt19937& random) {
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto number = [&] { return std::uniform_int_distribution<int>(5, 30)(random); };
+  const auto unit = [](const Vec3& v) { return (1 / Length(v)) * v; };
+  VolumeGeometry grid;
+  grid.size = {number(), number(), number()};
+  grid.spacing = {uniform(0.4, 2), uniform(0.4, 2), uniform(0.4, 2)};
+  const Vec3 x = unit({uniform(-1, 1), uniform(-1, 1), uniform(0.1, 1)}), z = unit(Cross(x, Vec3{uniform(-1, 1), 1, 0.3}));
+  grid.orientation.axes = {x, Cross(z, x), z};
+  const Vec3 extent = volume.spacing * ToVec3(volume.size), middle = {uniform(0, extent.x), uniform(0, extent.y), uniform(0, extent.z)};
+  grid.orientation.origin = middle - grid.orientation.ToWorld(0.5 * grid.spacing * ToVec3(grid.size));
+  return grid;
+}
 
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
   const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);

@@ -39,7 +39,9 @@ struct SetupOptions {
 };
 FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
 // Null: the setup needs none.
-std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup);
+// `fields`: those of the setup.
+std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup, const std::vector<Volume>& fields = {});
+CoarserLevel NewLightVolume(const VolumeDescription& description);  // with a dataset of its own
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1, double jitter = 0);
 // For a setup of splatting.
 FrameSetup SplatSetup(const Volume& volume, const SetupOptions& options, double footprint);
@@ -79,6 +81,30 @@ LocalImage CombinedBoxes(const FrameSetup& setup, const Partition& partition, co
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn = nullptr);
 // The picture, of the whole volume as one box.
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);
+
+// A frame of several fields: its volume, and the fields of FrameSetup::fields, each of one level.
+struct Scene {
+  Volume volume;
+  std::vector<Volume> fields;
+  FrameSetup setup;
+
+  void Show(Volume field, FieldLook look);
+  void Show(Volume labels, LabelLook look);  // after the other fields
+  void Hide();                               // all but the volume
+
+ private:
+  FieldSetup& Add(Volume field);
+};
+// The voxels that a box of a scene is rendered from.
+struct SceneBoxes {
+  SceneBoxes(const Scene& scene, const Box& box);
+  std::unique_ptr<BoxData> volume;
+  std::vector<std::unique_ptr<BoxData>> fields;  // null: the field does not reach there
+};
+LocalImage Rendered(const Scene& scene, const Box& box);
+LocalImage Rendered(const Scene& scene);
+// Turned in any way, with its middle somewhere in the volume.
+VolumeGeometry RandomGridIn(const VolumeGeometry& volume, std::mt19937& random);
 
 // `boxes` slabs along an axis (fewer where there are not as many slices).
 Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis);

@@ -58,57 +58,24 @@ struct Mixture {
 struct FieldPlace {
   Floats k;
   const SamplePlace& of_volume;
-  const CornerWeights& weights;   // of_volume's, for fields that have the same voxels
   const FrameLight::View* light;  // MarchWork::light
   Mask on_face;
   const Floats (&face)[3];  // there: the face's normal among the volume's voxels
 };
 
-// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it has the same voxels. kLit: by bricks.
-template <class T, bool kLit>
-HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
+// Adds samples of a field. `entry`: EntryOf; gradient_of(): theirs, asked for where one is visible.
+template <class GradientOf>
+HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask visible, const LaneNumbers& entry, GradientOf&& gradient_of,
                            Mixture& mixture) {
   const FloatTag df;
   const RayLook& look = *field.look;
-  SamplePlace own;
-  if (!field.among_same_voxels) own = PlaceSample(among, field.voxels, at.k);
-  const SamplePlace& place = field.among_same_voxels ? at.of_volume : own;
-  if (!field.map.everywhere) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto& p = place.position[i];
-      sampled = hn::And(sampled, hn::And(hn::Ge(p, Set(field.map.low[i])), hn::Lt(p, Set(field.map.high[i]))));
-    }
-    if (hn::AllFalse(df, sampled)) return;
-  }
-  Floats value;
-  Gradient gradient;
-  Neighbours<T> neighbours;
-  if constexpr (kLit) {
-    BrickPlace found;
-    FindInBricks<T>(field.voxels, place, sampled, bricks, found, found);
-    const LitSample sample = InterpolateCorners<T>(bricks.corners(), found.corner, field.among_same_voxels ? at.weights : WeightsAt(place));
-    value = sample.value;
-    gradient = sample.gradient;
-  } else {
-    neighbours = LoadNeighbours<T>(field.voxels, place, sampled);
-    value = Interpolate(neighbours, place);
-  }
-  auto visible = sampled;
-  LaneNumbers entry;
-  if constexpr (std::is_same_v<T, float>) {
-    const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    entry.Set(EntryOf(look, value, finite));
-    visible = hn::And(visible, finite);
-  } else {
-    entry.Set(EntryOf(look, value));
-  }
   const Entries entries = EntriesAt(look.entries.data(), entry);
   const auto& opacity = entries.part[3];
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return;
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong || at.light != nullptr) {
-    if constexpr (!kLit) gradient = GradientAt(neighbours, place);
+    Gradient gradient = gradient_of();
     if (!hn::AllFalse(df, at.on_face)) {
       const auto face = [&](std::size_t i) HWY_ATTR { return Combined(field.normals, at.face, i); };
       gradient = Choose(at.on_face, {face(0), face(1), face(2)}, gradient);
@@ -122,24 +89,143 @@ HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sam
   mixture.Add(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
 }
 
-// Adds what all fields have of samples. `shown`: as in RayFields, 0 where there is no sample. `among` and `bricks`: by field.
-HWY_NOINLINE void MixFields(const RayFields& fields, const FieldPlace& at, Ints shown, const RayPacket* among, GradientBricks* bricks,
-                            Mixture& mixture) {
+// The samples of `sampled` that lie where a field shows.
+HWY_INLINE Mask WithinField(const RayField& field, const SamplePlace& place, Mask sampled) {
+  if (field.map.everywhere) return sampled;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& p = place.position[i];
+    sampled = hn::And(sampled, hn::And(hn::Ge(p, Set(field.map.low[i])), hn::Lt(p, Set(field.map.high[i]))));
+  }
+  return sampled;
+}
+
+// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it has the same voxels. kLit: by bricks.
+template <class T, bool kLit>
+HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
+                           Mixture& mixture) {
   const FloatTag df;
-  for (std::size_t i = 0; i < fields.fields.size(); ++i) {
-    const RayField& field = fields.fields[i];
-    const Mask sampled = hn::RebindMask(df, hn::TestBit(shown, SetInt(2 * RayFields::kVolume << i)));
-    if (hn::AllFalse(df, sampled)) continue;
-    const auto mix = [&](auto value, auto lit)
-                         HWY_ATTR { MixField<decltype(value), lit()>(field, at, sampled, among[i], bricks[i], mixture); };
-    const bool phong = field.look->phong;
-    switch (field.voxels.type) {
-      case ScalarType::kUint8: phong ? mix(std::uint8_t(), std::true_type()) : mix(std::uint8_t(), std::false_type()); break;
-      case ScalarType::kUint16: phong ? mix(std::uint16_t(), std::true_type()) : mix(std::uint16_t(), std::false_type()); break;
-      case ScalarType::kFloat32: mix(float(), std::false_type()); break;
+  SamplePlace own;
+  if (!field.among_same_voxels) own = PlaceSample(among, field.voxels, at.k);
+  const SamplePlace& place = field.among_same_voxels ? at.of_volume : own;
+  sampled = WithinField(field, place, sampled);
+  if (hn::AllFalse(df, sampled)) return;
+  LaneNumbers entry;
+  if constexpr (kLit) {
+    BrickPlace found;
+    FindInBricks<T>(field.voxels, place, sampled, bricks, found, found);
+    const LitSample sample = InterpolateCorners<T>(bricks.corners(), found.corner, WeightsAt(place));
+    entry.Set(EntryOf(*field.look, sample.value));
+    MixSamples(
+        field, at, sampled, entry, [&]() HWY_ATTR { return sample.gradient; }, mixture);
+  } else {
+    const Neighbours<T> neighbours = LoadNeighbours<T>(field.voxels, place, sampled);
+    const auto value = Interpolate(neighbours, place);
+    if constexpr (std::is_same_v<T, float>) {
+      const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+      entry.Set(EntryOf(*field.look, value, finite));
+      sampled = hn::And(sampled, finite);
+    } else {
+      entry.Set(EntryOf(*field.look, value));
     }
+    MixSamples(
+        field, at, sampled, entry, [&]() HWY_ATTR { return GradientAt(neighbours, place); }, mixture);
   }
 }
+
+// Whether samples of a field are read from bricks.
+HWY_INLINE bool HasBricks(const RayField& field) { return field.look->phong && field.voxels.type != ScalarType::kFloat32; }
+
+// MixField, by the field's type.
+HWY_INLINE void MixAny(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
+                       Mixture& mixture) {
+  const auto mix = [&](auto value, auto lit) HWY_ATTR { MixField<decltype(value), lit()>(field, at, sampled, among, bricks, mixture); };
+  const bool lit = HasBricks(field);
+  switch (field.voxels.type) {
+    case ScalarType::kUint8: lit ? mix(std::uint8_t(), std::true_type()) : mix(std::uint8_t(), std::false_type()); break;
+    case ScalarType::kUint16: lit ? mix(std::uint16_t(), std::true_type()) : mix(std::uint16_t(), std::false_type()); break;
+    default: mix(float(), std::false_type()); break;
+  }
+}
+
+// RayFields::shown at samples; 0 where not `sampled`.
+HWY_INLINE Ints ShownAt(const RayFields& fields, const RayBox& box, const SamplePlace& place, Mask sampled) {
+  const IntTag di;
+  const auto cell = CellOf<kCellShift>(place, box.cells, sampled);
+  const auto shown = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(fields.shown), hn::Add(cell, cell));
+  return hn::IfThenElseZero(hn::RebindMask(di, sampled), hn::And(shown, SetInt(0xFFFF)));
+}
+// Where a field may show.
+HWY_INLINE Mask ShowsField(Ints shown, std::size_t number) {
+  return hn::RebindMask(FloatTag(), hn::TestBit(shown, SetInt(RayFields::kVolume << number)));
+}
+
+// Adds what all fields but the volume have of samples. `shown`: as in RayFields, 0 where there is no sample. `among`, `bricks`: by field.
+HWY_NOINLINE void MixFields(const RayFields& fields, const FieldPlace& at, Ints shown, const RayPacket* among, GradientBricks* bricks,
+                            Mixture& mixture) {
+  for (std::size_t i = 1; i < fields.fields.size(); ++i) {
+    const Mask sampled = ShowsField(shown, i);
+    if (!hn::AllFalse(FloatTag(), sampled)) MixAny(fields.fields[i], at, sampled, among[i], bricks[i], mixture);
+  }
+}
+
+// Samples of the volume and of all other fields. Those in bricks at the volume's own places are found and read a step ahead each, so that
+// the voxels of one field are waited for while others are at work; others are read when they are mixed.
+struct FieldSamples {
+  struct Found {
+    BrickPlace of[kMaxShownFields];
+  };
+  LitSample of[kMaxShownFields];
+  LaneNumbers entry[kMaxShownFields];
+
+  static HWY_INLINE Found Nowhere() {
+    Found found;
+    for (BrickPlace& of : found.of) of.number = hn::Zero(IntTag());
+    return found;
+  }
+  static HWY_INLINE bool Ahead(const RayField& field) { return field.among_same_voxels && HasBricks(field); }
+
+  static HWY_INLINE void Find(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, Found& found,
+                              Found& before) {
+    for (std::size_t i = 0; i < fields.fields.size(); ++i) {
+      const RayField& field = fields.fields[i];
+      found.of[i].number = hn::Zero(IntTag());
+      const Mask sampled = ShowsField(shown, i);
+      if (hn::AllFalse(FloatTag(), sampled) || !Ahead(field)) continue;
+      const Mask within = WithinField(field, place, sampled);
+      if (field.voxels.type == ScalarType::kUint8) {
+        FindInBricks<std::uint8_t>(field.voxels, place, within, bricks[i], found.of[i], before.of[i]);
+      } else {
+        FindInBricks<std::uint16_t>(field.voxels, place, within, bricks[i], found.of[i], before.of[i]);
+      }
+    }
+  }
+  HWY_INLINE void Read(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, const Found& found) {
+    const CornerWeights weights = WeightsAt(place);
+    for (std::size_t i = 0; i < fields.fields.size(); ++i) {
+      const RayField& field = fields.fields[i];
+      if (hn::AllFalse(FloatTag(), ShowsField(shown, i)) || !Ahead(field)) continue;
+      of[i] = field.voxels.type == ScalarType::kUint8 ? InterpolateCorners<std::uint8_t>(bricks[i].corners(), found.of[i].corner, weights)
+                                                      : InterpolateCorners<std::uint16_t>(bricks[i].corners(), found.of[i].corner, weights);
+      entry[i].Set(EntryOf(*field.look, of[i].value));
+    }
+  }
+  HWY_INLINE void Mix(const RayFields& fields, const FieldPlace& at, Ints shown, const RayPacket* among, GradientBricks* bricks,
+                      Mixture& mixture) const {
+    for (std::size_t i = 0; i < fields.fields.size(); ++i) {
+      const RayField& field = fields.fields[i];
+      const Mask sampled = ShowsField(shown, i);
+      if (hn::AllFalse(FloatTag(), sampled)) continue;
+      if (Ahead(field)) {
+        MixSamples(
+            field, at, WithinField(field, at.of_volume, sampled), entry[i], [&]() HWY_ATTR { return of[i].gradient; }, mixture);
+      } else {
+        Mixture so_far = mixture;  // a call that takes its address would keep `mixture` out of registers
+        MixAny(field, at, sampled, among[i], bricks[i], so_far);
+        mixture = so_far;
+      }
+    }
+  }
+};
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

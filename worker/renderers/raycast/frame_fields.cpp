@@ -6,6 +6,7 @@
 #include "common/base/check.h"
 #include "common/parallel/parallel.h"
 #include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/field_cells.h"
 
 namespace slabstream {
 namespace {
@@ -40,7 +41,7 @@ Result<FrameFields> FrameFields::Make(const BoxData& data, const LevelBox& at, c
   for (std::size_t i = 0; i < setup.fields.size(); ++i) {
     BoxData* const voxels = data.fields()[i];
     const FieldSetup& field = setup.fields[i];
-    if (voxels == nullptr || !(field.look.weight > 0)) continue;
+    if (voxels == nullptr || field.labels || !(field.look.weight > 0)) continue;
     const VolumeDescription& description = LevelOf(field, at.level).description;
     const std::vector<RayPiece>& pieces = voxels->CacheOf<RayVolume>().PiecesOf(*voxels);
     if (pieces.size() > 1) return TooLargeForRays(i);
@@ -61,8 +62,12 @@ bool FrameFields::Field::among_same_voxels(const RayPiece& other) const {
   return from_level.is_identity() && piece->voxels.box.begin == other.voxels.box.begin;
 }
 
-std::vector<RayField> FrameFields::Of(const RayPiece& piece) const {
-  std::vector<RayField> fields;
+std::vector<RayField> FrameFields::Of(const RayPiece& piece, const RayLook& volume) const {
+  std::vector<RayField> fields = {{.voxels = BoxOfVoxels(piece.voxels, piece.cells.counts),
+                                   .look = &volume,
+                                   .map = {.everywhere = true},
+                                   .normals = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                   .among_same_voxels = true}};
   for (const Field& of : fields_) {
     RayField& field = fields.emplace_back(of.at);
     field.look = &of.look;
@@ -72,50 +77,16 @@ std::vector<RayField> FrameFields::Of(const RayPiece& piece) const {
 }
 
 std::vector<std::uint16_t> FrameFields::ShownIn(const RayPiece& piece) const {
-  constexpr double kRounding = 1.0 / 64;  // voxels
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint16_t> shown(CountIn(counts));
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     const Field& field = fields_[i];
-    const MacrocellRanges& ranges = field.piece->cells;
     const VisibleSamples visible(field.look);
     const auto bit = std::uint16_t(2 * RayFields::kVolume << i);
-    const std::vector<std::uint8_t> hidden =
-        VisibleCells(ranges, [&](float low, float high) { return visible.AnyMatterBetween(low, high); });
-    const auto any_in = [&](const Index3& begin, const Index3& end) {
-      for (Index3 cell = begin; cell.z < end.z; ++cell.z) {
-        for (cell.y = begin.y; cell.y < end.y; ++cell.y) {
-          const std::uint8_t* const row = &hidden[NumberIn(ranges.counts, {0, cell.y, cell.z})];
-          if (std::any_of(row + begin.x, row + end.x, [](std::uint8_t of) { return of == 0; })) return true;
-        }
-      }
-      return false;
-    };
-    const bool same_cells = field.among_same_voxels(piece);
-    const Vec3 origin = ToVec3(piece.voxels.box.begin) - Vec3{1, 1, 1},
-               field_origin = ToVec3(field.piece->voxels.box.begin) - Vec3{1, 1, 1};
-    ParallelFor(0, counts.z, [&](std::int32_t z) {
-      for (Index3 cell = {0, 0, z}; cell.y < counts.y; ++cell.y) {
-        for (cell.x = 0; cell.x < counts.x; ++cell.x) {
-          Index3 begin = cell, end = cell + Uniform(1);
-          if (!same_cells) {
-            const SampledRegion span =
-                Mapped({origin + double(kCellSide) * ToVec3(cell), origin + double(kCellSide) * ToVec3(end)}, field.from_level);
-            for (const Axis axis : kAxes) {
-              const auto of = [&](double position) {
-                const double number = std::floor((position - field_origin[axis]) / kCellSide);
-                return std::int32_t(std::clamp(number, -1.0, double(ranges.counts[axis])));
-              };
-              begin[axis] = std::max(of(span.low[axis] - kRounding), 0);
-              end[axis] = of(span.high[axis] + kRounding) + 1;
-            }
-          }
-          for (const Axis axis : kAxes) end[axis] = std::min(end[axis], ranges.counts[axis]);
-          const bool empty = begin.x >= end.x || begin.y >= end.y || begin.z >= end.z;
-          if (!empty && any_in(begin, end)) shown[NumberIn(counts, cell)] |= bit;
-        }
-      }
-    });
+    const std::vector<std::uint8_t> cells =
+        VisibleCells(field.piece->cells, [&](float low, float high) { return visible.AnyMatterBetween(low, high); });
+    const std::vector<std::uint8_t> in_cells = CellsThatShow(piece, *field.piece, field.from_level, cells);
+    for (std::size_t cell = 0; cell < shown.size(); ++cell) shown[cell] |= in_cells[cell] != 0 ? bit : std::uint16_t{0};
   }
   return shown;
 }

@@ -19,8 +19,8 @@ class FrameFields {
 
   bool empty() const { return fields_.empty(); }
 
-  // The fields as samples of a piece read them.
-  std::vector<RayField> Of(const RayPiece& piece) const;
+  // RayFields::fields, as samples of a piece read them. `volume`: the volume's look.
+  std::vector<RayField> Of(const RayPiece& piece, const RayLook& volume) const;
 
   // Which fields may show in each cell of a piece, as RayFields::shown without the volume. Parallel.
   std::vector<std::uint16_t> ShownIn(const RayPiece& piece) const;

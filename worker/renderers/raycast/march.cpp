@@ -13,7 +13,7 @@
 #include "worker/rays/ray_sums-inl.h"
 #include "worker/renderers/raycast/field_samples-inl.h"
 #include "worker/renderers/raycast/gradient_bricks-inl.h"
-#include "worker/renderers/raycast/layer_samples-inl.h"
+#include "worker/renderers/raycast/label_samples-inl.h"
 #include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -35,10 +35,10 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
   const float* const colors = work.look->surface_looks.data();
   const auto opacity = hn::GatherIndex(df, colors + 3, entry);
-  if (work.layers == nullptr || work.layers->labels == nullptr) return sums.Add(rays, opacity, colors, entry, light);
-  const LabelTables& tables = *work.layers->labels;
+  if (work.labels == nullptr) return sums.Add(rays, opacity, colors, entry, light);
+  const LabelTables& tables = work.labels->tables;
   const float* const tints = tables.entries.data();
-  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, IndexBefore(*work.box, place, rays)));
+  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.labels, PlaceAmong(*work.labels, *work.box, place, rays)));
   const auto changed = hn::GatherIndex(df, tints + 3, label);
   const auto shown = hn::Ge(changed, hn::Zero(df));
   const auto factor = hn::IfThenElse(shown, tables.surface ? hn::Zero(df) : changed, Set(1));
@@ -72,34 +72,34 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Floats before, Sur
 }
 
 // The light on samples with labels. `gradient`: of the volume, or a face's normal if `on_face`.
-HWY_INLINE Light LightOfLayers(const MarchWork& work, const SamplePlace& place, Ints at, const LayeredSample& sample, Mask visible,
+HWY_INLINE Light LightOfLabels(const MarchWork& work, const SamplePlace& place, const LabelledSample& sample, Mask visible,
                                Gradient gradient, Mask on_face) {
   const FloatTag df;
+  if (work.labels == nullptr) return LightOn(work, gradient, place);
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
-    gradient = Choose(matter, IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label), gradient);
+    gradient = Choose(matter, IndicatorGradientAt(*work.labels, sample.place, sample.label), gradient);
   }
   return LightOn(work, gradient, place);
 }
 
-// The colours of samples with layers.
-HWY_INLINE Floats LayeredColor(const MarchWork& work, const Entries& entries, const LayeredSample& sample, const Light& light,
-                               std::size_t channel) {
-  const FloatTag df;
-  const RayLayers& layers = *work.layers;
+// The colours of samples with labels.
+HWY_INLINE Floats LabelledColor(const MarchWork& work, const Entries& entries, const LabelledSample& sample, const Light& light,
+                                std::size_t channel) {
   auto color = entries.part[channel];
-  if (layers.labels != nullptr) {
-    color = Lerp(sample.tint, color, hn::GatherIndex(df, layers.labels->entries.data() + channel, sample.label_entry));
+  if (work.labels != nullptr) {
+    color = Lerp(sample.tint, color, hn::GatherIndex(FloatTag(), work.labels->tables.entries.data() + channel, sample.entry));
   }
   return Sums::Lit(color, light);
 }
 
 // `shown`: Step::shown.
-HWY_INLINE Mask ShowsVolume(Ints shown) { return hn::RebindMask(FloatTag(), hn::TestBit(shown, SetInt(RayFields::kVolume))); }
+HWY_INLINE Mask ShowsVolume(Ints shown) { return ShowsField(shown, 0); }
 
-// What a frame may ask for: only a transfer function; cuts, isosurfaces and gradient opacity, too; and layers and other fields on top. Each
-// is compiled by itself, so that a frame does not pay for what it does not use.
-enum class Samples { kPlain, kAll, kLayered };
+// What a frame may ask for: only a transfer function; cuts, isosurfaces and gradient opacity, too; labels and other fields on top; and
+// several fields, the volume like the others, by transfer functions and with cuts. Each is compiled by itself, so that a frame does not pay
+// for what it does not use.
+enum class Samples { kPlain, kAll, kMixed, kFields };
 
 // How far the rays of a packet go on: the rays that take their next sample, and the samples from it to the one after.
 struct Stride {
@@ -166,7 +166,7 @@ struct Step {
   typename Voxels::Found found;  // where the voxels are
   Voxels voxels;
   LaneNumbers entry;  // EntryOf
-  // Of kLayered.
+  // Of kMixed and kFields.
   Ints shown;         // as in RayFields, if there are any; 0 where there is no sample
   bool shows_volume;  // the volume may show there
 };
@@ -184,11 +184,10 @@ struct Classified {
   Floats opacity;
   Mask visible;
   Gradient gradient;  // if opacities depend on it
-  std::conditional_t<kSamples == Samples::kLayered, LayeredSample, std::monostate> layered;
+  std::conditional_t<kSamples == Samples::kMixed, LabelledSample, std::monostate> labelled;
 };
-// `at`: as in Neighbours, of kLayered.
 template <class T, Samples kSamples, class Voxels>
-HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Ints at, Classified<kSamples>& of) {
+HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Classified<kSamples>& of) {
   const FloatTag df;
   const RayLook& look = *work.look;
   const SamplePlace& place = step.place;
@@ -211,10 +210,12 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
     }
     of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
   }
-  if constexpr (kSamples == Samples::kLayered) {
-    of.layered = WithLayers(*work.layers, *work.box, place, at, hn::IfThenElseZero(finite, of.opacity));
-    of.opacity = of.layered.opacity;
-    of.visible = hn::And(step.sampled, hn::Gt(of.opacity, zero));
+  if constexpr (kSamples == Samples::kMixed) {
+    if (work.labels != nullptr) {
+      of.labelled = WithLabels(*work.labels, *work.box, place, step.sampled, hn::IfThenElseZero(finite, of.opacity));
+      of.opacity = of.labelled.opacity;
+      of.visible = hn::And(step.sampled, hn::Gt(of.opacity, zero));
+    }
   }
 }
 
@@ -230,8 +231,8 @@ HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, 
 
 // Lights samples and adds those that are visible to Sums or to a Mixture: add(mask, opacity, color(channel)).
 template <Samples kSamples, class Voxels, class Add>
-HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, const PacketPart* part, Ints at,
-                           const Classified<kSamples>& samples, Floats opacity, Add&& add) {
+HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, const PacketPart* part, const Classified<kSamples>& samples,
+                           Floats opacity, Add&& add) {
   const RayLook& look = *work.look;
   const SamplePlace& place = step.place;
   Light light = {Set(1), hn::Zero(FloatTag())};
@@ -243,15 +244,15 @@ HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, cons
       on_face = hn::Lt(step.k, part->face_end);
       gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
     }
-    if constexpr (kSamples == Samples::kLayered) {
-      light = LightOfLayers(work, place, at, samples.layered, samples.visible, gradient, on_face);
+    if constexpr (kSamples == Samples::kMixed) {
+      light = LightOfLabels(work, place, samples.labelled, samples.visible, gradient, on_face);
     } else {
       light = LightOn(work, gradient, place);
     }
   }
-  if constexpr (kSamples == Samples::kLayered) {
+  if constexpr (kSamples == Samples::kMixed) {
     add(samples.visible, opacity,
-        [&](std::size_t channel) HWY_ATTR { return LayeredColor(work, samples.entries, samples.layered, light, channel); });
+        [&](std::size_t channel) HWY_ATTR { return LabelledColor(work, samples.entries, samples.labelled, light, channel); });
   } else {
     add(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.part[channel], light); });
   }
@@ -270,7 +271,7 @@ struct MarchingPacket {
 template <class T, Samples kSamples, class Voxels>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned,
                                       const PacketPart* part, Sums& gathered) {
-  constexpr bool kAll = kSamples != Samples::kPlain;
+  constexpr bool kAll = kSamples != Samples::kPlain, kFields = kSamples == Samples::kFields;
   const FloatTag df;
   const RayLook& look = *work.look;
   const auto zero = hn::Zero(df), one = Set(1);
@@ -282,13 +283,13 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   // Addresses depend on `inside` alone, so that loads need not wait for the samples before.
   auto inside = hn::Lt(k, owned.end), alive = inside;
   std::uint64_t shaded = 0;
-  const bool has_surfaces = kAll && work.to_surfaces != nullptr;
+  const bool has_surfaces = kAll && !kFields && work.to_surfaces != nullptr;
   [[maybe_unused]] const RayFields* fields = nullptr;
-  if constexpr (kSamples == Samples::kLayered) fields = work.layers->fields;
+  if constexpr (kSamples == Samples::kMixed || kFields) fields = work.fields;
   SurfaceWalk<T> surfaces(work, packet.among, has_surfaces ? OctantStart(*work.to_surfaces, packet.among) : hn::Zero(IntTag()));
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
-    if (kSamples != Samples::kLayered && !look.volume_shows) alive = hn::Lt(one, zero);
+    if (kSamples == Samples::kAll && !look.volume_shows) alive = hn::Lt(one, zero);
     if (has_surfaces) surfaces.Start(*part);
   }
   if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
@@ -305,7 +306,12 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
     while (!hn::AllFalse(df, alive)) {
       step.place = PlaceSample(packet.among, *work.box, k);
       Stride stride = {inside, one};
-      if (!in_matter) stride = LeapFrom(work, packet.leaps, octant_start, step.place, inside);
+      bool may_leap = !in_matter;
+      if constexpr (kFields) {  // a cell is empty where no field may show
+        step.shown = ShownAt(*fields, *work.box, step.place, inside);
+        may_leap = !hn::AllFalse(df, hn::And(inside, hn::RebindMask(df, hn::Eq(step.shown, hn::Zero(IntTag())))));
+      }
+      if (may_leap) stride = LeapFrom(work, packet.leaps, octant_start, step.place, inside);
       step.k = k;
       step.sampled = hn::And(alive, stride.sampled);
       k = hn::Add(k, stride.steps);
@@ -313,51 +319,65 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       alive = hn::And(alive, inside);
       if (hn::AllFalse(df, step.sampled)) continue;
       step.any = true;
-      auto read = stride.sampled;
-      if constexpr (kSamples == Samples::kLayered) {
-        step.shows_volume = true;
-        if (fields != nullptr) {
-          const auto cell = CellOf<kCellShift>(step.place, work.box->cells, read);
-          const auto shown = hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(fields->shown), hn::Add(cell, cell));
-          step.shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), step.sampled), hn::And(shown, SetInt(0xFFFF)));
-          read = ShowsVolume(step.shown);
-          step.shows_volume = !hn::AllFalse(df, read);
+      if constexpr (kFields) {
+        step.shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), step.sampled), step.shown);
+        Voxels::Find(*fields, step.place, step.shown, packet.bricks, step.found, before.found);
+      } else {
+        auto read = stride.sampled;
+        if constexpr (kSamples == Samples::kMixed) {
+          step.shows_volume = true;
+          if (fields != nullptr) {
+            step.shown = ShownAt(*fields, *work.box, step.place, step.sampled);
+            read = ShowsVolume(step.shown);
+            step.shows_volume = !hn::AllFalse(df, read);
+          }
         }
+        Voxels::Find(work, step.place, read, packet.bricks, step.found, before.found);
       }
-      Voxels::Find(work, step.place, read, packet.bricks, step.found, before.found);
       return;
     }
   };
   // Their values.
   const auto read = [&](Step<Voxels>& step) SLABSTREAM_INLINED {
-    if (kSamples == Samples::kLayered && !step.shows_volume) return;
-    step.voxels.Read(work, step.place, step.found, packet.bricks);
-    if constexpr (std::is_same_v<T, float>) {
-      step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
+    if constexpr (kFields) {
+      step.voxels.Read(*fields, step.place, step.shown, packet.bricks, step.found);
     } else {
-      step.entry.Set(EntryOf(look, step.voxels.value));
+      if (kSamples == Samples::kMixed && !step.shows_volume) return;
+      step.voxels.Read(work, step.place, step.found, packet.bricks);
+      if constexpr (std::is_same_v<T, float>) {
+        step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
+      } else {
+        step.entry.Set(EntryOf(look, step.voxels.value));
+      }
     }
   };
   // Their looks.
   const auto add = [&](const Step<Voxels>& step) SLABSTREAM_INLINED {
-    Ints at = hn::Zero(IntTag());
-    if constexpr (kSamples == Samples::kLayered) at = IndexBefore(*work.box, step.place, step.sampled);
     Classified<kSamples> samples;
     samples.visible = hn::Lt(one, zero);
-    if (kSamples != Samples::kLayered || step.shows_volume) ClassifySamples<T, kSamples>(work, step, at, samples);
-    samples.visible = hn::And(samples.visible, hn::Lt(sums.alpha, opaque));
-    if (kSamples == Samples::kLayered && fields != nullptr) samples.visible = hn::And(samples.visible, ShowsVolume(step.shown));
+    const auto transparent = hn::Lt(sums.alpha, opaque);
+    if constexpr (!kFields) {
+      if (kSamples != Samples::kMixed || step.shows_volume) ClassifySamples<T, kSamples>(work, step, samples);
+      samples.visible = hn::And(samples.visible, transparent);
+    }
     [[maybe_unused]] Mixture mixture;
-    if constexpr (kSamples == Samples::kLayered) {
+    if constexpr (kSamples == Samples::kMixed || kFields) {
       if (fields != nullptr) {
         mixture = Mixture::Empty();
-        if (!hn::AllFalse(df, samples.visible)) {
-          AddSamples<kSamples>(work, step, part, at, samples, samples.opacity,
-                               [&](Mask visible, Floats opacity, auto&& color) HWY_ATTR { mixture.Add(visible, opacity, color); });
+        if constexpr (!kFields) {
+          samples.visible = hn::And(samples.visible, ShowsVolume(step.shown));
+          if (!hn::AllFalse(df, samples.visible)) {
+            AddSamples<kSamples>(work, step, part, samples, samples.opacity,
+                                 [&](Mask visible, Floats opacity, auto&& color) HWY_ATTR { mixture.Add(visible, opacity, color); });
+          }
         }
-        const auto shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), hn::Lt(sums.alpha, opaque)), step.shown);
-        MixFields(*fields, {step.k, step.place, WeightsAt(step.place), work.light, hn::Lt(step.k, part->face_end), part->face}, shown,
-                  packet.among_fields, packet.bricks + 1, mixture);
+        const auto shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), transparent), step.shown);
+        const FieldPlace there = {step.k, step.place, work.light, hn::Lt(step.k, part->face_end), part->face};
+        if constexpr (kFields) {
+          step.voxels.Mix(*fields, there, shown, packet.among_fields, packet.bricks, mixture);
+        } else {
+          MixFields(*fields, there, shown, packet.among_fields, packet.bricks, mixture);
+        }
         samples.opacity = mixture.alpha;
         samples.visible = hn::Gt(mixture.alpha, zero);
       }
@@ -371,16 +391,16 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
     }
     const auto opacity = has_ends ? OpacityAtEnds(ends, step.k, samples.visible, samples.opacity) : samples.opacity;
     const auto add_to_sums = [&](Mask visible, Floats of, auto&& color) SLABSTREAM_INLINED { sums.AddChannels(visible, of, color); };
-    if constexpr (kSamples == Samples::kLayered) {
-      if (fields != nullptr) {
+    if constexpr (kSamples == Samples::kMixed || kFields) {
+      if (kFields || fields != nullptr) {
         const auto straight = mixture.Straight(fields->flat);
         add_to_sums(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return hn::Mul(mixture.color[channel], straight); });
         if (fields->flat) sums.LimitColors();
-      } else {
-        AddSamples<kSamples>(work, step, part, at, samples, opacity, add_to_sums);
+      } else if constexpr (!kFields) {
+        AddSamples<kSamples>(work, step, part, samples, opacity, add_to_sums);
       }
     } else {
-      AddSamples<kSamples>(work, step, part, at, samples, opacity, add_to_sums);
+      AddSamples<kSamples>(work, step, part, samples, opacity, add_to_sums);
     }
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   };
@@ -408,11 +428,17 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
 // Apart from plain frames, so that these have the registers for themselves.
 template <class T, Samples kSamples, class Voxels>
 HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket packet, const SampleInterval& owned, Sums& sums) {
-  RayPacket among_fields[kSamples == Samples::kLayered ? kMaxShownFields : 1];
-  if constexpr (kSamples == Samples::kLayered) {
+  if constexpr (kSamples == Samples::kMixed) {  // chosen here: another branch in MarchPacket would make plain frames slower
+    if (work.fields != nullptr && work.labels == nullptr && work.to_surfaces == nullptr && !work.look->by_gradient()) {
+      return MarchParts<std::uint8_t, Samples::kFields, FieldSamples>(work, packet, owned, sums);
+    }
+  }
+  constexpr bool kMayMix = kSamples == Samples::kMixed || kSamples == Samples::kFields;
+  RayPacket among_fields[kMayMix ? kMaxShownFields : 1];
+  if constexpr (kMayMix) {
     packet.among_fields = among_fields;
-    if (work.layers->fields != nullptr) {
-      const std::span<const RayField> fields = work.layers->fields->fields;
+    if (work.fields != nullptr) {
+      const std::span<const RayField> fields = work.fields->fields;
       for (std::size_t i = 0; i < fields.size(); ++i) {
         if (!fields[i].among_same_voxels) among_fields[i] = AmongVoxels(packet.of_frame, fields[i].map);
       }
@@ -439,13 +465,14 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
+  const bool mixed = work.labels != nullptr || work.fields != nullptr;
   const bool has_parts = !work.rays->clip.empty() || work.to_surfaces != nullptr || work.look->by_gradient();
-  if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
+  if (HWY_LIKELY(!mixed && !has_parts)) {
     shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
-  } else if (work.layers == nullptr) {
+  } else if (!mixed) {
     shaded = MarchParts<T, Samples::kAll, Voxels>(work, packet, owned, sums);
   } else {
-    shaded = MarchParts<T, Samples::kLayered, Voxels>(work, packet, owned, sums);
+    shaded = MarchParts<T, Samples::kMixed, Voxels>(work, packet, owned, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
@@ -466,10 +493,10 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
 template <class T>
 std::uint64_t March(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* HWY_RESTRICT rgba,
                     std::size_t floats_a_row) {
-  if (work.layers != nullptr && work.layers->fields != nullptr) {
-    const std::span<const RayField> fields = work.layers->fields->fields;
+  if (work.fields != nullptr) {
+    const std::span<const RayField> fields = work.fields->fields;
     for (std::size_t i = 0; i < fields.size(); ++i) {
-      if (fields[i].look->phong && fields[i].voxels.type != ScalarType::kFloat32) bricks[1 + i].Enter(fields[i].voxels);
+      if (HasBricks(fields[i])) bricks[i].Enter(fields[i].voxels);
     }
   }
   if constexpr (!std::is_same_v<T, float>) {

@@ -7,7 +7,7 @@
 //   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
 //   light       shadows and ambient occlusion at the sample (LightAt), if there are any
-//   layers      the label of the nearest voxel changes the volume's sample as docs/rendering.md says (RayLayers)
+//   labels      the label of the nearest voxel changes the volume's sample as docs/rendering.md says (RayLabels)
 //   fields      sampled like the volume, and blended with it (RayFields)
 //
 // Isosurfaces of the interpolated volume are composited among the samples, each crossing of a ray with its surface's opacity
@@ -23,7 +23,8 @@
 #include "worker/rays/ray_look.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/gradient_bricks.h"
-#include "worker/renderers/raycast/ray_layers.h"
+#include "worker/renderers/raycast/ray_fields.h"
+#include "worker/renderers/raycast/ray_labels.h"
 
 namespace slabstream {
 
@@ -37,7 +38,8 @@ struct MarchWork {
   const EmptyDistances* to_surfaces = nullptr;  // null: no isosurface is shown
   const std::int32_t* surface_cells = nullptr;  // FindSurfaceCells
   float termination = 0;                        // a ray ends where it transmits less; 0: never
-  const RayLayers* layers = nullptr;            // null: none is shown
+  const RayLabels* labels = nullptr;            // null: none are shown
+  const RayFields* fields = nullptr;            // null: no other field is shown
   const FrameLight::View* light = nullptr;      // shadows and ambient occlusion, by positions in the box; null: there are none
 };
 

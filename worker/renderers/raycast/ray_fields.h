@@ -1,4 +1,4 @@
-// RayFields: the fields that a frame shows beside its volume, as the ray caster's kernel reads them at the samples of one piece of a padded
+// RayFields: the fields that a frame of several fields shows, as the ray caster's kernel reads them at the samples of one piece of a padded
 // box. Neither copies nor owns.
 #pragma once
 
@@ -25,9 +25,9 @@ struct RayField {
 };
 
 struct RayFields {
-  static constexpr std::int32_t kVolume = 1;  // in `shown`; field i has the bit 2 << i
+  static constexpr std::int32_t kVolume = 1;  // in `shown`; field i has the bit kVolume << i
 
-  std::span<const RayField> fields;      // in the order in which they are blended, after the volume
+  std::span<const RayField> fields;      // in the order in which they are blended; the first is the volume
   const std::uint16_t* shown = nullptr;  // by cell of the piece: what may show there. Kernels may read two bytes more
   bool flat = false;                     // FrameSetup::flat
 };

@@ -2,7 +2,8 @@
 // computes.
 //
 //   1. once a padded box: pad its voxels (RayVolume) and find the range of each small cell
-//   2. once a transfer function, look of layers, and octant of directions: for each cell, find how far rays may leap (EmptyDistances)
+//   2. once a transfer function, looks of labels and fields, and octant of directions: for each cell, find how far rays may leap
+//   (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
 
 #include <cmath>
@@ -11,12 +12,11 @@
 #include <tuple>
 #include <utility>
 
-#include "common/frame/matter_labels.h"
 #include "common/parallel/per_thread.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/field_cells.h"
 #include "worker/renderers/raycast/frame_fields.h"
-#include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
 #include "worker/renderers/raycast/surface_cells.h"
 #include "worker/renderers/renderer.h"
@@ -34,26 +34,37 @@ struct Visibility {
   std::vector<std::uint16_t> shown;           // RayFields::shown; empty: there are no other fields
 };
 
-// What is visible of a padded box: samples of the volume, and what layers add.
+// What is visible of a padded box: samples of the volume, and what labels and other fields add.
 struct VisibleValues {
   VisibleSamples volume;
-  std::optional<MatterLabels> labels = {};
+  // Labels that are material.
+  struct Labels {
+    MatterNumbers matter;
+    std::weak_ptr<std::byte[]> voxels;  // their numbers
+    AffineMap map;
+    friend bool operator==(const Labels& a, const Labels& b) {
+      return a.matter == b.matter && !a.voxels.owner_before(b.voxels) && !b.voxels.owner_before(a.voxels) && a.map == b.map;
+    }
+  };
+  std::optional<Labels> labels = {};
   FrameFields::Visible fields = {};
   friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
-// `layers`: of the piece; null if none is shown.
-Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers, const FrameFields& fields) {
+// `labels`: null: none are shown.
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const RayLabels* labels, const FrameFields& fields) {
   const bool has_surfaces = !visible.volume.isovalues().empty();
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint8_t> with_samples =
       VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnyMatterBetween(low, high); });
-  const auto add = [&](const MacrocellRanges& of, const auto& shown) {
-    for (std::size_t i = 0; i < of.ranges.size(); ++i) {
-      if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) with_samples[i] = 0;
+  if (visible.labels) {
+    const std::vector<std::uint8_t> cells =
+        VisibleCells(labels->numbers->cells, [&](float low, float high) { return labels->matter.AnyBetween(low, high); });
+    const std::vector<std::uint8_t> in_cells = CellsThatShow(piece, *labels->numbers, labels->map, cells);
+    for (std::size_t i = 0; i < in_cells.size(); ++i) {
+      if (in_cells[i] != 0) with_samples[i] = 0;
     }
-  };
-  if (visible.labels) add(layers->label_cells, *visible.labels);
+  }
   std::vector<std::uint16_t> shown;
   if (!fields.empty()) {
     shown = fields.ShownIn(piece);
@@ -88,47 +99,19 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
   return result;
 }
 
-// The layers that a frame shows of a padded box.
-struct ShownLayers {
-  const std::vector<LayerPiece>* pieces = nullptr;  // null: none
-  std::optional<LabelTables> labels;
-
-  // Of a piece. nullopt: none is shown.
-  std::optional<RayLayers> Of(std::size_t number) const {
-    if (pieces == nullptr) return std::nullopt;
-    const LayerPiece& piece = (*pieces)[number];
-    RayLayers layers;
-    if (labels) {
-      layers.labels = &*labels;
-      layers.label_type = piece.labels.type;
-      layers.label_samples = piece.labels.samples.get();
-    }
-    return layers;
-  }
-};
-
-ShownLayers LayersOf(BoxData& data, std::span<const RayPiece> pieces, const FrameSetup& setup, double steps_per_voxel) {
-  ShownLayers shown;
-  const LayerLooks& looks = setup.looks;
-  if (!looks.any()) return shown;
-  shown.pieces = &data.CacheOf<LayerVolume>().PiecesOf(data, pieces, looks);
-  if (looks.labels) shown.labels = MakeLabelTables(*looks.labels, steps_per_voxel, setup.transfer.opacity_distance);
-  return shown;
-}
-
 // The visible parts of a padded box, kept until other values are visible.
 class VisibilityCache : public BoxCache {
  public:
   // By piece.
-  const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
-                                    const ShownLayers& shown, const FrameFields& fields, OctantSet octants) {
+  const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const RayLabels* labels,
+                                    const FrameFields& fields, OctantSet octants) {
     VisibleValues visible{.volume = VisibleSamples(look), .fields = fields.visible()};
-    if (looks.labels && looks.labels->mode == LabelMode::kSurface) visible.labels.emplace(*looks.labels);
+    if (labels != nullptr && labels->tables.surface) visible.labels = {labels->matter, labels->numbers->voxels.samples, labels->map};
     if (pieces_.empty() || visible_ != visible) {
       visible_ = std::move(visible);
       pieces_.clear();
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i], fields));
+        pieces_.push_back(VisibilityOf(pieces[i], *visible_, labels, fields));
       }
     }
     for (Visibility& piece : pieces_) {
@@ -189,12 +172,14 @@ class RaycastRenderer : public Renderer {
     RayLook look = MakeRayLook(classification, setup.transfer, setup.description, setup.camera, setup.shading,
                                samples_per_voxel / setup.weight, GeometryOf(setup, at.level).spacing);
     look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
-    const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
+    const Result<std::optional<RayLabels>> labels = LabelsFor(data, at, setup, samples_per_voxel);
+    if (!labels.ok()) return labels.status();
+    const RayLabels* const shown_labels = *labels ? &**labels : nullptr;
     const Result<FrameFields> fields = FrameFields::Make(data, at, setup, samples_per_voxel);
     if (!fields.ok()) return fields.status();
     const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
                                    setup.clip, setup.parameters.at(1));
-    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown, *fields, OctantsOf(rays));
+    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, shown_labels, *fields, OctantsOf(rays));
     clock.Charge(Stage::kPrepare);
 
     std::optional<FrameLight::View> light;
@@ -202,17 +187,12 @@ class RaycastRenderer : public Renderer {
     const RayEnds ends(setup.termination);
     std::atomic<std::uint64_t> shaded = 0;
     std::vector<std::vector<RayField>> fields_of_pieces;
-    for (const RayPiece& piece : pieces) fields_of_pieces.push_back(fields->Of(piece));
+    for (const RayPiece& piece : pieces) fields_of_pieces.push_back(fields->Of(piece, look));
     PerThread<std::vector<GradientBricks>> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
-          std::optional<RayLayers> layers = shown.Of(piece);
           const RayFields ray_fields = {fields_of_pieces[piece], visible[piece].shown.data(), setup.flat};
-          if (!fields->empty()) {
-            if (!layers) layers.emplace();
-            layers->fields = &ray_fields;
-          }
           const MarchWork work = {.rays = &rays,
                                   .box = &ray_box,
                                   .look = &look,
@@ -220,9 +200,10 @@ class RaycastRenderer : public Renderer {
                                   .to_surfaces = visible[piece].to_surfaces ? &*visible[piece].to_surfaces : nullptr,
                                   .surface_cells = visible[piece].surface_cells.data(),
                                   .termination = ends[steps],
-                                  .layers = layers ? &*layers : nullptr,
+                                  .labels = shown_labels,
+                                  .fields = fields->empty() ? nullptr : &ray_fields,
                                   .light = light ? &*light : nullptr};
-          std::vector<GradientBricks>& of_thread = bricks.Mine([&] { return std::vector<GradientBricks>(1 + ray_fields.fields.size()); });
+          std::vector<GradientBricks>& of_thread = bricks.Mine([&] { return std::vector<GradientBricks>(ray_fields.fields.size()); });
           shaded += MarchTile(work, tile, of_thread, rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));

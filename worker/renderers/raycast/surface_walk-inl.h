@@ -376,7 +376,7 @@ class SurfaceWalk {
       for (std::size_t i = 0; i < kMostKept; ++i) queue_[i].Become(hn::And(found, hn::Eq(kept_, Set(float(i)))), crossing);
       kept_ = hn::Add(kept_, hn::IfThenElseZero(found, Set(1)));
       // A ray ends at the latest where the surfaces alone let too little through. Labels may change their opacity.
-      if (work_.layers == nullptr) {
+      if (work_.labels == nullptr) {
         const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)));
         transmitted_ = hn::Sub(transmitted_, hn::IfThenElseZero(found, hn::Mul(transmitted_, opacity)));
       }

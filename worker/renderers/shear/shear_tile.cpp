@@ -187,7 +187,7 @@ std::uint64_t ShearAny(const ShearWork& work, const TilePixels& tile, TileRoom& 
   switch (work.voxels->type) {
     case ScalarType::kUint8: return TilePasses<std::uint8_t>(work, tile, room).Run();
     case ScalarType::kUint16: return TilePasses<std::uint16_t>(work, tile, room).Run();
-    case ScalarType::kFloat32: break;
+    default: break;
   }
   return TilePasses<float>(work, tile, room).Run();
 }

@@ -38,11 +38,11 @@ class SliceRenderer : public Renderer {
   Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     const Box& box = at.box;
-    if (data.layers().cells == nullptr) {
+    if (data.cells() == nullptr) {
       return Status::InvalidArgument("renderer slice draws the cells of unstructured grids, but the dataset has none");
     }
     StageClock clock(report);
-    const Mesh& mesh = *data.layers().cells;
+    const Mesh& mesh = *data.cells();
     const double planes_per_voxel = setup.parameters.at(0);
     const VolumeGeometry& geometry = setup.description.geometry;
     ClassificationTable table = data.Classification(setup);

@@ -128,7 +128,7 @@ void CutFaces::DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns co
         const std::int32_t n = candidates[i], x = begin + n;
         const Index3 voxel = voxel_at(std::size_t(n));
         const auto sample = double(samples[voxels_.Offset(voxel)]);
-        const std::uint16_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
+        const std::uint32_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
         const LabelUse use = labels_ != nullptr ? labels_->uses[label] : LabelUse::kAsVolume;
         if (use == LabelUse::kClear) continue;
         std::uint16_t bin = 0;
@@ -142,7 +142,7 @@ void CutFaces::DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns co
                                               std::uint32_t(bricks_.x), std::uint32_t(bricks_.y));
         const std::size_t side = keep_ ? rays_.SideEntered(x, y) : rays_.SideLeft(x, y);
         keys[n] = std::uint64_t{std::bit_cast<std::uint32_t>(depth)} << 32 | (kFirstCut + cuts.size());
-        cuts.push_back({x, y, depth, index, bin, label, std::uint16_t(side)});
+        cuts.push_back({x, y, depth, index, label, bin, std::uint16_t(side)});
       }
     }
   });

@@ -28,7 +28,8 @@ struct CutPixel {
   std::int32_t x = 0, y = 0;
   float depth = 0;
   std::uint32_t voxel = 0;  // FaceIndex
-  std::uint16_t bin = 0, label = 0;
+  std::uint32_t label = 0;
+  std::uint16_t bin = 0;
   std::uint16_t side = 0;  // the side of the clip region
 };
 

@@ -1,23 +1,44 @@
 #include "worker/renderers/zbuffer/shown_labels.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "common/parallel/parallel.h"
+#include "common/volume/affine_map.h"
 
 namespace slabstream {
 namespace {
 
-template <class T>
-std::uint32_t SampleOf(const BrickedVoxels& voxels, const Index3& voxel) {
-  const BrickView<T> brick = voxels.View<T>(voxel / kBrick);
-  return brick.Row(voxel.y, voxel.z)[voxel.x - brick.begin.x];
+// Numbers of the labels nearest to the voxels of `box`.
+VoxelBlock NearestOn(const Box& box, const PaddedVoxels& labels, const AffineMap& map) {
+  VoxelBlock numbers = MakeVoxelBlock(box, ScalarType::kUint32);
+  VisitLabelType(labels.type, [&]<class T>(const T*) {
+    ParallelFor(box.begin.z, box.end.z, [&](std::int32_t z) {
+      std::uint32_t* to = numbers.samples<std::uint32_t>() + numbers.Offset({box.begin.x, box.begin.y, z});
+      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
+        for (std::int32_t x = box.begin.x; x < box.end.x; ++x, ++to) {
+          const Vec3 p = map.To({double(x), double(y), double(z)});
+          const Index3 voxel = {std::int32_t(std::floor(p.x + 0.5)), std::int32_t(std::floor(p.y + 0.5)),
+                                std::int32_t(std::floor(p.z + 0.5))};
+          if (labels.box.Contains(voxel)) *to = std::uint32_t(*reinterpret_cast<const T*>(labels.At(voxel)));
+        }
+      }
+    });
+  });
+  return numbers;
+}
+
+std::vector<float> ColorsOf(const LabelLook& look, const std::vector<LabelStyle>& styles) {
+  std::vector<float> colors;
+  colors.reserve(4 * styles.size());
+  for (const LabelStyle& style : styles) {
+    const float share = !style.shown ? 0 : look.mode == LabelMode::kTint ? float(look.tint) : 1;
+    colors.insert(colors.end(), {share * style.color.r, share * style.color.g, share * style.color.b, share});
+  }
+  return colors;
 }
 
 }  // namespace
-
-std::uint16_t ShownLabels::NumberOf(const Index3& voxel) const {
-  const std::uint32_t number =
-      numbers->type() == ScalarType::kUint8 ? SampleOf<std::uint8_t>(*numbers, voxel) : SampleOf<std::uint16_t>(*numbers, voxel);
-  return std::uint16_t(std::min(number, std::uint32_t(uses.size() - 1)));
-}
 
 bool ShownLabels::AnyOpaqueBetween(float low, float high) const {
   if (!(low <= high)) return false;
@@ -25,13 +46,38 @@ bool ShownLabels::AnyOpaqueBetween(float low, float high) const {
   return std::find(at(low), at(high) + 1, LabelUse::kOpaque) != at(high) + 1;
 }
 
-std::vector<float> LabelColors(const LabelLook& look) {
-  std::vector<float> colors(4);
-  for (const LabelLook::Entry& entry : look.entries) {
-    const float share = !entry.shown ? 0 : look.mode == LabelMode::kTint ? float(look.tint) : 1;
-    colors.insert(colors.end(), {share * entry.color.r, share * entry.color.g, share * entry.color.b, share});
+Result<const ShownLabels*> LabelsOfBox::Of(const BoxData& data, const FrameSetup& setup, bool& changed) {
+  const FieldSetup* const field = slabstream::LabelsOf(setup);
+  BoxData* const box = field == nullptr ? nullptr : data.fields().back();
+  if (box == nullptr) {
+    changed = shown_.has_value();
+    shown_.reset();
+    return nullptr;
   }
-  return colors;
+  auto& volume = box->CacheOf<LabelVolume>();
+  const Result<const NumberedLabels*> numbered = volume.Of(*box);
+  if (!numbered.ok()) return numbered.status();
+  const PaddedVoxels& labels = (*numbered)->numbers.voxels;
+  const std::weak_ptr<std::byte[]> from = labels.samples;
+  changed = !shown_ || from.owner_before(found_from_) || found_from_.owner_before(from);
+  if (changed) {
+    VoxelBlock numbers = NearestOn(data.bricks().box(), labels, MapTo(setup, *field, 0));
+    BrickRanges ranges{VoxelBricks(numbers)};
+    shown_.emplace(ShownLabels{std::move(numbers), std::move(ranges), {}, {}});
+    found_from_ = from;
+  }
+  const std::vector<LabelStyle>& styles = volume.StylesOf(*field->labels);
+  std::vector<LabelUse> uses;
+  uses.reserve(styles.size());
+  for (const LabelStyle& style : styles) uses.push_back(UseOf(field->labels->mode, style));
+  changed = changed || uses != shown_->uses;
+  shown_->uses = std::move(uses);
+  shown_->colors = ColorsOf(*field->labels, styles);
+  return &*shown_;
+}
+
+std::size_t LabelsOfBox::bytes() const {
+  return !shown_ ? 0 : shown_->numbers.bytes.capacity() + shown_->ranges.bytes() + shown_->uses.capacity() + 4 * shown_->colors.capacity();
 }
 
 }  // namespace slabstream

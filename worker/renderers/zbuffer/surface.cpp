@@ -22,7 +22,7 @@ struct BrickFaces {
   SurfaceBrick brick;
   std::vector<FaceSite> sites;
   std::vector<FaceNormals> normals;
-  std::vector<std::uint16_t> labels;
+  std::vector<std::uint32_t> labels;
 };
 
 // The packed normals at the vertices of a brick, made where they are asked for.
@@ -156,7 +156,7 @@ class BrickSurface {
   void AddFace(const Index3& local, int side) {
     const Index3 voxel = {origin_.x + local.x, origin_.y + local.y, origin_.z + local.z};
     const T sample = voxels_.samples<T>()[voxels_.Offset(voxel)];
-    const std::uint16_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
+    const std::uint32_t label = labels_ != nullptr ? labels_->NumberOf(voxel) : 0;
     const bool of_label = labels_ != nullptr && labels_->uses[label] == LabelUse::kOpaque;
     const std::uint16_t bin = of_label ? 0 : lookup_(sample);  // colours of labels hide those of bins
     faces_.sites.push_back({std::uint16_t(voxel.x), std::uint16_t(voxel.y), std::uint16_t(voxel.z), std::uint16_t(bin | side << kBinBits)});
@@ -207,7 +207,7 @@ struct FoundFaces {
   SurfaceBrick brick;  // numbers faces of the arrays
   const FaceSite* sites = nullptr;
   const FaceNormals* normals = nullptr;
-  const std::uint16_t* labels = nullptr;
+  const std::uint32_t* labels = nullptr;
 };
 
 // The faces of `part` of the brick at `origin`. False: no known box holds just this part of it.
@@ -252,7 +252,7 @@ Surface Join(std::span<const FoundFaces> parts, bool labelled) {
 
 std::size_t Surface::bytes() const {
   return bricks.capacity() * sizeof(SurfaceBrick) + sites.capacity() * sizeof(FaceSite) + normals.capacity() * sizeof(FaceNormals) +
-         labels.capacity() * sizeof(std::uint16_t);
+         labels.capacity() * sizeof(std::uint32_t);
 }
 
 Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const Vec3& spacing, const Box& box,
@@ -269,7 +269,7 @@ Surface FindSurface(const VoxelBlock& voxels, const OpaqueVoxels& opaque, const 
       const BrickRanges::Range& range = opaque.ranges.Of(brick);
       if (lookup.AnyBetween(range.min, range.max)) return true;
       if (opaque.labels == nullptr) return false;
-      const BrickRanges::Range& numbers = opaque.label_ranges->Of(brick);
+      const BrickRanges::Range& numbers = opaque.labels->ranges.Of(brick);
       return opaque.labels->AnyOpaqueBetween(numbers.min, numbers.max);
     };
     ForEachRowOfBricks(bricks, [&](Index3 brick) {

@@ -1,5 +1,5 @@
 // Surface: the faces that the Z-buffer draws of a box, made once for a transfer function: the faces of its opaque voxels without an opaque
-// neighbour, with bins and the normals at their corners. 24 bytes a face, 26 with labels. Faces are grouped by bricks, so that a frame
+// neighbour, with bins and the normals at their corners. 24 bytes a face, 28 with labels. Faces are grouped by bricks, so that a frame
 // places, culls and sorts a few bricks instead of many faces, and draws only the sides that face the eye.
 #pragma once
 
@@ -29,7 +29,7 @@ struct Surface {
   std::vector<SurfaceBrick> bricks;    // x fastest
   AlignedVector<FaceSite> sites;       // by face, in the order of FaceIndex; then kSitesReadAhead more that are no faces
   AlignedVector<FaceNormals> normals;  // by face
-  std::vector<std::uint16_t> labels;   // by face: the number of its voxel's label, and one more; empty if labels are not shown
+  std::vector<std::uint32_t> labels;   // by face: the number of its voxel's label, and one more; empty if labels are not shown
 
   Box opaque_hull;  // outside it no voxel of the box is opaque; whole bricks, so it may be too large
 
@@ -45,10 +45,9 @@ struct KnownSurface {
 // Which voxels are opaque.
 struct OpaqueVoxels {
   const ClassificationTable& table;
-  const BinSelection& bins;                   // opaque ones
-  const BrickRanges& ranges;                  // ranges of the voxels
-  const ShownLabels* labels = nullptr;        // null: not shown
-  const BrickRanges* label_ranges = nullptr;  // if they are
+  const BinSelection& bins;             // opaque ones
+  const BrickRanges& ranges;            // ranges of the voxels
+  const ShownLabels* labels = nullptr;  // null: not shown
 };
 
 // Looks up neighbours in all of `voxels`, including the halo (of at least 2 voxels); outside the volume nothing is opaque. A brick's faces

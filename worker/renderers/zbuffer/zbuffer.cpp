@@ -173,7 +173,9 @@ class ZBufferRenderer : public Renderer {
     StageClock clock(report);
     const ClassificationTable& table = data.Classification(setup);
     auto& cache = data.CacheOf<SurfaceCache>();
-    const Surface& surface = cache.Of(data, setup, box);
+    const Result<const Surface*> found = cache.Of(data, setup, box);
+    if (!found.ok()) return found.status();
+    const Surface& surface = **found;
     std::optional<CutFaces> cuts;
     // Cuts lie in opaque voxels; without these there are no faces either.
     if (!setup.clip.empty() && !surface.opaque_hull.empty()) {
@@ -195,11 +197,9 @@ class ZBufferRenderer : public Renderer {
     colors.reserve(4 * table.color.size());
     for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
     shading.colors = colors.data();
-    std::vector<float> label_colors;
-    if (setup.looks.labels) {
-      label_colors = LabelColors(*setup.looks.labels);
+    if (const ShownLabels* const labels = cache.labels()) {
       shading.labels = surface.labels.data();
-      shading.label_colors = label_colors.data();
+      shading.label_colors = labels->colors.data();
     }
     clock.Charge(Stage::kZBuffer);
 

@@ -29,6 +29,7 @@ struct Scene {
   void Show(Volume field, FieldLook look) {
     look.range = Summarize(field).range;
     setup.fields.push_back({.levels = {{DatasetId(2 + fields.size()), field.description, {}}}, .of_volume = {0}, .look = std::move(look)});
+    if (setup.light) setup.fields.back().light = NewLightVolume(field.description);
     fields.push_back(std::move(field));
   }
 };
@@ -47,6 +48,7 @@ struct Boxes {
       all.push_back(fields.back().get());
     }
     volume->SetFields(std::move(all));
+    volume->SetLight(LightOf(scene.volume, scene.setup, scene.fields));
   }
   std::unique_ptr<BoxData> volume;
   std::vector<std::unique_ptr<BoxData>> fields;
@@ -226,11 +228,88 @@ TEST(Fields, AddInAnyOrder) {
   }
 }
 
+// ---- shadows
+
+SetupOptions Shadowed(SetupOptions options) {
+  options.shading.shadows = 1;
+  options.shading.ambient_occlusion = 0.7F;
+  options.shading.lights = {{1, 0.4, 0.6}, {-0.2, 1, 0.3}};
+  return options;
+}
+
+// A volume with a floor, and a field with a slab above half of it. The slab is black, so that what is seen through it tells of the floor.
+TEST(Fields, CastShadowsOnEachOther) {
+  constexpr double kOpacity = 0.06;
+  const VolumeGeometry geometry = {{96, 64, 64}};
+  const auto floor = [](const Index3& v) { return v.z < 10 ? 100 : 0; };
+  const auto slab = [](const Index3& v) { return v.x < 48 && v.z >= 40 && v.z < 52 ? 100 : 0; };
+  SetupOptions options;
+  options.view = {.elevation_degrees = 20, .zoom = 1};
+  options.size = {160, 160};
+  options.shading = {.lights = {{0, 0, 1}}, .ambient = 0, .diffuse = 1, .specular = 0};
+  const auto rendered = [&](bool floor_is_volume, float shadows, const Vec3& point) {
+    options.transfer = floor_is_volume ? Uniform(1, {1, 1, 1}) : Uniform(kOpacity, {0, 0, 0});
+    options.shading.shadows = shadows;
+    Scene scene = MakeScene(floor_is_volume ? MakeVolume(geometry, ScalarType::kUint8, floor)  //
+                                            : MakeVolume(geometry, ScalarType::kUint8, slab),
+                            options);
+    if (floor_is_volume) {
+      scene.Show(MakeVolume(geometry, ScalarType::kUint8, slab), {.transfer = Uniform(kOpacity, {0, 0, 0})});
+    } else {
+      scene.Show(MakeVolume(geometry, ScalarType::kUint8, floor), {.transfer = Uniform(1, {1, 1, 1})});
+    }
+    const auto at = scene.setup.camera.Project(point);
+    return double(PixelOf(Rendered(scene), int(at.x), int(at.y))[0]);
+  };
+  for (const bool floor_is_volume : {true, false}) {
+    const auto ratio_at = [&](const Vec3& point) {
+      const double lit = rendered(floor_is_volume, 0, point);
+      EXPECT_GT(lit, 0.3);
+      return rendered(floor_is_volume, 1, point) / lit;
+    };
+    // Values from 1 on have the opacity, so the interpolated slab is nearly a voxel longer.
+    EXPECT_NEAR(ratio_at({24, 20, 9.5}), std::pow(1 - kOpacity, 12.99), 0.02) << floor_is_volume;
+    EXPECT_NEAR(ratio_at({72, 20, 9.5}), 1, 0.01) << "beside the slab";
+  }
+}
+
+TEST(Fields, CastTheSameShadowsInAnyOrder) {
+  SetupOptions options = Shadowed({});
+  options.view.azimuth_degrees = 40;
+  const Volume a = MakeBlobs(kGeometry, ScalarType::kUint8, 1), b = MakeBlobs(kGeometry, ScalarType::kUint16, 2);
+  TransferFunction of_a = Ramp(0.2), of_b = Ramp(0.4);
+  of_b.colors = {{0, {0.5, 0.5, 1}}, {200, {1, 0.3F, 0}}};
+  const auto rendered = [&](const Volume& volume, const TransferFunction& transfer, const Volume& field, const TransferFunction& other) {
+    options.transfer = transfer;
+    Scene scene = MakeScene(volume, options);
+    scene.setup.weight = &volume == &a ? 0.6 : 0.9;
+    scene.Show(field, {.transfer = other, .range = {}, .weight = &volume == &a ? 0.9 : 0.6});
+    return Rendered(scene);
+  };
+  const LocalImage expected = rendered(a, of_a, b, of_b);
+  EXPECT_LT(LargestDifference(rendered(b, of_b, a, of_a), expected), 1e-5F);
+  options.shading.shadows = options.shading.ambient_occlusion = 0;
+  EXPECT_GT(LargestDifference(rendered(a, of_a, b, of_b), expected), 0.1F);
+}
+
+TEST(Fields, CastNoShadowIfTheyAreHidden) {
+  const Volume volume = MakeBlobs(kGeometry, ScalarType::kUint8, 1), field = MakeBlobs(kGeometry, ScalarType::kUint8, 2);
+  SetupOptions options = Shadowed({});
+  options.transfer = Ramp(0.3);
+  Scene scene = MakeScene(volume, options), other = MakeScene(field, options);
+  const LocalImage alone = Rendered(scene), other_alone = Rendered(other);
+  scene.Show(field, {.transfer = Ramp(0.3), .range = {}, .weight = 0});
+  EXPECT_LT(LargestDifference(Rendered(scene), alone), 1e-5F);
+  scene.setup.weight = 0;
+  scene.setup.fields[0].look.weight = 1;
+  EXPECT_LT(LargestDifference(Rendered(scene), other_alone), 1e-5F);
+}
+
 // ---- any fields, boxes and instruction set
 
 Vec3 Unit(const Vec3& v) { return (1 / std::sqrt(Dot(v, v))) * v; }
 
-Scene RandomScene(unsigned seed, int i) {
+Scene RandomScene(unsigned seed, int i, bool shadows = false) {
   std::mt19937 random(seed + unsigned(i));
   const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   const auto number = [&](int least, int most) { return std::uniform_int_distribution<int>(least, most)(random); };
@@ -244,6 +323,7 @@ Scene RandomScene(unsigned seed, int i) {
   if (i % 7 == 3) options.shading.model = ShadingModel::kNone;
   if (i % 3 == 1) options.shading.lights = {{1, 2, 3}, {-1, 0.3, -0.2}};
   options.size = {45, 38};
+  if (shadows) options = Shadowed(std::move(options));
   Scene scene = MakeScene(MakeBlobs(geometry, ScalarType(1 + i % 3), unsigned(i)), options, i % 4 == 1 ? 2.5 : 1);
   scene.setup.weight = uniform(0.3, 1);
   scene.setup.flat = i % 6 == 5;
@@ -281,6 +361,20 @@ TEST(Fields, DoNotDependOnBoxes) {
   }
 }
 
+TEST(Fields, CastShadowsThatDoNotDependOnBoxes) {
+  constexpr unsigned kSeed = 331;
+  std::mt19937 random(kSeed);
+  for (int i = 0; i < 6; ++i) {
+    const Scene scene = RandomScene(kSeed, i, true);
+    const LocalImage one = Rendered(scene);
+    for (const int boxes : {3, 8}) {
+      const Partition partition = CutAtRandom(scene.volume.description.geometry.bounds(), boxes, random);
+      const LocalImage frame = CombinedBoxes(scene.setup, partition, [&](const Box& box) { return Rendered(scene, box); });
+      EXPECT_LE(LargestDifference(frame, one), 5e-6F) << "case " << i << ", " << boxes << " boxes, seed " << kSeed;
+    }
+  }
+}
+
 // Twice as far from it as one field: covering takes two powers a sample.
 TEST(Fields, AgreeWithTheReference) {
   constexpr unsigned kSeed = 57;
@@ -301,9 +395,8 @@ TEST(Fields, AgreeWithTheReference) {
     const std::vector<std::uint16_t> all_shown(piece.cells.ranges.size() + 1, 0xFFFF);
     const Result<FrameFields> shown = FrameFields::Make(*boxes.volume, whole, setup, rate);
     ASSERT_TRUE(shown.ok());
-    const std::vector<RayField> ray_fields = shown->Of(piece);
+    const std::vector<RayField> ray_fields = shown->Of(piece, look);
     const RayFields fields = {ray_fields, all_shown.data(), setup.flat};
-    const RayLayers layers = {.fields = &fields};
     const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, WholeBox(whole), WholeBox(whole), rays, setup.camera);
     const MarchWork work = {.rays = &rays,
                             .box = &box,
@@ -311,7 +404,7 @@ TEST(Fields, AgreeWithTheReference) {
                             .to_samples = &everywhere,
                             .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
                             .surface_cells = surface_cells.data(),
-                            .layers = &layers};
+                            .fields = &fields};
     const PixelBounds all = {0, 0, setup.camera.width, setup.camera.height};
     const auto marched = [&](auto&& marcher) {
       LocalImage image = MakeLocalImage(PixelFormat::kRgba, all);
@@ -319,7 +412,7 @@ TEST(Fields, AgreeWithTheReference) {
       return image;
     };
     const LocalImage expected = marched(MarchTileReference);
-    std::vector<GradientBricks> bricks(1 + ray_fields.size());
+    std::vector<GradientBricks> bricks(ray_fields.size());
     const auto march = [&](const MarchWork& of, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
       return MarchTile(of, tile, bricks, rgba, floats_a_row);
     };

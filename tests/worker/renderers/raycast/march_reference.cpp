@@ -150,11 +150,11 @@ class ReferenceMarch {
       const Crossing& crossing = crossings.front();
       const float* const rgba = &look_.surface_looks[4 * crossing.surface];
       Part surface = {.opacity = double(rgba[3]), .color = {double(rgba[0]), double(rgba[1]), double(rgba[2])}};
-      if (ShowsLabels()) {
-        const std::int32_t label = LabelAt(crossing.position);
-        const float* const entry = &work_.layers->labels->entries[4 * std::size_t(label)];
+      if (work_.labels != nullptr) {
+        const LabelTables& tables = work_.labels->tables;
+        const float* const entry = &tables.entries[4 * std::size_t(LabelAt(AmongLabels(crossing.position)))];
         if (entry[3] >= 0) {
-          surface.opacity *= work_.layers->labels->surface ? 0 : double(entry[3]);
+          surface.opacity *= tables.surface ? 0 : double(entry[3]);
           Tint(entry, surface);
         }
       }
@@ -205,8 +205,8 @@ class ReferenceMarch {
     if (!look_.gradient_factors.empty()) {
       volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(gradient), double(look_.step_exponent));
     }
-    if (ShowsLabels()) AddLabel(p, volume, gradient);
-    if (work_.layers != nullptr && work_.layers->fields != nullptr) {
+    if (work_.labels != nullptr) AddLabel(p, volume, gradient);
+    if (work_.fields != nullptr) {
       Light(face != nullptr ? *face : gradient, volume);
       return AddMixed(ray, k, steps, face, volume, sum);
     }
@@ -221,7 +221,7 @@ class ReferenceMarch {
     double weight = volume.opacity, transmittance = 1 - volume.opacity;
     std::array<double, 3> color{};
     for (std::size_t c = 0; c < 3; ++c) color.at(c) = volume.opacity * volume.color.at(c);
-    for (const RayField& field : work_.layers->fields->fields) {
+    for (const RayField& field : work_.fields->fields.subspan(1)) {
       const auto by = [](const std::array<Float3, 3>& columns, const Float3& v) {
         Float3 sum_of{};
         for (std::size_t i = 0; i < 3; ++i) sum_of.at(i) = v[0] * columns[0].at(i) + v[1] * columns[1].at(i) + v[2] * columns[2].at(i);
@@ -248,7 +248,7 @@ class ReferenceMarch {
       transmittance *= 1 - opacity;
     }
     if (!(weight > 0)) return;
-    for (double& of : color) of /= work_.layers->fields->flat ? 1 - transmittance : weight;
+    for (double& of : color) of /= work_.fields->flat ? 1 - transmittance : weight;
     Blend(color, 1 - std::pow(transmittance, steps), sum);
   }
 
@@ -259,14 +259,25 @@ class ReferenceMarch {
     sum[3] += float(weight);
   }
 
-  bool ShowsLabels() const { return work_.layers != nullptr && work_.layers->labels != nullptr; }
-  std::int32_t LabelOf(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    const std::int64_t index = IndexOf(x, y, z);
-    return work_.layers->label_type == ScalarType::kUint8 ? reinterpret_cast<const std::uint8_t*>(work_.layers->label_samples)[index]
-                                                          : reinterpret_cast<const std::uint16_t*>(work_.layers->label_samples)[index];
+  // A position of the volume, on the grid of the labels. To the same bit as kernels: half-way between two voxels a bit decides.
+  Float3 AmongLabels(const Float3& p) const {
+    const RayLabels& labels = *work_.labels;
+    Float3 there{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      there.at(i) = labels.offset[i] + p[0] * labels.steps[0][i] + p[1] * labels.steps[1][i] + p[2] * labels.steps[2][i];
+    }
+    return there;
   }
-  // Of the nearest voxel.
-  std::int32_t LabelAt(const Float3& p) const {
+  // The number of a voxel of the labels.
+  std::uint32_t LabelOf(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const RayBox& voxels = work_.labels->voxels;
+    const std::int64_t index = std::int64_t{voxels.slice} * (z - voxels.origin.z + 1) +
+                               std::int64_t{voxels.row} * (y - voxels.origin.y + 1) + (x - voxels.origin.x + 1);
+    return VisitLabelType(voxels.type, [&]<class L>(const L*) { return std::uint32_t(reinterpret_cast<const L*>(voxels.samples)[index]); });
+  }
+  // Of the voxel nearest to a position on the grid of the labels; 0 outside of it.
+  std::uint32_t LabelAt(const Float3& p) const {
+    if (!Inside(p, work_.labels->low, work_.labels->high)) return 0;
     const auto nearest = [&](std::size_t i) {
       const float floor = std::floor(p.at(i));
       return std::int32_t(floor) + (p.at(i) - floor >= 0.5F ? 1 : 0);
@@ -275,17 +286,18 @@ class ReferenceMarch {
   }
 
   void Tint(const float* entry, Part& volume) const {
-    for (std::size_t c = 0; c < 3; ++c) volume.color.at(c) += double(work_.layers->labels->tint) * (double(entry[c]) - volume.color.at(c));
+    for (std::size_t c = 0; c < 3; ++c) volume.color.at(c) += double(work_.labels->tables.tint) * (double(entry[c]) - volume.color.at(c));
   }
 
   void AddLabel(const Float3& p, Part& volume, Float3& gradient) const {
-    const LabelTables& tables = *work_.layers->labels;
-    const std::int32_t label = LabelAt(p);
+    const LabelTables& tables = work_.labels->tables;
+    const Float3 there = AmongLabels(p);
+    const std::uint32_t label = LabelAt(there);
     const float* const entry = &tables.entries[4 * std::size_t(label)];
     if (entry[3] < 0) return;
     if (tables.surface) {
       volume = PartOf(entry);
-      gradient = IndicatorGradient(p, label);
+      gradient = IndicatorGradient(there, label);
       return;
     }
     const double steps = double(tables.steps_a_length), of_length = 1 - std::pow(1 - volume.opacity, steps);
@@ -303,7 +315,8 @@ class ReferenceMarch {
     return v < 0 ? -slope : slope;
   }
 
-  Float3 IndicatorGradient(const Float3& p, std::int32_t label) const {
+  // `p`: on the grid of the labels. The gradient is along the volume's axes.
+  Float3 IndicatorGradient(const Float3& p, std::uint32_t label) const {
     const std::array<std::int32_t, 3> first = {std::int32_t(std::floor(p[0])) - 1, std::int32_t(std::floor(p[1])) - 1,
                                                std::int32_t(std::floor(p[2])) - 1};
     std::array<double, 3> gradient{};
@@ -319,7 +332,12 @@ class ReferenceMarch {
       }
     }
     const double square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
-    return square > 1e-4 ? Float3{float(gradient[0]), float(gradient[1]), float(gradient[2])} : Float3{};
+    Float3 of_volume{};
+    if (!(square > 1e-4)) return of_volume;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 3; ++i) of_volume.at(axis) += float(gradient.at(i)) * work_.labels->steps.at(axis).at(i);
+    }
+    return of_volume;
   }
 
   // Lights the colour of a part.

@@ -206,7 +206,7 @@ struct RandomFaces {
       normals.push_back(corners);
     }
     for (int i = 0; i < 4 * 16; ++i) colors.push_back(uniform(random));
-    for (int face = 0; face < 200; ++face) labels.push_back(std::uint16_t(random() % 8));
+    for (int face = 0; face < 200; ++face) labels.push_back(std::uint32_t(random() % 8));
     for (int i = 0; i < 4 * 8; ++i) label_colors.push_back(uniform(random) / 2);
     for (int i = 0; i < 100; ++i) {
       const float depth = random() % 3 == 0 ? std::numeric_limits<float>::infinity() : 60 + 60 * uniform(random);
@@ -228,7 +228,7 @@ struct RandomFaces {
   std::vector<FaceSite> sites;
   std::vector<FaceNormals> normals;
   std::vector<float> colors, label_colors;
-  std::vector<std::uint16_t> labels;
+  std::vector<std::uint32_t> labels;
   bool with_labels = false;
   std::vector<std::uint64_t> keys;
 };
