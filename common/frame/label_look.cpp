@@ -27,12 +27,11 @@ LabelStyle StyleOf(const LabelLook& look, std::uint64_t value) {
 }
 
 bool MayBeMatter(const LabelLook& look, const ValueRange& values) {
-  if (look.mode != LabelMode::kSurface || !(values.min <= values.max)) return false;
+  if (look.mode != LabelMode::kSurface || !(values.min <= values.max) || values.max < 1) return false;
+  if (look.shown.empty()) return true;
   constexpr float kFarthest = std::numeric_limits<float>::max();
   // Whatever was rounded to these.
   const double low = std::nextafter(values.min, 0.0F), high = std::nextafter(values.max, kFarthest);
-  if (values.max < 1) return false;
-  if (look.shown.empty()) return true;
   const auto span = std::ranges::lower_bound(look.shown, low, {}, [](const LabelLook::Span& of) { return double(of.last); });
   return span != look.shown.end() && double(span->first) <= high;
 }

@@ -38,15 +38,16 @@ Status NoneNamed(const std::string& name, const LabelTable& table) {
 
 // The labels of a range, or those that have its name.
 Status AddShown(const LabelRange& range, const LabelTable& table, std::vector<LabelLook::Span>& shown) {
-  const auto covered = [&](const Label& label) { return Covers(range, label); };
   if (!range.name.empty()) {
+    const std::size_t before = shown.size();
     for (const Label& label : table.labels) {
-      if (covered(label)) shown.push_back({label.value, label.value});
+      if (Covers(range, label)) shown.push_back({label.value, label.value});
     }
-    return std::ranges::any_of(table.labels, covered) ? Status::Ok() : NoneNamed(range.name, table);
+    return shown.size() > before ? Status::Ok() : NoneNamed(range.name, table);
   }
   shown.push_back({range.first, range.last});
-  if (!table.complete || std::ranges::any_of(table.labels, covered)) return Status::Ok();
+  const auto label = std::ranges::lower_bound(table.labels, range.first, {}, &Label::value);  // of many ranges each is looked up
+  if (!table.complete || (label != table.labels.end() && label->value <= range.last)) return Status::Ok();
   return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
 }
 

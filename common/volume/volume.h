@@ -98,15 +98,7 @@ decltype(auto) VisitScalarType(ScalarType type, Function&& function) {
   }
   return function(static_cast<const float*>(nullptr));
 }
-// The same of labels, too, with const std::uint32_t* and const std::uint64_t*.
-template <class Function>
-decltype(auto) VisitStoredType(ScalarType type, Function&& function) {
-  if (type == ScalarType::kUint32) return function(static_cast<const std::uint32_t*>(nullptr));
-  if (type == ScalarType::kUint64) return function(static_cast<const std::uint64_t*>(nullptr));
-  return VisitScalarType(type, function);
-}
-
-// The same of labels alone: whole numbers.
+// The same of labels: const std::uint8_t* ... const std::uint64_t*.
 template <class Function>
 decltype(auto) VisitLabelType(ScalarType type, Function&& function) {
   switch (type) {
@@ -116,6 +108,13 @@ decltype(auto) VisitLabelType(ScalarType type, Function&& function) {
     default: break;
   }
   return function(static_cast<const std::uint64_t*>(nullptr));
+}
+
+// The same of any samples.
+template <class Function>
+decltype(auto) VisitStoredType(ScalarType type, Function&& function) {
+  if (type == ScalarType::kFloat32) return function(static_cast<const float*>(nullptr));
+  return VisitLabelType(type, function);
 }
 
 struct Mesh;  // common/mesh/mesh.h

@@ -33,7 +33,7 @@ struct MeasuredVolume {
 // Means of whole numbers are right to one rounding. InvalidArgument: the box cannot be laid into this volume. Pure; takes about a
 // nanosecond a voxel.
 Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& box);
-// The labels of a row of the volume's voxels, from `first` along x on; 0: none.
+// The labels of a row of the volume's voxels, from `first` along x on, all in one brick; 0: none.
 using ReadLabels = std::function<void(const Index3& first, std::span<std::uint64_t> labels)>;
 // The same of the voxels of each label, by label. ResourceExhausted: more than kMaxLabels labels have voxels in the box.
 Result<std::map<std::uint64_t, BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box,

@@ -306,7 +306,15 @@ ReadLabels LabelsBesideVolume(const AnswerQuestion& asked, const VoxelServer::Sa
   const VolumeGeometry &grid = asked.summary->description.geometry, &labels = asked.labels.summary->description.geometry;
   const AffineMap map = AffineMapBetween(grid, labels);
   const auto read = of.in_parts.source != nullptr ? std::make_shared<ReadVoxels>(of.in_parts) : nullptr;
-  return [map, read, &of, &status, bounds = labels.bounds()](const Index3& first, std::span<std::uint64_t> row) {
+  const bool same_voxels = map.is_identity() && grid.size == labels.size;
+  return [map, read, same_voxels, &of, &status, bounds = labels.bounds()](const Index3& first, std::span<std::uint64_t> row) {
+    if (read == nullptr && same_voxels) {
+      const VoxelBricks held = of.view();
+      return VisitLabelType(held.type(), [&]<class T>(const T*) {
+        const BrickView<T> brick = held.View<T>(first / kBrick);
+        std::ranges::copy_n(brick.Row(first.y, first.z) + (first.x - brick.begin.x), std::ptrdiff_t(row.size()), row.begin());
+      });
+    }
     for (std::size_t i = 0; i < row.size(); ++i) {
       const Index3 voxel = VoxelAt(map.To(ToVec3(first + Index3{std::int32_t(i), 0, 0})));
       row[i] = !bounds.Contains(voxel) ? 0 : read != nullptr ? read->LabelAt(voxel) : SampleOf<std::uint64_t>(of.view(), voxel);

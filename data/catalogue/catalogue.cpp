@@ -258,17 +258,24 @@ void WarnOfComponents(const SourceText& text, const SourceInfo& info) {
   if (info.components > 1) WarnOfPart(text.path, options, info);
 }
 
-// `colors`: of labels.
-Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const ColorTable& colors) {
+// What is known of labels: all of them are those of `whole`; null: nobody has read them. Null: the source has values.
+Result<std::shared_ptr<const LabelTable>> KnownLabels(const SourceText& text, const std::string& named_colors, const SourceInfo& info,
+                                                      const Volume* whole) {
+  if (!text.options.labels) return std::shared_ptr<const LabelTable>();
+  const Result<FoundColors> colors = ReadLabelColors(text.path, named_colors);
+  if (!colors.ok()) return colors.status();
+  return std::make_shared<const LabelTable>(
+      MakeLabelTable(whole == nullptr ? std::nullopt : ValuesOfLabels(*whole), colors->table, info.looks));
+}
+
+Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const std::string& label_colors) {
   Result<LoadedVolume> read = ReadVolume(source, text.path, text.options);
   if (!read.ok()) return read.status();
   if (!read->rounding.empty()) LogWarning(text.path + ": " + read->rounding);
   WarnOfComponents(text, read->info);
-  std::shared_ptr<const LabelTable> labels;
-  if (text.options.labels) {
-    labels = std::make_shared<const LabelTable>(MakeLabelTable(ValuesOfLabels(*read->volume), colors, read->info.looks));
-  }
-  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), std::move(labels), nullptr, std::move(read->exact)});
+  Result<std::shared_ptr<const LabelTable>> labels = KnownLabels(text, label_colors, read->info, read->volume.get());
+  if (!labels.ok()) return labels.status();
+  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(labels), nullptr, std::move(read->exact)});
 }
 
 // Other processes may run in other folders.
@@ -300,19 +307,21 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
   const bool is_large = info.levels.size() > 1 || info.finest().voxel_bytes() > most;
   const bool labels = text->options.labels;
-  Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
+  // Their files; they are read again, with the voxels, once their stamp is taken.
+  const Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
   if (!colors.ok()) return colors.status();
   way.files.insert(way.files.end(), colors->files.begin(), colors->files.end());
   if (info.whole || !is_large || (labels && info.slices)) {
-    way.read = [source, text = *std::move(text), table = std::move(colors->table)] { return ReadWhole(*source, text, table); };
+    way.read = [source, text = *std::move(text), named = data.label_colors] { return ReadWhole(*source, text, named); };
   } else if (info.slices) {
     way.read = [path = data.path, most_bytes, &progress] { return ReadStream(path, most_bytes, progress); };
   } else {
-    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, table = std::move(colors->table), &progress] {
+    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, named = data.label_colors,
+                &progress]() -> Result<ReadableSource> {
       WarnOfComponents(text, source->info());
-      std::shared_ptr<const LabelTable> known;
-      if (text.options.labels) known = std::make_shared<const LabelTable>(MakeLabelTable(std::nullopt, table, source->info().looks));
-      return Surveyed(source, place, FindIndex(source_text, source->info()), progress, known);
+      const Result<std::shared_ptr<const LabelTable>> known = KnownLabels(text, named, source->info(), nullptr);
+      if (!known.ok()) return known.status();
+      return Surveyed(source, place, FindIndex(source_text, source->info()), progress, *known);
     };
   }
   return way;

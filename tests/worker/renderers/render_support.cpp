@@ -214,7 +214,9 @@ FieldSetup& Scene::Add(Volume field) {
 
 void Scene::Show(Volume field, FieldLook look) {
   look.range = Summarize(field).range;
-  Add(std::move(field)).look = std::move(look);
+  FieldSetup& added = Add(std::move(field));
+  added.look = std::move(look);
+  if (setup.light) added.light = NewLightVolume(fields.back().description);
 }
 
 void Scene::Show(Volume labels, LabelLook look) { Add(std::move(labels)).labels = std::move(look); }
@@ -232,6 +234,7 @@ SceneBoxes::SceneBoxes(const Scene& scene, const Box& box) : volume(CutBox(scene
     all.push_back(fields.back().get());
   }
   volume->SetFields(std::move(all));
+  volume->SetLight(LightOf(scene.volume, scene.setup, scene.fields));
 }
 
 LocalImage Rendered(const Scene& scene, const Box& box) {

@@ -8,7 +8,7 @@
 #include "common/kernels/combine.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
-#include "tests/worker/renderers/raycast/march_reference.h"
+#include "tests/worker/renderers/raycast/scene_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/frame_fields.h"
@@ -20,46 +20,10 @@ using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): t
 
 const VolumeGeometry kGeometry = {{24, 20, 22}, {1, 1, 1}, {}};
 
-// Volumes of a picture: the frame's, and those of FrameSetup::fields.
-struct Scene {
-  Volume volume;
-  std::vector<Volume> fields;
-  FrameSetup setup;
-
-  void Show(Volume field, FieldLook look) {
-    look.range = Summarize(field).range;
-    setup.fields.push_back({.levels = {{DatasetId(2 + fields.size()), field.description, {}}}, .of_volume = {0}, .look = std::move(look)});
-    if (setup.light) setup.fields.back().light = NewLightVolume(field.description);
-    fields.push_back(std::move(field));
-  }
-};
 Scene MakeScene(Volume volume, SetupOptions options, double rate = 1) {
   FrameSetup setup = RaycastSetup(volume, std::move(options), rate);
   return {std::move(volume), {}, std::move(setup)};
 }
-
-// The voxels of a box and of the fields there.
-struct Boxes {
-  Boxes(const Scene& scene, const Box& box) : volume(CutBox(scene.volume, PaddedBox(box, scene.setup))) {
-    std::vector<BoxData*> all;
-    for (std::size_t i = 0; i < scene.fields.size(); ++i) {
-      const Box there = PaddedBox(box, scene.setup, scene.setup.fields[i]);
-      fields.push_back(there.empty() ? nullptr : CutBox(scene.fields[i], there));
-      all.push_back(fields.back().get());
-    }
-    volume->SetFields(std::move(all));
-    volume->SetLight(LightOf(scene.volume, scene.setup, scene.fields));
-  }
-  std::unique_ptr<BoxData> volume;
-  std::vector<std::unique_ptr<BoxData>> fields;
-};
-
-LocalImage Rendered(const Scene& scene, const Box& box) {
-  const Boxes boxes(scene, box);
-  RankReport report;
-  return MakeRenderer(*scene.setup.renderer)->Render(*boxes.volume, box, scene.setup, {}, RenderControl(), report).value();
-}
-LocalImage Rendered(const Scene& scene) { return Rendered(scene, scene.volume.description.geometry.bounds()); }
 
 SetupOptions Unlit(double opacity, Rgb color) {
   SetupOptions options;
@@ -379,45 +343,8 @@ TEST(Fields, CastShadowsThatDoNotDependOnBoxes) {
 TEST(Fields, AgreeWithTheReference) {
   constexpr unsigned kSeed = 57;
   for (int i = 0; i < 16; ++i) {
-    const Scene scene = RandomScene(kSeed, i);
-    const FrameSetup& setup = scene.setup;
-    const Box whole = scene.volume.block.box;
-    const double rate = setup.parameters[0];
-    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, rate, setup.clip);
-    const Boxes boxes(scene, whole);
-    const RayPiece& piece = boxes.volume->CacheOf<RayVolume>().PiecesOf(*boxes.volume).front();
-    const RayLook look = MakeRayLook(boxes.volume->Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading,
-                                     rate / setup.weight);
-    // Nothing is leapt over.
-    EmptyDistances everywhere(piece.cells.counts, std::vector<std::uint8_t>(piece.cells.ranges.size(), 0));
-    everywhere.Find((1U << kOctants) - 1);
-    const std::vector<std::int32_t> surface_cells(2 * piece.cells.ranges.size(), -1);
-    const std::vector<std::uint16_t> all_shown(piece.cells.ranges.size() + 1, 0xFFFF);
-    const Result<FrameFields> shown = FrameFields::Make(*boxes.volume, whole, setup, rate);
-    ASSERT_TRUE(shown.ok());
-    const std::vector<RayField> ray_fields = shown->Of(piece, look);
-    const RayFields fields = {ray_fields, all_shown.data(), setup.flat};
-    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, WholeBox(whole), WholeBox(whole), rays, setup.camera);
-    const MarchWork work = {.rays = &rays,
-                            .box = &box,
-                            .look = &look,
-                            .to_samples = &everywhere,
-                            .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
-                            .surface_cells = surface_cells.data(),
-                            .fields = &fields};
-    const PixelBounds all = {0, 0, setup.camera.width, setup.camera.height};
-    const auto marched = [&](auto&& marcher) {
-      LocalImage image = MakeLocalImage(PixelFormat::kRgba, all);
-      marcher(work, all, image.rgba.data(), 4 * std::size_t(all.width()));
-      return image;
-    };
-    const LocalImage expected = marched(MarchTileReference);
-    std::vector<GradientBricks> bricks(ray_fields.size());
-    const auto march = [&](const MarchWork& of, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-      return MarchTile(of, tile, bricks, rgba, floats_a_row);
-    };
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(marched(march), expected), 4e-5F) << "case " << i << ", seed " << kSeed; });
-    EXPECT_LE(LargestDifference(Rendered(scene), expected), 4e-5F) << "leaps change case " << i;
+    SCOPED_TRACE(::testing::Message() << "case " << i << ", seed " << kSeed);
+    ExpectAgreesWithReference(RandomScene(kSeed, i), 4e-5F);
   }
 }
 

@@ -13,7 +13,7 @@
 #include "tests/support/random_box.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
-#include "tests/worker/renderers/raycast/march_reference.h"
+#include "tests/worker/renderers/raycast/scene_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/frame_fields.h"
@@ -407,48 +407,8 @@ TEST(Labels, DoNotDependOnBoxes) {
 TEST(Labels, AgreeWithTheReference) {
   constexpr unsigned kSeed = 47;
   for (int i = 0; i < 24; ++i) {
-    const Scene scene = RandomScene(kSeed, i);
-    const FrameSetup& setup = scene.setup;
-    const Box whole = scene.volume.block.box;
-    const double rate = setup.parameters[0];
-    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, rate, setup.clip);
-    const SceneBoxes boxes(scene, whole);
-    const RayPiece& piece = boxes.volume->CacheOf<RayVolume>().PiecesOf(*boxes.volume).front();
-    const RayLook look =
-        MakeRayLook(boxes.volume->Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, rate);
-    const Result<std::optional<RayLabels>> labels = LabelsFor(*boxes.volume, whole, setup, rate);
-    ASSERT_TRUE(labels.ok() && *labels);
-    // Nothing is leapt over.
-    EmptyDistances everywhere(piece.cells.counts, std::vector<std::uint8_t>(piece.cells.ranges.size(), 0));
-    everywhere.Find((1U << kOctants) - 1);
-    const std::vector<std::int32_t> surface_cells(2 * piece.cells.ranges.size(), -1);
-    const std::vector<std::uint16_t> all_shown(piece.cells.ranges.size() + 1, 0xFFFF);
-    const Result<FrameFields> shown = FrameFields::Make(*boxes.volume, whole, setup, rate);
-    ASSERT_TRUE(shown.ok());
-    const std::vector<RayField> ray_fields = shown->Of(piece, look);
-    const RayFields fields = {ray_fields, all_shown.data()};
-    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, WholeBox(whole), WholeBox(whole), rays, setup.camera);
-    const MarchWork work = {.rays = &rays,
-                            .box = &box,
-                            .look = &look,
-                            .to_samples = &everywhere,
-                            .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
-                            .surface_cells = surface_cells.data(),
-                            .labels = &**labels,
-                            .fields = shown->empty() ? nullptr : &fields};
-    const PixelBounds all = {0, 0, setup.camera.width, setup.camera.height};
-    const auto marched = [&](auto&& marcher) {
-      LocalImage image = MakeLocalImage(PixelFormat::kRgba, all);
-      marcher(work, all, image.rgba.data(), 4 * std::size_t(all.width()));
-      return image;
-    };
-    const LocalImage expected = marched(MarchTileReference);
-    std::vector<GradientBricks> bricks(ray_fields.size());
-    const auto march = [&](const MarchWork& of, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-      return MarchTile(of, tile, bricks, rgba, floats_a_row);
-    };
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(marched(march), expected), 4e-5F) << "case " << i << ", seed " << kSeed; });
-    EXPECT_LE(LargestDifference(Rendered(scene), expected), 4e-5F) << "leaps change case " << i;
+    SCOPED_TRACE(::testing::Message() << "case " << i << ", seed " << kSeed);
+    ExpectAgreesWithReference(RandomScene(kSeed, i), 4e-5F);
   }
 }
 

@@ -1,0 +1,12 @@
+// Scenes in the ray caster's kernel and in its reference.
+#pragma once
+
+#include "tests/worker/renderers/render_support.h"
+
+namespace slabstream::testing {
+
+// The whole scene as one box, for each instruction set: without leaps, and by the renderer with them. Its labels, if it has any, must reach
+// the volume.
+void ExpectAgreesWithReference(const Scene& scene, float tolerance);
+
+}  // namespace slabstream::testing
