@@ -1,17 +1,13 @@
-// AlignedVector<T>: std::vector whose storage begins at a 64-byte boundary, so that kernels may use whole-register loads. Large ones ask
-// for huge pages: taking a volume's memory 4 KiB at a time costs as much as reading the volume.
+// AlignedVector<T>: std::vector whose storage begins at a 64-byte boundary, so that kernels may use whole-register loads. Large ones go
+// back to the system when they are freed (mapped_memory.h).
 #pragma once
 
-#include <sys/mman.h>
-
 #include <cstddef>
-#include <new>
 #include <vector>
 
-namespace slabstream {
+#include "common/memory/mapped_memory.h"
 
-inline constexpr std::size_t kBufferAlignment = 64;                                          // bytes: one AVX-512 register, one cache line
-inline constexpr std::size_t kHugePage = std::size_t{2} << 20, kHugeBuffer = 8 * kHugePage;  // bytes
+namespace slabstream {
 
 template <class T>
 struct AlignedAllocator {
@@ -19,17 +15,9 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT(google-explicit-constructor): rebinding
-  T* allocate(std::size_t count) {
-    const std::size_t bytes = count * sizeof(T);
-    void* const data = ::operator new(bytes, Alignment(bytes));
-    if (bytes >= kHugeBuffer) (void)::madvise(data, bytes, MADV_HUGEPAGE);  // without huge pages nothing changes
-    return static_cast<T*>(data);
-  }
-  void deallocate(T* data, std::size_t count) { ::operator delete(data, Alignment(count * sizeof(T))); }
+  T* allocate(std::size_t count) { return static_cast<T*>(TakeMemory(count * sizeof(T))); }
+  void deallocate(T* data, std::size_t count) { FreeMemory(data, count * sizeof(T)); }
   friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
-
- private:
-  static std::align_val_t Alignment(std::size_t bytes) { return std::align_val_t(bytes >= kHugeBuffer ? kHugePage : kBufferAlignment); }
 };
 
 template <class T>

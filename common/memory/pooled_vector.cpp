@@ -1,46 +1,23 @@
 #include "common/memory/pooled_vector.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <bit>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <unordered_map>
 
-#include "common/memory/aligned_buffer.h"
 #include "common/memory/large_buffers.h"
+#include "common/memory/mapped_memory.h"
 
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kLeastKept = std::size_t{1} << 17;  // bytes: smaller blocks come from the heap, and go back to it
-#ifdef __SANITIZE_ADDRESS__
-constexpr bool kSanitized = true;  // nothing is kept or mapped, so that uses of a block after it was given back are seen
-#else
-constexpr bool kSanitized = false;
-#endif
-constexpr std::size_t kUsuallyKept = std::size_t{96} << 20;                   // bytes
-constexpr std::size_t kMostOwnKept = kSanitized ? 0 : std::size_t{32} << 20;  // bytes
+constexpr std::size_t kLeastKept = std::size_t{1} << 17;                    // bytes: smaller blocks come from the heap, and go back to it
+constexpr std::size_t kUsuallyKept = std::size_t{96} << 20;                 // bytes
+constexpr std::size_t kMostOwnKept = kWatched ? 0 : std::size_t{32} << 20;  // bytes
 
 // Images of neighbouring views differ in size; rounding lets them reuse each other's blocks. Pages never written take no memory.
 std::size_t BlockBytes(std::size_t bytes) { return std::bit_ceil(bytes); }
-
-void* AllocatePrivate(std::size_t bytes) {
-  if (kSanitized || bytes < kLeastKept) return ::operator new(bytes, std::align_val_t(kBufferAlignment));
-  void* const block = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (block == MAP_FAILED) throw std::bad_alloc();
-  if (bytes >= 2 * kHugePage) (void)::madvise(block, bytes, MADV_HUGEPAGE);  // without huge pages nothing changes
-  return block;
-}
-void FreePrivate(void* block, std::size_t bytes) {
-  if (kSanitized || bytes < kLeastKept) {
-    ::operator delete(block, std::align_val_t(kBufferAlignment));
-  } else {
-    ::munmap(block, bytes);
-  }
-}
 
 class Pool {
  public:
@@ -60,7 +37,7 @@ class Pool {
         if (void* const data = arena_->Take(bytes)) return data;
       }
     }
-    return AllocatePrivate(bytes);
+    return TakeMemory(bytes, kLeastKept);
   }
 
   void GiveBack(void* data, std::size_t bytes) {
@@ -78,7 +55,7 @@ class Pool {
     if (arena_ != nullptr) return Status::Ok();
     Result<std::unique_ptr<SharedArena>> arena = SharedArena::Create();
     if (!arena.ok()) return arena.status();
-    for (const Block& kept : std::exchange(blocks_, {})) FreePrivate(kept.data, kept.bytes);
+    for (const Block& kept : std::exchange(blocks_, {})) FreeMemory(kept.data, kept.bytes, kLeastKept);
     bytes_ = 0;
     arena_ = *std::move(arena);
     return Status::Ok();
@@ -137,7 +114,7 @@ class Pool {
     if (arena_ != nullptr && arena_->Contains(data)) {
       arena_->GiveBack(data);
     } else {
-      FreePrivate(data, bytes);
+      FreeMemory(data, bytes, kLeastKept);
     }
   }
 
@@ -151,7 +128,7 @@ class Pool {
 
 // Never destroyed: blocks are given back until the very end of the program.
 Pool& BlocksOf(BlockPool pool) {
-  static Pool& shared = *new Pool(kSanitized ? 0 : kUsuallyKept);
+  static Pool& shared = *new Pool(kWatched ? 0 : kUsuallyKept);
   static Pool& own = *new Pool(kMostOwnKept);
   return pool == BlockPool::kShared ? shared : own;
 }
@@ -160,19 +137,19 @@ Pool& SharedBlocks() { return BlocksOf(BlockPool::kShared); }
 }  // namespace
 
 void* TakeBlock(BlockPool pool, std::size_t bytes) {
-  return bytes < kLeastKept ? AllocatePrivate(bytes) : BlocksOf(pool).Take(BlockBytes(bytes));
+  return bytes < kLeastKept ? TakeMemory(bytes, kLeastKept) : BlocksOf(pool).Take(BlockBytes(bytes));
 }
 
 void GiveBackBlock(BlockPool pool, void* block, std::size_t bytes) {
   if (bytes < kLeastKept) {
-    FreePrivate(block, bytes);
+    FreeMemory(block, bytes, kLeastKept);
   } else {
     BlocksOf(pool).GiveBack(block, BlockBytes(bytes));
   }
 }
 
 void KeepBlocks(std::size_t bytes) {
-  if (!kSanitized) SharedBlocks().KeepMore(bytes);
+  if (!kWatched) SharedBlocks().KeepMore(bytes);
 }
 Status ShareBlocks() { return SharedBlocks().Share(); }
 std::optional<ArenaName> SharedBlocksArena() { return SharedBlocks().arena(); }

@@ -1,12 +1,16 @@
 #include "common/memory/pooled_vector.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <fstream>
 #include <numeric>
 #include <random>
 #include <thread>
+
+#include "common/memory/aligned_buffer.h"
 
 namespace slabstream {
 namespace {
@@ -24,6 +28,35 @@ TEST(PooledVector, HoldsWhatAVectorHolds) {
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(vectors[at].data()) % 64, 0U);
     const std::size_t other = random() % 20;
     ASSERT_TRUE(std::ranges::equal(vectors[other], expected[other])) << "seed " << seed << " step " << step;
+  }
+}
+
+// Volumes of one size come and go while smaller things that came between them stay: their memory is not held.
+TEST(AlignedVector, LargeOnesGoBackToTheSystem) {
+  const auto resident = [] {
+    std::ifstream statm("/proc/self/statm");
+    std::int64_t all = 0, pages = 0;
+    statm >> all >> pages;
+    return pages * ::sysconf(_SC_PAGESIZE);
+  };
+  constexpr std::size_t kBytes = std::size_t{16} << 20;
+  const std::int64_t before = resident();
+  std::vector<AlignedVector<std::byte>> stay;
+  for (int round = 0; round < 20; ++round) {
+    const AlignedVector<std::byte> volume(kBytes, std::byte{1});
+    EXPECT_TRUE(kWatched || reinterpret_cast<std::uintptr_t>(volume.data()) % kHugePage == 0);
+    stay.emplace_back(100'000, std::byte{2});
+  }
+  EXPECT_TRUE(kWatched || resident() - before < std::int64_t(2 * kBytes)) << (resident() - before);
+}
+
+TEST(MappedMemory, ReadsAsZeroAndHoldsWhatIsWrittenAtBothEnds) {
+  for (const std::size_t bytes : {std::size_t{1}, kHugePage - 1, 2 * kHugePage - 1, 2 * kHugePage, 5 * kHugePage + 4097}) {
+    auto* const block = static_cast<char*>(MapMemory(bytes));
+    EXPECT_EQ(block[0] | block[bytes - 1], 0) << bytes;
+    block[0] = block[bytes - 1] = 'x';
+    EXPECT_EQ(block[bytes - 1], 'x');
+    UnmapMemory(block, bytes);
   }
 }
 
