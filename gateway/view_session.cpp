@@ -9,6 +9,7 @@
 #include "client/report/status_text.h"
 #include "common/base/version.h"
 #include "common/threads/guarded.h"
+#include "gateway/next_times.h"
 
 namespace slabstream {
 namespace {
@@ -171,7 +172,7 @@ void ViewSession::Render(const ViewAction& action) {
   }
   // A level that the view names is drawn, however coarse pictures may be.
   const bool names_level = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return LevelNumber(frame.level).has_value(); });
-  Rendering rendering{.order = order, .ticket = 0, .view = {}, .size = job->frames.front().size, .shadowed = shadowed};
+  Rendering rendering{.order = order, .ticket = 0, .view = {}, .frame = job->frames.front(), .shadowed = shadowed};
   rendering.view.seq = seq;
   rendering.view.scale = scale;
   rendering.view.coarseness = names_level ? 1 : coarseness;
@@ -219,7 +220,8 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
     if (unavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
     return Do(machine_.OnRefused(MonotonicNow()));
   }
-  RenderedView view = JoinPictures(std::move(rendered->pictures), rendering.size);
+  FetchNextTimes(rendering.frame);
+  RenderedView view = JoinPictures(std::move(rendered->pictures), rendering.frame.size);
   view.key = std::move(rendered->key);
   view.seq = rendering.view.seq;
   view.scale = rendering.view.scale;
@@ -230,6 +232,18 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
   around_.metrics.CountFrame(view.statistics, view.latency);
   rendered_ = std::make_shared<const RenderedView>(std::move(view));
   Do(machine_.OnRendered(finest, rendering.shadowed, MonotonicNow()));
+}
+
+// While times are played: those that follow, so that workers read them while the page shows this one.
+void ViewSession::FetchNextTimes(const FrameRequest& shown) {
+  const FrameRequest before = std::exchange(shown_, shown);
+  if (before.dataset != shown.dataset) return;
+  const auto dataset = std::ranges::find(news_->status.datasets, shown.dataset, &DatasetStatus::name);
+  const int times = dataset == news_->status.datasets.end() || !dataset->fields ? 1 : dataset->fields->times.count;
+  std::vector<FrameRequest> next = NextTimes(shown, before.time, times);
+  if (next.empty()) return;
+  if (fetching_ != 0) link_->Cancel(fetching_);
+  fetching_ = link_->Render(std::move(next), {}, kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
 }
 
 void ViewSession::Encode(bool final, int quality) {

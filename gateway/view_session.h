@@ -49,6 +49,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void Render(const ViewAction& action);  // kRender
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
+  void FetchNextTimes(const FrameRequest& shown);
   void Encode(bool final, int quality);
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
   void Send(std::uint64_t frame);
@@ -69,11 +70,13 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
     std::uint64_t order = 0;
     ServiceLink::Ticket ticket = 0;
     RenderedView view;      // what is known before the pictures are there
-    ImageSize size;         // the size of each frame
+    FrameRequest frame;     // the first one; all have the same size
     bool shadowed = false;  // the view asks for shadows or ambient occlusion
   };
   std::optional<Rendering> rendering_;
   std::shared_ptr<const RenderedView> rendered_;
+  FrameRequest shown_;                           // the first frame of `rendered_`
+  ServiceLink::Ticket fetching_ = 0;             // times ahead; 0: none
   std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;

@@ -115,7 +115,7 @@ Result<VolumeFacts> FactsOf(const std::string& source) {
     return VolumeFacts{std::move(info), opened->survey.summary, std::move(*opened)};
   }
   const LoadedSource& loaded = std::get<LoadedSource>(*read);
-  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(Summarize(*loaded.volume))};
+  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(OverTimes(Summarize(*loaded.volume), loaded.other_times))};
 }
 
 std::uint64_t CountedVoxels(const VolumeSummary& summary) {
@@ -132,10 +132,17 @@ double OccupancyOf(const VolumeSummary& summary, const TransferFunction& transfe
 
 // Where the statistics come from; "": from all voxels.
 std::string OfWhichVoxels(const VolumeFacts& facts) {
-  if (!facts.parts) return "";
-  const auto& [level, sample, summary] = facts.parts->survey;
-  if (sample) return fmt::format(" of a sample of level {}", level);
-  return level > 0 ? fmt::format(" of level {}", level) : "";
+  std::string which;
+  if (facts.parts) {
+    const auto& [level, sample, summary] = facts.parts->survey;
+    if (sample) {
+      which = fmt::format(" of a sample of level {}", level);
+    } else if (level > 0) {
+      which = fmt::format(" of level {}", level);
+    }
+  }
+  if (facts.summary->times > 1) which += fmt::format(" of {} of {} times", facts.summary->times, facts.file.times.count);
+  return which;
 }
 
 std::string TransferName(const TransferChoice& transfer) {
@@ -312,11 +319,12 @@ Result<LayerFacts> FactsOf(const LayerFiles& files) {
     if (const auto* const opened = std::get_if<OpenedSource>(&*read)) {
       facts.labels = opened->survey.summary->labels;
     } else {
-      const auto& [file, volume, labels, stamp, exact] = std::get<LoadedSource>(*read);
-      facts.labels = labels;
-      VisitLabelType(volume->block.type, [&]<class T>(const T*) {
-        for (const T label : std::span(volume->block.samples<T>(), std::size_t(volume->block.box.voxel_count()))) {
-          if (label > 0 && (labels->complete || facts.voxels.size() < kMaxLabels)) ++facts.voxels[label];
+      const LoadedSource& loaded = std::get<LoadedSource>(*read);
+      facts.labels = loaded.labels;
+      const VoxelBlock& block = loaded.volume->block;
+      VisitLabelType(block.type, [&]<class T>(const T*) {
+        for (const T label : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) {
+          if (label > 0 && (loaded.labels->complete || facts.voxels.size() < kMaxLabels)) ++facts.voxels[label];
         }
       });
     }
@@ -378,7 +386,7 @@ void AddPartsJson(const VolumeFacts& facts, Json& json) {
                               {"voxel_bytes", level.description.voxel_bytes()},
                               {"block", SizeJson(level.block)}});
   }
-  json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
+  json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}, {"times", facts.summary->times}};
 }
 
 std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy,

@@ -144,8 +144,7 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
       resolved.push_back({level.dataset, level.summary, {}, *std::move(labels)});
       continue;
     }
-    const VolumeSummary& statistics = other.statistics != nullptr ? *other.statistics : *level.summary;
-    Result<FieldLook> look = LookOf(request, *fields.dataset, other.number, statistics, HasFullRange(request, renderer));
+    Result<FieldLook> look = LookOf(request, *fields.dataset, other.number, *level.summary, HasFullRange(request, renderer));
     if (!look.ok()) return look.status();
     look->range = level.summary->range;
     look->transfer.opacity_distance = opacity_distance;
@@ -170,12 +169,11 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
   const Result<bool> as_channel = ShowsAsChannel(request, fields);
   if (!as_channel.ok()) return as_channel.status();
-  const VolumeSummary& statistics = fields.statistics != nullptr ? *fields.statistics : *summary;
-  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, statistics);
+  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
   double weight = 1;
   if (*as_channel || !fields.volume_shows) {
-    Result<FieldLook> look = LookOf(request, *fields.dataset, fields.volume, statistics, HasFullRange(request, renderer));
+    Result<FieldLook> look = LookOf(request, *fields.dataset, fields.volume, *summary, HasFullRange(request, renderer));
     if (!look.ok()) return look.status();
     const double distance = transfer->opacity_distance;
     transfer = std::move(look->transfer);

@@ -26,12 +26,11 @@ struct CoarserVolume {
 
 // A field that a picture shows beside its volume.
 struct FieldVolume {
-  int number = 0;                                        // of the field
-  bool labels = false;                                   // its values are labels
-  std::vector<CoarserVolume> levels;                     // FieldSetup::levels
-  std::shared_ptr<const VolumeSummary> statistics = {};  // ShownFields::statistics
-  std::vector<std::uint32_t> of_volume;                  // FieldSetup::of_volume
-  std::optional<CoarserVolume> light = {};               // ResolvedRequest::light, of this field
+  int number = 0;                           // of the field
+  bool labels = false;                      // its values are labels
+  std::vector<CoarserVolume> levels;        // FieldSetup::levels
+  std::vector<std::uint32_t> of_volume;     // FieldSetup::of_volume
+  std::optional<CoarserVolume> light = {};  // ResolvedRequest::light, of this field
   friend bool operator==(const FieldVolume&, const FieldVolume&) = default;
 };
 
@@ -41,9 +40,6 @@ struct ShownFields {
   int volume = 0;                                          // the number of the field that is the picture's volume
   bool volume_shows = true;                                // FieldNumbers::volume_shows
   std::vector<FieldVolume> others = {};                    // by ascending numbers, so labels are the last one
-  // From which transfer functions and ranges are made, so that all times look alike: those of the time that the dataset itself shows. Null:
-  // those of the volume.
-  std::shared_ptr<const VolumeSummary> statistics = nullptr;
 
   // How many show that have values, with the volume.
   std::size_t values() const { return 1 + others.size() - (!others.empty() && others.back().labels ? 1 : 0); }

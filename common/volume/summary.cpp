@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -182,10 +183,51 @@ ValueRange AnyValue(const VolumeDescription& description) {
 }
 
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
-  VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
+  VolumeSummary summary = WithStatistics({.description = description}, surveyed);
   summary.non_finite = surveyed.non_finite;
   summary.labels = surveyed.labels;
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
+  return summary;
+}
+
+VolumeSummary OverTimes(VolumeSummary own, std::span<const VolumeSummary> others) {
+  if (others.empty()) return own;
+  std::vector<const VolumeSummary*> times = {&own};
+  for (const VolumeSummary& other : others) times.push_back(&other);
+  const auto count = [](const VolumeSummary& of) { return std::accumulate(of.histogram.begin(), of.histogram.end(), 0.0); };
+  std::erase_if(times, [&](const VolumeSummary* of) { return count(*of) == 0; });
+  VolumeSummary over = own;
+  over.times = 1 + int(others.size());
+  if (times.empty()) return over;
+  over.range = times.front()->range;
+  for (const VolumeSummary* const of : times) {
+    over.range = {std::min(over.range.min, of->range.min), std::max(over.range.max, of->range.max)};
+  }
+  const double voxels = count(*times.front());
+  const double width = (double(over.range.max) - double(over.range.min)) / kHistogramBins;
+  std::array<double, kHistogramBins> mean{};
+  for (const VolumeSummary* const of : times) {
+    const double weight = voxels / count(*of) / double(times.size());
+    const double own_width = (double(of->range.max) - double(of->range.min)) / kHistogramBins;
+    for (int bin = 0; bin < kHistogramBins; ++bin) {
+      const double counted = double(of->histogram[std::size_t(bin)]) * weight, begin = double(of->range.min) + own_width * bin;
+      if (counted == 0) continue;
+      const int first = HistogramBin(over.range, begin), last = HistogramBin(over.range, begin + own_width);
+      for (int to = first; to <= last; ++to) {
+        const double from = double(over.range.min) + width * to;
+        const double overlap = std::min(from + width, begin + own_width) - std::max(from, begin);
+        mean[std::size_t(to)] += first == last ? counted : counted * std::max(overlap, 0.0) / own_width;
+      }
+    }
+  }
+  std::ranges::transform(mean, over.histogram.begin(), [](double each) { return std::uint64_t(std::llround(each)); });
+  return over;
+}
+
+VolumeSummary WithStatistics(VolumeSummary summary, const VolumeSummary& statistics) {
+  summary.range = statistics.range;
+  summary.histogram = statistics.histogram;
+  summary.times = statistics.times;
   return summary;
 }
 

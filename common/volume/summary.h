@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/volume/labels.h"
@@ -48,6 +49,7 @@ struct VolumeSummary {
   Index3 brick_counts;                                    // bricks along each axis
   BrickRangeList bricks;        // ranges of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
   std::int64_t non_finite = 0;  // voxels that are NaN or infinite: never visible
+  int times = 1;                // of how many of the dataset's times range and histogram are (OverTimes)
   std::shared_ptr<const LabelTable> labels = nullptr;  // of a field of labels, else null
   // Nobody holds the voxels, but they can be read there. None: they are held.
   std::optional<StoredAt> stored = {};
@@ -66,6 +68,13 @@ ValueRange AnyValue(const VolumeDescription& description);
 
 // What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and no bricks.
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+
+// With range and histogram over its own time and others: the range of all finite values, and the mean of the histograms, in which each time
+// has the same weight, however many voxels of it were read. Bins of another range are spread evenly over those that they overlap.
+VolumeSummary OverTimes(VolumeSummary own, std::span<const VolumeSummary> others);
+
+// With range and histogram of `statistics`.
+VolumeSummary WithStatistics(VolumeSummary summary, const VolumeSummary& statistics);
 
 // The range of data values that belongs to a range of stored samples: kNoFiniteValue stays what it is.
 ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples);

@@ -35,6 +35,14 @@ void DatasetMachine::State::On(const KeepDataset& event) {
   if (use != uses.end()) use->second.kept = event.datasets;
 }
 
+void DatasetMachine::State::On(const LeaveDataset& event) {
+  if (uses.erase(event.use) == 0) return;
+  for (const std::string& name : std::exchange(wait_for_room, {})) {
+    const DatasetTable::Entry* const entry = datasets.Find(name);
+    if (entry != nullptr && entry->state == DatasetState::kUnloaded && IsWanted(name)) LoadData(name);
+  }
+}
+
 void DatasetMachine::State::On(const ForgetClient& event) {
   std::erase_if(orders, [&](const auto& order) { return order.second.client == event.client; });
   if (const Upload upload = UploadOf(event.client); upload != uploads.end()) {
@@ -45,6 +53,14 @@ void DatasetMachine::State::On(const ForgetClient& event) {
 }
 
 void DatasetMachine::State::On(const FinishStatus& event) {
+  if (now >= times_seen + config.check_interval) {
+    times_seen = now;
+    datasets.ForEach([this](const std::string& name, DatasetTable::Entry& entry) {
+      if (entry.state != DatasetState::kReady || entry.stamp == nullptr || !entry.MayGrow()) return;
+      entry.checks.Want();
+      CheckFilesOf(name);
+    });
+  }
   StatusReply reply = event.reply;
   reply.datasets = datasets.Report(now);
   reply.refused += refused;
@@ -83,14 +99,37 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
   return 0;
 }
 
-// The entry of a field at a time of a dataset that is open.
-std::string DatasetMachine::State::SourceOf(const std::string& dataset, int field, int time) {
+// The entry of a field of a dataset that is open, at the dataset's own time.
+std::string DatasetMachine::State::OwnSourceOf(const std::string& dataset, int field) {
   const DatasetTable::Entry& entry = *datasets.Find(dataset);
-  if (entry.fields != nullptr && !entry.fields->fields[std::size_t(field)].channel) time = entry.fields->time;  // it has one for all times
-  if (entry.fields == nullptr || (field == entry.fields->field && time == entry.fields->time)) return dataset;
-  std::string name = PartName(dataset, field, time);
-  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time), now);
+  if (entry.fields == nullptr || field == entry.fields->field) return dataset;
+  std::string name = PartName(dataset, field, entry.fields->time);
+  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, entry.fields->time, nullptr), now);
   return name;
+}
+
+// The same at a time. At another time than the dataset's own the field is drawn by the statistics of that one, and a field with a source of
+// its own tells there how many times it has: until that is known, `ready` is false, and the entry is the one that must be ready first.
+// InvalidArgument: the field has several times, but not as many as the dataset.
+Result<DatasetMachine::State::FieldSource> DatasetMachine::State::SourceOf(const std::string& dataset, int field, int time) {
+  DatasetTable::Entry& entry = *datasets.Find(dataset);
+  const std::string own = OwnSourceOf(dataset, field);
+  if (entry.fields == nullptr || time == entry.fields->time) return FieldSource{own};
+  if (!entry.statistics.contains(field)) {
+    const DatasetTable::Entry& found = *datasets.Find(own);
+    if (found.state != DatasetState::kReady) return FieldSource{own, false};
+    const FieldInfo& info = entry.fields->fields[std::size_t(field)];
+    const int times = info.channel || found.fields == nullptr ? 1 : found.fields->times.count;
+    if (times > 1 && times != entry.fields->times.count) {
+      return Status::InvalidArgument(fmt::format("field '{}' of dataset \"{}\" has {} times, must have one or {}, as the dataset",
+                                                 info.name, dataset, times, entry.fields->times.count));
+    }
+    if (!info.channel && times == 1) return FieldSource{own};  // at all times
+    entry.statistics[field] = found.levels != nullptr ? found.levels->overview : found.summary;
+  }
+  std::string name = PartName(dataset, field, time);
+  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field)), now);
+  return FieldSource{name};
 }
 
 // Seeks what it needs next, as far as that is known. Errors of FieldsToShow, TimeToShow and LevelsOf.
@@ -109,21 +148,24 @@ Status DatasetMachine::State::SeekSources(Use& use) {
   const std::string& name = use.request->dataset;
   Result<ShownAtTime> shown = WhatShows(*use.request, datasets.Find(name)->fields);
   if (!shown.ok()) return shown.status();
-  const Use::Entry dataset = use.entries.front();
-  std::vector<Use::Entry> entries;
-  const auto seek = [&](int number, int time) {
-    const std::string source = SourceOf(name, number, time);
-    entries.push_back(source == name ? dataset : Use::Entry{source, Seek(source)});
-  };
-  for (const int number : shown->numbers) seek(number, shown->time);
-  // At another time than the dataset's own, looks need the values of that one, too.
-  use.fields = std::move(shown->fields);
-  const DatasetFields& fields = *use.fields.dataset;
-  const auto& statistics = datasets.Find(name)->statistics;
+  use.entries.resize(1);  // the dataset
+  // More times may have come.
+  if (use.request->time == kLastTime && !datasets.Find(name)->checks.IsOver(use.entries.front().check)) return Status::Ok();
+  std::vector<std::string> sources;
   for (const int number : shown->numbers) {
-    if (shown->time != fields.time && !statistics.contains(number) && fields.fields[std::size_t(number)].channel) seek(number, fields.time);
+    const Result<FieldSource> source = SourceOf(name, number, shown->time);
+    if (!source.ok()) return source.status();
+    if (source->ready) {
+      sources.push_back(source->entry);
+    } else {
+      use.entries.push_back({source->entry, Seek(source->entry)});
+    }
   }
-  use.entries = std::move(entries);
+  if (use.entries.size() > 1) return Status::Ok();
+  const Use::Entry dataset = use.entries.front();
+  use.entries.clear();
+  for (const std::string& source : sources) use.entries.push_back(source == name ? dataset : Use::Entry{source, Seek(source)});
+  use.fields = std::move(shown->fields);
   use.stage = Use::Stage::kSources;
   return Status::Ok();
 }
@@ -137,18 +179,6 @@ Status DatasetMachine::State::SeekVoxels(Use& use) {
     return {1, entry.levels != nullptr ? entry.levels->overview : entry.summary};
   };
   std::vector<Use::Entry> sources = std::exchange(use.entries, {});
-  sources.resize(1 + use.fields.others.size());  // the rest was needed for its values alone
-  if (use.fields.dataset->times.count > 1) {
-    auto& statistics = datasets.Find(use.request->dataset)->statistics;
-    const auto of = [&](int number) {
-      const std::string name = SourceOf(use.request->dataset, number, use.fields.dataset->time);
-      if (datasets.Find(name)->state == DatasetState::kReady) statistics[number] = overview(name).summary;
-      const auto found = statistics.find(number);
-      return found == statistics.end() ? nullptr : found->second;
-    };
-    use.fields.statistics = of(use.fields.volume);
-    for (FieldVolume& field : use.fields.others) field.statistics = of(field.number);
-  }
   ShownFields fields = use.fields;
   for (std::size_t i = 0; i < fields.others.size(); ++i) {
     fields.others[i].levels = {overview(sources[i + 1].name)};
@@ -293,15 +323,19 @@ bool DatasetMachine::State::IsWanted(const std::string& name) const {
          std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.WaitsFor(name); });
 }
 
-bool DatasetMachine::State::InUse(DatasetId dataset) const {
+bool DatasetMachine::State::IsKept(DatasetId dataset) const {
+  return std::ranges::any_of(uses,
+                             [&](const auto& each) { return std::ranges::find(each.second.kept, dataset) != each.second.kept.end(); });
+}
+
+bool DatasetMachine::State::IsAwaited(DatasetId dataset) const {
   const auto is_of = [&](const std::string& name) {
     const DatasetTable::Entry* const entry = datasets.Find(name);
     return entry != nullptr && entry->id == dataset;
   };
   const auto uses_it = [&](const auto& each) {
     const Use& use = each.second;
-    if (use.begun()) return std::ranges::find(use.kept, dataset) != use.kept.end();
-    return std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
+    return !use.begun() && std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
   };
   return std::ranges::any_of(uses, uses_it) || std::ranges::any_of(questions, [&](const auto& open) {
            return !open.second.asked && (is_of(open.second.entry) || is_of(open.second.overlay.name) || is_of(open.second.labels.name));
@@ -342,7 +376,8 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   while (datasets.bytes() > share && UnloadOne()) {
   }
   if (datasets.bytes() <= share) return;
-  // All that are loaded are in use. What came last goes, with its requests.
+  // All that are loaded are in use. What came last goes.
+  if (datasets.bytes() - BytesThatFramesGiveBack() <= share) return WaitForRoom(event.name);
   const Status too_large = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
   const Status full(too_large.code(), too_large.message() + "; an .ome.zarr, as slabstream convert makes it, is read in parts");
   Lose(event.name, full, &RefusedRequests::too_large);
@@ -371,9 +406,13 @@ void DatasetMachine::State::On(const DatasetFailed& event) {
 
 // A dataset cannot be read, or not be looked at. It is tried again when it is asked for again.
 void DatasetMachine::State::FailData(const std::string& name, const Status& status) {
-  datasets.Fail(name, status, now);
   const bool full = status.code() == StatusCode::kResourceExhausted;
-  if (full && UnloadOne()) return LoadData(name);  // there may be room now
+  if (full && UnloadOne()) {  // there may be room now
+    datasets.Unload(name, now);
+    return LoadData(name);
+  }
+  if (full && BytesThatFramesGiveBack() > 0) return WaitForRoom(name);
+  datasets.Fail(name, status, now);
   Tell(NoteAbout::kDatasets, LogLevel::kWarning, "{} cannot be read: {}", Named(name), status.message());
   Lose(name, status, full ? &RefusedRequests::too_large : nullptr);
 }
@@ -394,8 +433,21 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     open.fields = {};
     open.overlay = open.labels = {};
   }
+  const bool may_grow = datasets.Find(name)->MayGrow();
   datasets.Reset(name, now);
-  if (IsWanted(name)) LoadData(name);
+  if (IsWanted(name) || may_grow) LoadData(name);
+}
+
+// Once those that render now have ended.
+std::uint64_t DatasetMachine::State::BytesThatFramesGiveBack() const {
+  return datasets.bytes([this](DatasetId dataset) { return dataset != 0 && IsKept(dataset) && !IsAwaited(dataset); });
+}
+
+// The requests of the entry wait on, without its voxels.
+void DatasetMachine::State::WaitForRoom(const std::string& name) {
+  if (const DatasetId unloaded = datasets.Unload(name, now); unloaded != 0) Unload(unloaded);
+  wait_for_room.insert(name);
+  TellUses(name);
 }
 
 bool DatasetMachine::State::UnloadOne() {
@@ -409,6 +461,25 @@ bool DatasetMachine::State::UnloadOne() {
 void DatasetMachine::State::UnloadRetired() {
   if (datasets.retired() == 0) return;
   for (const DatasetId dataset : datasets.TakeRetired([this](DatasetId id) { return InUse(id); })) Unload(dataset);
+}
+
+// Frames that have begun keep the voxels that they began with.
+void DatasetMachine::State::ClosePartsThatNobodyWants() {
+  const auto is_of = [](const std::string& entry, const std::string& part) { return entry == part || entry.starts_with(part + '\n'); };
+  const auto is_wanted = [&](const std::string& part) {
+    return std::ranges::any_of(uses,
+                               [&](const auto& each) {
+                                 const Use& use = each.second;
+                                 return !use.begun() &&
+                                        std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name, part); });
+                               }) ||
+           std::ranges::any_of(questions, [&](const auto& each) {
+             const OpenQuestion& open = each.second;
+             return !open.asked && (is_of(open.entry, part) || is_of(open.overlay.name, part) || is_of(open.labels.name, part));
+           });
+  };
+  while (datasets.ClosePart(is_wanted)) {
+  }
 }
 
 void DatasetMachine::State::Unload(DatasetId dataset) {
@@ -441,16 +512,17 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
     RenewData(event.name);
   } else {
     CheckFilesOf(event.name);
-    for (auto& each : uses) {
-      Use& use = each.second;
+    bool tell = false;
+    for (auto& [id, use] : uses) {
       bool over = false;
       for (Use::Entry& awaited : use.entries) {
         if (awaited.check == 0 || awaited.name != event.name || !entry->checks.IsOver(awaited.check)) continue;
         awaited.check = 0;
         over = true;
       }
-      if (over && !use.begun()) TellUse(each);
+      tell |= over && !use.begun();
     }
+    if (tell) AdvanceUses(event.name);
   }
   AnswerLists();
 }
@@ -510,6 +582,7 @@ std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time 
   if (!state.stopped) {
     if (now >= state.NextWake()) state.CheckEverything();
     state.AskExecutor();
+    state.ClosePartsThatNobodyWants();
     state.UnloadRetired();
     if (!state.news.uses.empty() || !state.news.unloaded.empty()) state.actions.emplace_back(std::exchange(state.news, {}));
   }

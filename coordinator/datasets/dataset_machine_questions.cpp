@@ -54,29 +54,42 @@ Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLe
   return Status::Ok();
 }
 
-// Of a dataset that is open: the question waits for the first field that it is about. Errors of FieldsToShow and TimeToShow.
+// Of a dataset that is open: the question waits for the first field that it is about, and for others; or for what must be known before
+// (SourceOf). Errors of FieldsToShow, TimeToShow and SourceOf.
 Status DatasetMachine::State::FindField(OpenQuestion& open) {
   const FrameRequest picture = PictureOf(open.question);
-  Result<ShownAtTime> shown = WhatShows(picture, datasets.Find(open.entry)->fields);
+  Result<ShownAtTime> shown = WhatShows(picture, datasets.Find(picture.dataset)->fields);
   if (!shown.ok()) return shown.status();
-  open.fields = std::move(shown->fields);
-  open.fields.others.clear();  // the question is about the first one
-  const DatasetFields& fields = *open.fields.dataset;
-  const auto other = [&](int number) {
-    const std::string source = SourceOf(picture.dataset, number, shown->time);
-    return Use::Entry{source, Seek(source)};
-  };
+  ShownFields found = std::move(shown->fields);
+  found.others.clear();  // the question is about the first one
+  const DatasetFields& fields = *found.dataset;
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
-  const int last = fields.values() - 1;
-  if (of_points && !fields.fields[std::size_t(last)].channel) open.overlay = other(last);
   const auto* const statistics = std::get_if<StatisticsQuery>(&open.question);
   const bool of_labels =
       of_points || (statistics != nullptr && statistics->labels) || picture.labels || std::holds_alternative<SummaryQuery>(open.question);
-  if (of_labels && fields.labels()) open.labels = other(*fields.labels());
-  const std::string source = SourceOf(picture.dataset, open.fields.volume, shown->time);
-  if (source == open.entry) return Status::Ok();
-  open.entry = source;
-  open.check = Seek(source);
+  struct Needed {
+    int field = 0;
+    Use::Entry entry = {};
+  };
+  std::optional<Needed> overlay, labels;
+  Needed volume{found.volume};
+  if (const int last = fields.values() - 1; of_points && !fields.fields[std::size_t(last)].channel) overlay = {last};
+  if (of_labels && fields.labels()) labels = {*fields.labels()};
+  for (Needed* const needed : {&volume, overlay ? &*overlay : nullptr, labels ? &*labels : nullptr}) {
+    if (needed == nullptr) continue;
+    const Result<FieldSource> source = SourceOf(picture.dataset, needed->field, shown->time);
+    if (!source.ok()) return source.status();
+    needed->entry = {source->entry, source->entry == open.entry ? open.check : Seek(source->entry)};
+    if (source->ready) continue;
+    open.entry = needed->entry.name;
+    open.check = needed->entry.check;
+    return Status::Ok();
+  }
+  open.fields = std::move(found);
+  open.entry = volume.entry.name;
+  open.check = volume.entry.check;
+  if (overlay) open.overlay = overlay->entry;
+  if (labels) open.labels = labels->entry;
   return Status::Ok();
 }
 

@@ -28,9 +28,9 @@ struct DatasetMachine::State {
   struct Use {
     std::shared_ptr<const FrameRequest> request;
     std::int64_t most_level_bytes = 0;  // SeekDataset::most_level_bytes
-    // The entries of the table that it waits for: the dataset; then the sources of the fields that it shows, the volume's first; then the
-    // levels that it draws of each, finest first, or the source if it has one level; and at last, if the picture has shadows or ambient
-    // occlusion, what the light volume of each is made from.
+    // The entries of the table that it waits for: the dataset, and its fields at its own time if another one shows; then the sources of
+    // the fields that it shows, the volume's first; then the levels that it draws of each, finest first, or the source if it has one level;
+    // and at last, if the picture has shadows or ambient occlusion, what the light volume of each is made from.
     struct Entry {
       std::string name;
       CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
@@ -78,6 +78,7 @@ struct DatasetMachine::State {
   const DatasetConfig config;
   DatasetTable datasets;
   std::map<UseId, Use> uses;
+  std::set<std::string> wait_for_room;  // entries that are loaded once a frame has ended
   std::map<OrderId, OpenOrder> orders;  // at most one of each client
   OrderId last_order = 0;
   std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
@@ -87,6 +88,7 @@ struct DatasetMachine::State {
   UploadId last_upload = 0;
   CheckCounter folder_checks;
   Time next_round;                                          // when the folders are looked through, if there are any
+  Time times_seen;                                          // when somebody was last told how many times datasets have
   std::map<std::string, std::set<std::string>> complaints;  // about what lies in each folder
   bool folders_asked_for = false;                           // by a client, since the last check began
   std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
@@ -103,7 +105,7 @@ struct DatasetMachine::State {
   }
   void On(const SeekDataset& event);
   void On(const KeepDataset& event);
-  void On(const LeaveDataset& event) { uses.erase(event.use); }
+  void On(const LeaveDataset& event);
   void On(const ForgetClient& event);
   void On(const FinishStatus& event);
   void On(const EndDatasets& event);
@@ -137,18 +139,28 @@ struct DatasetMachine::State {
   Status SeekSources(Use& use);
   Status SeekVoxels(Use& use);
   void AdvanceUses(const std::string& name);
-  std::string SourceOf(const std::string& dataset, int field, int time);
+  struct FieldSource {
+    std::string entry;
+    bool ready = true;
+  };
+  std::string OwnSourceOf(const std::string& dataset, int field);
+  Result<FieldSource> SourceOf(const std::string& dataset, int field, int time);
   void TellUse(const std::pair<const UseId, Use>& use);
   void TellUses(const std::string& name);
   void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
   bool IsWanted(const std::string& name) const;  // by a request whose frame has not begun, or a question that was not asked
-  bool InUse(DatasetId dataset) const;
+  bool IsKept(DatasetId dataset) const;          // by a frame that has begun
+  bool IsAwaited(DatasetId dataset) const;       // by a request whose frame has not begun, or a question that was not asked
+  bool InUse(DatasetId dataset) const { return IsKept(dataset) || IsAwaited(dataset); }
+  void ClosePartsThatNobodyWants();
 
   // ---- voxels
   void LoadData(const std::string& name);
   void FailData(const std::string& name, const Status& status);
   void RenewData(const std::string& name);
   bool UnloadOne();  // false: all are in use
+  std::uint64_t BytesThatFramesGiveBack() const;
+  void WaitForRoom(const std::string& name);
   void UnloadRetired();
   void Unload(DatasetId dataset);
   Status TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const;

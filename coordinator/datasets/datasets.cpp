@@ -100,6 +100,21 @@ void DatasetTable::AddPart(const std::string& name, DataSource source, Time now)
   parts_.try_emplace(name, Entry{.source = std::move(source), .since = now});
 }
 
+bool DatasetTable::ClosePart(const std::function<bool(const std::string&)>& is_wanted) {
+  if (parts_.size() <= kMostParts) return false;
+  auto oldest = parts_.end();
+  for (auto part = parts_.begin(); part != parts_.end(); ++part) {
+    const auto& [name, entry] = *part;
+    if (IsLevelName(name) || entry.state == DatasetState::kLoading) continue;
+    if ((oldest == parts_.end() || entry.last_use < oldest->second.last_use) && !is_wanted(name)) oldest = part;
+  }
+  if (oldest == parts_.end()) return false;
+  RemoveParts(oldest->first);
+  Retire(oldest->second);
+  parts_.erase(oldest);
+  return true;
+}
+
 LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   Entry& entry = *Find(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
@@ -125,6 +140,7 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   entry->stamp = std::move(stamp);
   entry->bytes = bytes;
   entry->fields = std::move(fields);
+  entry->statistics.clear();
   retired_.erase(id);  // the same voxels again
   return true;
 }
@@ -174,10 +190,10 @@ void DatasetTable::Retire(const Entry& entry) {
   if (entry.state == DatasetState::kReady && entry.levels == nullptr) retired_[entry.id] = entry.source.held_bytes + entry.bytes;
 }
 
-std::uint64_t DatasetTable::bytes() const {
+std::uint64_t DatasetTable::bytes(const std::function<bool(DatasetId)>& which) const {
   std::uint64_t total = 0;
-  VisitAll(*this, [&](const std::string&, const Entry& entry) { total += entry.source.held_bytes + entry.bytes; });
-  for (const auto& [id, bytes] : retired_) total += bytes;
+  VisitAll(*this, [&](const std::string&, const Entry& entry) { total += which(entry.id) ? entry.source.held_bytes + entry.bytes : 0; });
+  for (const auto& [id, bytes] : retired_) total += which(id) ? bytes : 0;
   return total;
 }
 
@@ -196,10 +212,16 @@ std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(Datase
     oldest = &name;
     last_use = entry.last_use;
   });
-  if (oldest == nullptr) return std::nullopt;
-  Entry& entry = *Find(*oldest);
+  return oldest == nullptr ? std::nullopt : std::optional(Unload(*oldest, now));
+}
+
+DatasetId DatasetTable::Unload(const std::string& name, Time now) {
+  Entry& entry = *Find(name);
   const DatasetId id = entry.id;
-  entry = Forgotten(entry, now);
+  Entry unloaded = Forgotten(entry, now);
+  unloaded.fields = entry.fields;  // parts may be asked for before it is loaded again
+  unloaded.statistics = std::move(entry.statistics);
+  entry = std::move(unloaded);
   retired_.erase(id);
   return id;
 }

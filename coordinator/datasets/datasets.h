@@ -43,6 +43,8 @@ inline bool IsPart(const std::string& name) { return name.find('\n') != std::str
 inline bool IsLevelName(const std::string& name) { return IsPart(name) && name.find(' ', name.rfind('\n')) == std::string::npos; }
 inline std::string DatasetOfPart(const std::string& name) { return name.substr(0, name.find('\n')); }
 
+inline constexpr std::size_t kMostParts = 1024;  // of all datasets; more only while requests need them: a source that is open takes memory
+
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
 // An entry of the table, named for messages: dataset "scan", or level 2 of field 1 time 0 of dataset "scan".
@@ -64,15 +66,17 @@ class DatasetTable {
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
     std::shared_ptr<const DatasetFields> fields;   // of a dataset, once it was ready; null: it has one field, of which nothing is known
-    // Of a dataset with several times: the statistics of fields at the time that it shows itself, as far as they are known.
-    std::map<int, std::shared_ptr<const VolumeSummary>> statistics;
-    std::shared_ptr<const FileStamp> stamp;  // kReady only: of its files as they were read; null: they never change
-    std::string error;                       // kFailed only
-    std::uint64_t bytes = 0;                 // kReady only: memory of its voxels beside what the source holds
-    std::uint64_t last_use = 0;              // greater: later
-    CheckCounter checks;                     // at its files, while it is ready
+    std::map<int, std::shared_ptr<const VolumeSummary>> statistics;  // of a dataset with several times: of its channels, as far as known
+    std::shared_ptr<const FileStamp> stamp;                          // kReady only: of its files as they were read; null: they never change
+    std::string error;                                               // kFailed only
+    std::uint64_t bytes = 0;                                         // kReady only: memory of its voxels beside what the source holds
+    std::uint64_t last_use = 0;                                      // greater: later
+    CheckCounter checks;                                             // at its files, while it is ready
     // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
     CheckId awaited = 0;
+
+    // People watch for its next time (data/open/file_times.h).
+    bool MayGrow() const { return source.path.find('*') != std::string::npos || (fields != nullptr && fields->times.count > 1); }
   };
 
   DatasetTable(Catalogue catalogue, std::set<std::string> folders);
@@ -91,8 +95,11 @@ class DatasetTable {
   void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
   void Await(const std::string& name, CheckId check);
   void AddPart(const std::string& name, DataSource source, Time now);  // unless it is there
-  void Remove(const std::string& name);                                // retires its voxels
-  std::set<std::string> folders;                                       // folders that are watched
+  // Forgets the field at a time that was used least recently, with its levels, if there are more than kMostParts parts. False: there are
+  // not, or all are wanted.
+  bool ClosePart(const std::function<bool(const std::string& name)>& is_wanted);
+  void Remove(const std::string& name);  // retires its voxels
+  std::set<std::string> folders;         // folders that are watched
 
   // ---- voxels
   LoadId BeginLoad(const std::string& name, Time now);  // begins to load a dataset that is unloaded or failed
@@ -108,10 +115,13 @@ class DatasetTable {
   void Reset(const std::string& name, Time now);
   void Fail(const std::string& name, const Status& status, Time now);
 
-  std::uint64_t bytes() const;          // bytes of all voxels, the retired ones too
+  // Bytes of all voxels, the retired ones too; or of some of them.
+  std::uint64_t bytes(const std::function<bool(DatasetId)>& which = [](DatasetId) { return true; }) const;
   bool Holds(DatasetId dataset) const;  // ready or retired
   std::size_t retired() const { return retired_.size(); }
-  // Unloads the least recently used one of those that are not `in_use`, nor held by their source. nullopt: there is none.
+  // Of one that is ready without levels, or is being loaded (0): whose voxels, if any, may go.
+  DatasetId Unload(const std::string& name, Time now);
+  // The same of the least recently used one of those that are not `in_use`, nor held by their source. nullopt: there is none.
   std::optional<DatasetId> UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now);
   // Takes out those that are retired and not `in_use`. Their voxels may go.
   std::vector<DatasetId> TakeRetired(const std::function<bool(DatasetId)>& in_use);

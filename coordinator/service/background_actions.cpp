@@ -142,7 +142,8 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 // A volume that was read as a whole.
 Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
   const std::shared_ptr<const Volume>& volume = loaded.volume;
-  VolumeSummary found = SummaryOf(*volume);
+  VolumeSummary found = OverTimes(SummaryOf(*volume), loaded.other_times);
+  if (action.source.statistics != nullptr) found = WithStatistics(std::move(found), *action.source.statistics);
   found.labels = loaded.labels;
   auto summary = std::make_shared<const VolumeSummary>(std::move(found));
   VoxelServer::Samples samples;
@@ -166,6 +167,8 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
   const SourceInfo& info = opened.source->info();
   const std::vector<SourceLevel>& levels = info.levels;
   (void)opened.source->TakeStoredBytes();  // the survey's, which belong to no frame
+  const std::shared_ptr<const DatasetFields> fields = FieldsOf(action.source, info);
+  const bool one_of_several = action.source.statistics != nullptr || (fields != nullptr && fields->times.count > 1);
   std::vector<DataSource> sources;
   auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
@@ -174,11 +177,11 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
                      .surveyed = opened.survey.summary,
                      .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
                      .stamp = opened.stamp,
-                     .index = opened.index};
+                     .index = opened.index,
+                     .times = one_of_several ? info.times.count : 1};
     if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
   }
-  const std::shared_ptr<const DatasetFields> fields = FieldsOf(action.source, info);
   if (sources.size() == 1) {
     Result<News> loaded = LoadLevel(action, *sources.front().at_level, tell);
     if (loaded.ok()) std::get<DatasetLoaded>(loaded->event).fields = fields;
@@ -191,7 +194,7 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
 Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell) {
   const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
   const auto bytes = std::uint64_t(description.voxel_bytes());
-  // A picture may be drawn from several levels, which must be held together.
+  // A picture may be drawn from several levels, which must be held together, and a movie shows all times.
   std::uint64_t with_coarser = 0;
   for (const SourceLevel& level : std::span(at.source->info().levels).subspan(std::size_t(at.stored.level))) {
     with_coarser += std::uint64_t(level.description.voxel_bytes());
@@ -201,7 +204,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
       !SchemeOf(at.stored.source).empty() ? std::min(action.most_bytes, std::uint64_t(kFarSurvey.exact)) : action.most_bytes;
   VoxelServer::Samples samples;
   VolumeSummary summary;
-  if (with_coarser <= most && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+  if (with_coarser <= most / std::uint64_t(at.times) && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     ReadProgress progress(tell);
     const Result<LevelInMemory> level = at.source->ReadLevel(at.stored.level, &progress);
     // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
@@ -216,8 +219,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
   }
   if (samples.volume != nullptr) {
     summary = at.surveyed_level ? *at.surveyed : Summarize(*samples.volume);
-    summary.range = at.surveyed->range;
-    summary.histogram = at.surveyed->histogram;
+    summary = WithStatistics(std::move(summary), *at.surveyed);
     summary.non_finite = at.surveyed->non_finite;
     summary.labels = at.surveyed->labels;
   } else {

@@ -20,6 +20,7 @@
 #include "common/wire/limits.h"
 #include "data/brick_store/brick_store.h"
 #include "data/catalogue/client_file.h"
+#include "data/catalogue/other_times.h"
 #include "data/layers/label_table.h"
 #include "data/open/open_source.h"
 #include "data/open/read_volume.h"
@@ -212,6 +213,18 @@ std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, cons
   return index.ok() && *index ? std::make_shared<const BrickIndex>(**std::move(index)) : nullptr;
 }
 
+// All times of a dataset look alike.
+void AddOtherTimes(const DataSource& source, ReadableSource& read) {
+  if (source.statistics != nullptr) return;
+  if (auto* const loaded = std::get_if<LoadedSource>(&read)) {
+    loaded->other_times = SurveyOtherTimes(source.path, loaded->file);
+    return;
+  }
+  auto& opened = std::get<OpenedSource>(read);
+  const std::vector<VolumeSummary> others = SurveyOtherTimes(source.path, opened.source->info());
+  if (!others.empty()) opened.survey.summary = std::make_shared<const VolumeSummary>(OverTimes(*opened.survey.summary, others));
+}
+
 Status BeingWritten(const DataSource& source) {
   return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
 }
@@ -232,9 +245,14 @@ struct WayToRead {
   std::function<Result<ReadableSource>()> read;
 };
 
-// `labels`: null: it has values.
+// `labels`: null: it has values. `statistics`: DataSource::statistics.
 Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
-                                ReadProgress& progress, std::shared_ptr<const LabelTable> labels = nullptr) {
+                                ReadProgress& progress, const std::shared_ptr<const VolumeSummary>& statistics,
+                                std::shared_ptr<const LabelTable> labels = nullptr) {
+  if (statistics != nullptr) {
+    auto known = std::make_shared<const VolumeSummary>(UnreadSummary(source->info().finest(), *statistics));
+    return ReadableSource(OpenedSource{std::move(source), {0, true, std::move(known)}, std::move(place), nullptr, std::move(index)});
+  }
   Result<Survey> survey = SurveySource(*source, !SchemeOf(place).empty() ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
   if (labels != nullptr) {
@@ -284,14 +302,14 @@ std::string PlaceOf(const DataSource& data, const SourceText& text) {
 }
 
 // Of a stream, or samples in several files, larger than what may be held.
-Result<ReadableSource> ReadStream(const std::string& source, std::uint64_t most_bytes, ReadProgress& progress) {
+Result<ReadableSource> ReadStream(const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
   constexpr std::uint64_t kLeastMemory = std::uint64_t{64} << 20, kMostMemory = std::uint64_t{1} << 30;
   const Result<StoreFolder> stores = StoreFolder::Usual();
   if (!stores.ok()) return stores.status();
   Result<StoredStream> stored =
-      OpenStored(source, *stores, ProcessReadContext(), {.memory = std::clamp(most_bytes, kLeastMemory, kMostMemory)}, &progress);
+      OpenStored(data.path, *stores, ProcessReadContext(), {.memory = std::clamp(most_bytes, kLeastMemory, kMostMemory)}, &progress);
   if (!stored.ok()) return stored.status();
-  return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress);
+  return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress, data.statistics);
 }
 
 Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
@@ -311,17 +329,17 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   const Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
   if (!colors.ok()) return colors.status();
   way.files.insert(way.files.end(), colors->files.begin(), colors->files.end());
+  if (!info.growth.empty()) way.files.push_back(info.growth);
   if (info.whole || !is_large || (labels && info.slices)) {
     way.read = [source, text = *std::move(text), named = data.label_colors] { return ReadWhole(*source, text, named); };
   } else if (info.slices) {
-    way.read = [path = data.path, most_bytes, &progress] { return ReadStream(path, most_bytes, progress); };
+    way.read = [data, most_bytes, &progress] { return ReadStream(data, most_bytes, progress); };
   } else {
-    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, named = data.label_colors,
-                &progress]() -> Result<ReadableSource> {
+    way.read = [source, data, place = PlaceOf(data, *text), text = *text, &progress]() -> Result<ReadableSource> {
       WarnOfComponents(text, source->info());
-      const Result<std::shared_ptr<const LabelTable>> known = KnownLabels(text, named, source->info(), nullptr);
+      const Result<std::shared_ptr<const LabelTable>> known = KnownLabels(text, data.label_colors, source->info(), nullptr);
       if (!known.ok()) return known.status();
-      return Surveyed(source, place, FindIndex(source_text, source->info()), progress, *known);
+      return Surveyed(source, place, FindIndex(data.path, source->info()), progress, data.statistics, *known);
     };
   }
   return way;
@@ -331,7 +349,9 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
 Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, const FileStamp& before) {
   const auto* const opened = std::get_if<OpenedSource>(&read);
   if (opened == nullptr) return std::make_shared<const FileStamp>(before);
-  Result<FileStamp> stamp = StampFiles(opened->source->info().files);
+  std::vector<std::string> files = opened->source->info().files;
+  if (const std::string& growth = opened->source->info().growth; !growth.empty()) files.push_back(growth);
+  Result<FileStamp> stamp = StampFiles(files);
   if (!stamp.ok()) return stamp.status();
   return std::make_shared<const FileStamp>(*std::move(stamp));
 }
@@ -481,6 +501,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     const Result<std::uint64_t> version = VersionOf(opened.files);
     if (!opened.files.empty() && (!version.ok() || *version != opened.version)) continue;  // they have changed since it was opened
     Result<ReadableSource> read = way->read();
+    if (read.ok()) AddOtherTimes(source, *read);
     Result<std::shared_ptr<const FileStamp>> stamp = std::shared_ptr<const FileStamp>();
     if (read.ok()) stamp = StampOf(*read, *before);
     const Result<bool> changed = HaveChanged(*before);

@@ -86,6 +86,7 @@ struct LoadedSource {
   std::shared_ptr<const LabelTable> labels = {};   // of labels
   std::shared_ptr<const FileStamp> stamp;          // the state of its files when they were read; null: they never change
   std::shared_ptr<const ExactSamples> exact = {};  // the whole numbers that the volume rounds; null: it rounds none
+  std::vector<VolumeSummary> other_times = {};     // SurveyOtherTimes
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

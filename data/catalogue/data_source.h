@@ -34,6 +34,7 @@ struct SourceAtLevel {
   StoredAt stored;                                // where workers find it
   std::shared_ptr<const FileStamp> stamp;         // the state of its files
   std::shared_ptr<const BrickIndex> index = {};   // the source's brick index; null: there is none
+  int times = 1;                                  // of its dataset
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
@@ -63,6 +64,9 @@ struct DataSource {
   // Fields with a grid of their own; null: there is none. Only a named dataset has them.
   std::shared_ptr<const DataSource> overlay = {}, labels = {};
   std::string label_colors = {};  // of labels: the table of their colours (label_table.h)
+  // Range and histogram of its field over the times of its dataset. Set: this is another time than the one that the dataset shows itself,
+  // and is not surveyed. Null: they are those that a survey finds.
+  std::shared_ptr<const VolumeSummary> statistics = {};
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
   DataLoader load;                         // set: `path` is not used

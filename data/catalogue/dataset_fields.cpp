@@ -45,13 +45,14 @@ std::shared_ptr<const DatasetFields> FieldsOf(const DataSource& source, const So
   return std::make_shared<const DatasetFields>(std::move(fields));
 }
 
-DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time) {
+DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time,
+                          std::shared_ptr<const VolumeSummary> statistics) {
   const FieldInfo& info = fields.fields[std::size_t(field)];
-  if (!info.channel) return info.labels ? *source.labels : *source.overlay;
-  DataSource at = source;
+  DataSource at = info.channel ? source : info.labels ? *source.labels : *source.overlay;
   at.overlay = at.labels = nullptr;
-  if (field != fields.field) at.path = WithReadOption(at.path, "channel", std::to_string(field));
-  if (fields.times.count > 1) at.path = AtTime(at.path, time);  // named even if it is the standard one: nobody needs to be told of a choice
+  if (info.channel && field != fields.field) at.path = WithReadOption(at.path, "channel", std::to_string(field));
+  if (time != fields.time) at.path = AtTime(at.path, time);
+  at.statistics = std::move(statistics);
   return at;
 }
 

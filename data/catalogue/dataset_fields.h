@@ -13,7 +13,9 @@ namespace slabstream {
 // time.
 std::shared_ptr<const DatasetFields> FieldsOf(const DataSource& source, const SourceInfo& info);
 
-// Where a field is read at a time. Both are some of `fields`.
-DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time);
+// Where a field is read at a time. Both are some of `fields`. `statistics`: DataSource::statistics at another time than the
+// dataset's own; else null.
+DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time,
+                          std::shared_ptr<const VolumeSummary> statistics);
 
 }  // namespace slabstream

@@ -10,6 +10,7 @@
 #include "common/volume/memory_budget.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/metadata/open_store_for.h"
+#include "data/open/file_times.h"
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/positional/file_source.h"
@@ -61,11 +62,20 @@ const std::vector<VolumeFormat>& VolumeFormats() {
 }
 
 const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& options) {
-  return IsUrl(path) ? nullptr : FindFormat(VolumeFormats(), path, options);
+  if (IsUrl(path)) return nullptr;
+  if (!NamesFileTimes(path)) return FindFormat(VolumeFormats(), path, options);
+  const Result<std::string> first = FirstFileOf(path);
+  return first.ok() ? FindFormat(VolumeFormats(), *first, options) : nullptr;
 }
 
 Status CheckVolume(const std::string& path, const ReadOptions& options) {
   if (IsUrl(path)) return Status::Ok();
+  if (NamesFileTimes(path)) {
+    const Result<std::string> first = FirstFileOf(path);
+    ReadOptions of_file = options;
+    of_file.time.reset();
+    return first.ok() ? CheckVolume(*first, of_file) : Printable(first.status());
+  }
   std::error_code error;
   const auto kind = std::filesystem::status(path, error).type();
   if (kind == std::filesystem::file_type::not_found) return Printable(Status::NotFound(path + ": no such file"));
@@ -83,6 +93,11 @@ bool LooksLikeVolume(const std::string& path) { return CheckVolume(path).ok(); }
 namespace {
 
 Result<std::shared_ptr<VolumeSource>> OpenValues(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  if (!IsUrl(path) && NamesFileTimes(path)) {
+    const auto open = [&](const std::string& file, const ReadOptions& of_file) { return OpenValues(file, of_file, context); };
+    Result<std::shared_ptr<VolumeSource>> source = OpenFileTimes(path, options, open);
+    return source.ok() ? source : Printable(source.status());
+  }
   if (!IsUrl(path)) {
     if (Status status = CheckVolume(path, options); !status.ok()) return status;
     const VolumeFormat& format = *FindFormat(path, options);

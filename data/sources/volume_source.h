@@ -68,6 +68,7 @@ struct SourceInfo {
   std::vector<std::string> notes = {};
   std::vector<std::string> files = {};    // whose time of change tells that it is another volume now (FileStamp)
   std::uint64_t version = 0;              // the version of these files when it was opened (VersionOf); only an opened source has one
+  std::string growth = {};                // the folder in which files of further times may come; "": there is none
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
   // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).

@@ -68,7 +68,7 @@ TEST_F(FieldRules, AFrameShowsAllChannelsOnceTheyAreThere) {
   EXPECT_THAT(LoadedNames(), ElementsAre("block"));
   EXPECT_THAT(HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[0])))), IsEmpty());
   ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 1, 0), PartName("block", 2, 0))) << "the overlay is not asked for";
-  EXPECT_EQ(script.loads[1].source.path, "/named/block.tif?channel=1,time=0");
+  EXPECT_EQ(script.loads[1].source.path, "/named/block.tif?channel=1");
   EXPECT_THAT(HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[2])))), IsEmpty());
   const std::vector<GroupAssignment> groups = HandedOut(NothingChanged(Loaded(LoadDataset(script.loads[1]))));
   ASSERT_THAT(groups, SizeIs(1));
@@ -171,6 +171,122 @@ TEST_F(FieldRules, AFrameShowsOneTimeOfAllItsFields) {
   ASSERT_THAT(groups, SizeIs(1));
   EXPECT_EQ(groups[0].setup.dataset, of(PartName("block", 0, 3))->load);
   EXPECT_EQ(groups[0].setup.fields.at(0).levels.at(0).dataset, of(PartName("block", 2, 3))->load);
+}
+
+// All times of a channel are drawn by the statistics of the dataset's own time, so those are there before another time is read.
+TEST_F(FieldRules, AnotherTimeIsReadWithTheStatisticsOfTheDatasetsOwn) {
+  script.Client(kClient, Showing(1, {"0", "2"}, "3"));
+  NothingChanged(Loaded(LoadDataset(script.loads[0])));
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 2, 0)));
+  NothingChanged(Loaded(LoadDataset(script.loads[1])));
+  ASSERT_THAT(LoadedNames(2), ElementsAre(PartName("block", 0, 3), PartName("block", 2, 3)));
+  for (const LoadDataset& load : script.loads) EXPECT_EQ(load.source.statistics != nullptr, load.name.ends_with(" time 3")) << load.name;
+  script.AnswerAll(LoadedAll(2));
+  script.Client(kClient, Showing(2, {"2"}, "4"));
+  ASSERT_THAT(LoadedNames(4), ElementsAre(PartName("block", 2, 4))) << "its statistics are known";
+  EXPECT_NE(script.loads[4].source.statistics, nullptr);
+}
+
+// A question about another time comes first: a later picture of it is drawn by the same statistics all the same.
+TEST_F(FieldRules, AQuestionAboutAnotherTimeWaitsForTheStatistics) {
+  script.Client(kClient, SampleQuery{.nonce = 1, .dataset = "block", .points = {{1, 1, 1}}, .field = "2", .time = "3"});
+  NothingChanged(Loaded(LoadDataset(script.loads[0])));
+  ASSERT_THAT(LoadedNames(1), ElementsAre(PartName("block", 2, 0)));
+  LoadedAll(1);
+  const auto part = std::ranges::find(script.loads, PartName("block", 2, 3), &LoadDataset::name);
+  ASSERT_NE(part, script.loads.end());
+  EXPECT_NE(part->source.statistics, nullptr);
+}
+
+// What has a source of its own tells how many times it has when it is opened.
+TEST_F(FieldRules, AFieldWithASourceOfItsOwnHasOneTimeOrAsManyAsTheDataset) {
+  const auto shown_with = [&](RequestId request, int times) {
+    script.Client(kClient, Showing(request, {"0", "overlay"}, "3"));
+    Actions actions;
+    for (std::size_t i = 0; i < script.loads.size(); ++i) {
+      const LoadDataset load = script.loads[i];
+      auto fields = std::make_shared<DatasetFields>();
+      fields->times.count = times;
+      CoordinatorScript::Append(actions,
+                                load.name == PartName("block", 3, 0)
+                                    ? script.Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary(), 0, stamp_, fields})
+                                    : Loaded(load));
+    }
+    return NothingChanged(std::move(actions));
+  };
+  const auto of = [&](const std::string& name) { return std::ranges::find(script.loads, name, &LoadDataset::name); };
+  const std::vector<GroupAssignment> groups = HandedOut(shown_with(1, 5));
+  ASSERT_THAT(groups, SizeIs(1));
+  ASSERT_NE(of(PartName("block", 3, 3)), script.loads.end());
+  EXPECT_EQ(of(PartName("block", 3, 3))->source.path, "/named/map.nii?time=3");
+  EXPECT_EQ(groups[0].setup.fields.at(0).levels.at(0).dataset, of(PartName("block", 3, 3))->load);
+}
+
+TEST_F(FieldRules, AFieldWithOtherTimesThanTheDatasetIsRefusedInOneLine) {
+  script.Client(kClient, Showing(1, {"0", "overlay"}, "3"));
+  Actions actions = Loaded(LoadDataset(script.loads[0]));
+  ASSERT_EQ(LoadedNames().back(), PartName("block", 3, 0));
+  const LoadDataset load = script.loads.back();
+  CoordinatorScript::Append(actions, script.Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary(), 0, stamp_,
+                                                               std::make_shared<DatasetFields>(DatasetFields{.times = {.count = 7}})}));
+  EXPECT_THAT(Failures(NothingChanged(std::move(actions))),
+              ElementsAre("field 'overlay' of dataset \"block\" has 7 times, must have one or 5, as the dataset"));
+}
+
+// The newest time is that of now: what is known of the dataset is not enough until its files have been looked at.
+TEST_F(FieldRules, TheLastTimeIsThatOfTheFilesAsTheyAre) {
+  script.Client(kClient, Showing(1, {"0"}, "0"));
+  script.AnswerAll(LoadedAll());
+  const std::size_t before = script.loads.size();
+  const Actions looks = script.Client(kClient, Showing(2, {"0"}, "last"));
+  EXPECT_THAT(LoadedNames(before), IsEmpty());
+  const std::vector<CheckDatasetFiles> asked = Of<CheckDatasetFiles>(looks);
+  ASSERT_THAT(asked, SizeIs(1));
+  script.Step(DatasetSeen{asked[0].name, asked[0].load, true});
+  ASSERT_THAT(LoadedNames(before), ElementsAre("block")) << "a time has come";
+  const auto grown = std::make_shared<DatasetFields>(*ThreeChannels());
+  grown->times.count = 6;
+  const LoadDataset load = script.loads.back();
+  Actions actions = script.Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary(), 0, stamp_, grown});
+  actions = NothingChanged(std::move(actions));
+  EXPECT_THAT(LoadedNames(before + 1), ElementsAre(PartName("block", 0, 5)));
+}
+
+TEST_F(FieldRules, WhoAsksForTheStatusHearsOfNewTimes) {
+  script.Client(kClient, Showing(1, {"0"}, "0"));
+  script.AnswerAll(LoadedAll());
+  script.Pass(seconds(30));
+  const Actions looks = script.Client(kClient, StatusQuery{});
+  const std::vector<CheckDatasetFiles> asked = Of<CheckDatasetFiles>(looks);
+  ASSERT_THAT(asked, SizeIs(1));
+  EXPECT_THAT(Of<CheckDatasetFiles>(script.Client(kClient, StatusQuery{})), IsEmpty()) << "not at each question";
+  const std::size_t before = script.loads.size();
+  script.Step(DatasetSeen{asked[0].name, asked[0].load, true});
+  EXPECT_THAT(LoadedNames(before), ElementsAre("block")) << "though nobody asks for a picture";
+}
+
+// Movies of any number of times: what was shown long ago is closed, what a frame waits for is not.
+TEST_F(FieldRules, FieldsAtManyTimesAreClosedAgain) {
+  const auto many = std::make_shared<DatasetFields>(*ThreeChannels());
+  many->times.count = 10 * int(kMostParts);
+  script.Client(kClient, Showing(1, {"0"}, "1"));
+  const LoadDataset block = script.loads[0];
+  Actions actions = script.Step(DatasetLoaded{block.name, block.load, block.load, BlockSummary(), 0, stamp_, many});
+  std::size_t unloaded = 0;
+  for (int time = 1; time < int(kMostParts) + 20; ++time) {
+    if (time > 1) actions = script.Client(kClient, Showing(RequestId(time), {"0"}, std::to_string(time)));
+    const LoadDataset load = script.loads.back();
+    ASSERT_EQ(load.name, PartName("block", 0, time));
+    CoordinatorScript::Append(actions, Loaded(load));
+    actions = NothingChanged(std::move(actions));
+    ASSERT_THAT(HandedOut(actions), SizeIs(1)) << time;
+    actions = script.AnswerAll(std::move(actions));
+    unloaded += Of<UnloadDataset>(actions).size();
+  }
+  EXPECT_GE(unloaded, 10U);
+  const std::size_t before = script.loads.size();
+  script.Client(kClient, Showing(9999, {"0"}, "1"));
+  EXPECT_THAT(LoadedNames(before), ElementsAre(PartName("block", 0, 1))) << "it is read again";
 }
 
 TEST_F(FieldRules, WhatIsNotThereIsRefusedInOneLine) {

@@ -259,20 +259,53 @@ TEST_F(DatasetRules, TheLeastRecentlyUsedIsUnloadedAndLoadedAgainWhenAskedFor) {
   EXPECT_EQ(StateOf(0), DatasetState::kUnloaded);
 }
 
-TEST_F(DatasetRules, WhatFramesNeedStaysAndWhatComesOnTopIsRefused) {
+TEST_F(DatasetRules, WhatFramesNeedStaysAndWhatComesOnTopWaitsForTheirEnd) {
   script.Join(11, 1);
   script.Client(kClient, Frame(1, 1, "a"));
   const std::vector<GroupAssignment> running = HandedOut(Loaded(200 * kMebi));
   ASSERT_THAT(running, SizeIs(1));
   script.Client(kClient, Frame(2, 1, "b"));
   const Actions actions = Loaded(150 * kMebi);
+  EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
+  EXPECT_THAT(HandedOut(actions), IsEmpty());
+  ASSERT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
+  EXPECT_EQ(Of<UnloadDataset>(actions)[0].dataset, IdOf("b"));
+  EXPECT_EQ(StateOf(1), DatasetState::kUnloaded);
+  const std::size_t loads = script.loads.size();
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Answer(running[0]))), SizeIs(1));
+  ASSERT_EQ(script.loads.size(), loads + 1) << "the frame has ended";
+  const Actions second = Loaded(150 * kMebi);
+  ASSERT_THAT(Of<UnloadDataset>(second), SizeIs(1));
+  EXPECT_EQ(Of<UnloadDataset>(second)[0].dataset, IdOf("a"));
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(second)), SizeIs(1));
+}
+
+TEST_F(DatasetRules, WhatTheEndOfFramesMakesNoRoomForIsRefused) {
+  script.Join(11, 1);
+  script.Client(kClient, Frame(1, 1, "a"));
+  ASSERT_THAT(HandedOut(Loaded(100 * kMebi)), SizeIs(1));
+  script.Client(kClient, Frame(2, 1, "b"));
+  const Actions actions = Loaded(350 * kMebi);
   const auto failed = ToClients<FrameFailed>(actions);
   ASSERT_THAT(failed, SizeIs(1));
   EXPECT_EQ(failed[0].message.request, 2U);
-  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("dataset \"b\" needs 150 MiB, limit 300 MiB (200 MiB are in use"));
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("dataset \"b\" needs 350 MiB, limit 300 MiB (100 MiB are in use"));
   ASSERT_THAT(Of<UnloadDataset>(actions), SizeIs(1));
   EXPECT_EQ(Of<UnloadDataset>(actions)[0].dataset, IdOf("b"));
-  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Answer(running[0]))), SizeIs(1));
+}
+
+TEST_F(DatasetRules, ALoadWithoutMemoryWaitsForTheEndOfFrames) {
+  script.Join(11, 1);
+  script.Client(kClient, Frame(1, 1, "a"));
+  const std::vector<GroupAssignment> running = HandedOut(Loaded(200 * kMebi));
+  script.Client(kClient, Frame(2, 1, "b"));
+  const std::size_t loads = script.loads.size();
+  const Status no_memory = Status::ResourceExhausted("b.nrrd needs 300 MiB");
+  EXPECT_THAT(ToClients<FrameFailed>(script.Step(DatasetFailed{"b", script.loads.back().load, no_memory})), IsEmpty());
+  EXPECT_EQ(script.loads.size(), loads);
+  script.AnswerAll(script.Answer(running.at(0)));
+  ASSERT_EQ(script.loads.size(), loads + 1);
+  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(Loaded(150 * kMebi))), SizeIs(1));
 }
 
 TEST_F(DatasetRules, ALoadWithoutMemoryIsTriedAgainWhenOthersAreUnloaded) {

@@ -544,8 +544,8 @@ TEST_F(CatalogueTest, LayersFollowANamedVolume) {
   ASSERT_NE(fields, nullptr);
   ASSERT_EQ(fields->fields.size(), 2U);
   EXPECT_FALSE(fields->fields[1].channel || fields->fields[1].shown);
-  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 1, 0).path, layer);
-  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 0, 0).path, volume);
+  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 1, 0, nullptr).path, layer);
+  EXPECT_EQ(AtFieldAndTime(with_overlay, *fields, 0, 0, nullptr).path, volume);
 }
 
 TEST_F(CatalogueTest, ALoadedFileHasAStampThatTellsOfEveryChange) {

@@ -126,6 +126,50 @@ TEST(Summary, OfOneValueIsOneBin) {
   }
 }
 
+std::uint64_t Counted(const VolumeSummary& summary) {
+  return std::accumulate(summary.histogram.begin(), summary.histogram.end(), std::uint64_t{0});
+}
+
+// A dark time with many voxels read, and a bright one with few: half of all values are dark.
+TEST(OverTimes, GivesEachTimeTheSameWeight) {
+  const VolumeSummary dark = Summarize(MakeTestVolume({64, 32, 32}, ScalarType::kUint16, [](const Index3& v) { return v.x % 10; }));
+  const VolumeSummary bright = Summarize(MakeTestVolume({8, 8, 8}, ScalarType::kUint16, [](const Index3& v) { return 1000 + v.x; }));
+  const VolumeSummary both = OverTimes(dark, std::vector{bright});
+  EXPECT_EQ(both.range, (ValueRange{0, 1007}));
+  EXPECT_EQ(both.times, 2);
+  EXPECT_EQ(both.bricks, dark.bricks) << "bricks are those of its own time";
+  EXPECT_NEAR(double(Counted(both)), double(Counted(dark)), 4);
+  const std::uint64_t below =
+      std::accumulate(both.histogram.begin(), both.histogram.begin() + HistogramBin(both.range, 500), std::uint64_t{0});
+  EXPECT_NEAR(double(below), double(Counted(dark)) / 2, 2);
+}
+
+TEST(OverTimes, IsThatOfTheVolumeWhereTimesAreEqual) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : kTypes) {
+    const VolumeSummary one = Summarize(RandomVolume(random, {20, 21, 22}, type));
+    const VolumeSummary over = OverTimes(one, std::vector{one, one});
+    EXPECT_EQ(over.range, one.range);
+    for (int bin = 0; bin < kHistogramBins; ++bin) {
+      EXPECT_NEAR(double(over.histogram.at(std::size_t(bin))), double(one.histogram.at(std::size_t(bin))), 1) << bin;
+    }
+  }
+}
+
+TEST(OverTimes, TakesTimesOfOneValueAndOfNone) {
+  const auto of = [](float value) {
+    return Summarize(MakeTestVolume({4, 4, 4}, ScalarType::kFloat32, [=](const Index3&) { return value; }));
+  };
+  const VolumeSummary over = OverTimes(of(kNan), std::vector{of(3), of(-5)});
+  EXPECT_EQ(over.range, (ValueRange{-5, 3}));
+  EXPECT_EQ(over.non_finite, 64) << "of its own time";
+  EXPECT_EQ(over.histogram.front(), 32U);
+  EXPECT_EQ(over.histogram.back(), 32U);
+  EXPECT_EQ(OverTimes(of(kNan), std::vector{of(kNan)}).range, (ValueRange{0, 0}));
+  EXPECT_EQ(OverTimes(of(3), {}), of(3));
+}
+
 TEST(HistogramBin, GivesUpTo256IntegersABinEach) {
   for (int last = 1; last < kHistogramBins; ++last) {
     int before = -1;

@@ -1,0 +1,93 @@
+#include "data/open/file_times.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "common/text/natural_order.h"
+#include "common/text/wildcard.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string FolderOf(const std::string& pattern) {
+  const fs::path folder = fs::path(pattern).parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+Result<std::vector<std::string>> FilesOf(const std::string& pattern) {
+  const std::string folder = FolderOf(pattern), names = fs::path(pattern).filename().string();
+  std::vector<std::string> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with('.') || !MatchesPattern(name, names)) continue;
+    if (files.size() == kMaxFileTimes) return Status::ResourceExhausted(fmt::format("{}: more than {} files", pattern, kMaxFileTimes));
+    files.push_back((fs::path(folder) / name).string());
+  }
+  if (error) return Status::NotFound(fmt::format("{}: {}", folder, error.message()));
+  if (files.empty()) return Status::NotFound(pattern + ": no file has such a name");
+  std::ranges::sort(files, {}, [](const std::string& file) { return InNaturalOrder(file); });
+  return files;
+}
+
+class FileAtTime : public DescribedSource {
+ public:
+  using DescribedSource::DescribedSource;
+
+ private:
+  Result<LevelInMemory> DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted) override {
+    return source_->ReadLevel(level, progress, wanted);
+  }
+};
+
+}  // namespace
+
+bool NamesFileTimes(const std::string& path) {
+  std::error_code error;
+  return fs::path(path).filename().string().find('*') != std::string::npos && !fs::exists(path, error);
+}
+
+Result<std::string> FirstFileOf(const std::string& pattern) {
+  const Result<std::vector<std::string>> files = FilesOf(pattern);
+  return files.ok() ? Result(files->front()) : files.status();
+}
+
+Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& pattern, const ReadOptions& options, const OpenFileFunction& open) {
+  Result<std::vector<std::string>> files = FilesOf(pattern);
+  if (!files.ok()) return files.status();
+  ReadOptions of_file = options;
+  of_file.time.reset();
+  if (!options.time && files->size() > 1) {
+    ReadOptions of_newest = of_file;
+    of_newest.headers_only = true;
+    if (!open(files->back(), of_newest).ok()) files->pop_back();
+  }
+  const int count = int(files->size()), time = options.time ? options.time->first : 0;
+  if (time >= count) {
+    return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]: a file each", pattern, time, count - 1));
+  }
+  if (!options.time && !options.describe && count > 1) {
+    return Status::InvalidArgument(
+        fmt::format("{}: holds {} volumes, a file each, of which --time takes one: 0 to {}", pattern, count, count - 1));
+  }
+  Result<std::shared_ptr<VolumeSource>> source = open((*files)[std::size_t(time)], of_file);
+  if (!source.ok()) return source;
+  SourceInfo info = (*source)->info();
+  if (info.times.count > 1) {
+    return Status::InvalidArgument(fmt::format("{}: holds {} times itself, but is one of {} files with a time each",
+                                               (*files)[std::size_t(time)], info.times.count, count));
+  }
+  info.times.count = count;
+  info.time = time;
+  if (!options.time) info.growth = FolderOf(pattern);
+  return std::shared_ptr<VolumeSource>(std::make_shared<FileAtTime>(*std::move(source), std::move(info)));
+}
+
+}  // namespace slabstream
