@@ -167,6 +167,8 @@ struct AnswerQuestion {
   // the levels, for a ViewQuery about such a dataset; its summary is the overview's
   std::shared_ptr<const VolumeLevels> levels = nullptr;
   ShownFields fields = {};  // the field that it is about
+  // A SummaryQuery about the time that it names, and not about all: range and histogram are those of the voxels, which `summary` is not of.
+  bool at_time = false;
   // Fields that it is about, too; `summary` is null of one that is not there, or that the question does not need.
   struct Other {
     DatasetId dataset = 0;  // 0: a SummaryQuery, which needs no voxels

@@ -124,7 +124,14 @@ void DatasetMachine::State::AskExecutor() {
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
     const bool about_view = std::holds_alternative<ViewQuery>(open.question);
     std::shared_ptr<const VolumeSummary> summary;
-    if (levels != nullptr && of_summary) {
+    const auto* const about = std::get_if<SummaryQuery>(&open.question);
+    const bool at_time = about != nullptr && !about->time.empty() && open.fields.dataset->times.count > 1;
+    if (levels != nullptr && at_time) {
+      open.summary = std::make_shared<const VolumeSummary>(StatisticsOf(*levels));
+      open.entry = LevelName(open.entry, int(levels->levels.size()) - 1);
+      open.check = Seek(open.entry);
+      if (!can_be_asked(open)) continue;
+    } else if (levels != nullptr && of_summary) {
       summary = std::make_shared<const VolumeSummary>(StatisticsOf(*levels));
     } else if (levels != nullptr && about_view) {
       summary = levels->overview;
@@ -136,9 +143,14 @@ void DatasetMachine::State::AskExecutor() {
       if (!can_be_asked(open)) continue;
     }
     const DatasetTable::Entry& entry = *datasets.Find(open.entry);
+    if (open.summary != nullptr) {
+      VolumeSummary of_all = *open.summary;
+      of_all.stored = entry.summary->stored;
+      summary = std::make_shared<const VolumeSummary>(std::move(of_all));
+    }
     open.asked = true;
-    AnswerQuestion ask{id,         open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
-                       open.fields};
+    AnswerQuestion ask{id,          open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
+                       open.fields, at_time};
     const auto other = [&](const Use::Entry& of) -> AnswerQuestion::Other {
       if (of.name.empty()) return {};
       const DatasetTable::Entry& found = *datasets.Find(of.name);

@@ -59,10 +59,11 @@ struct DatasetMachine::State {
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    std::string entry;        // the entry of the table that it waits for
-    CheckId check = 0;        // the check of its files, which must be over first; 0: none
-    bool asked = false;       // whether the executor was asked
-    ShownFields fields = {};  // once it waits for the field that it is about: that field alone
+    std::string entry;                                       // the entry of the table that it waits for
+    CheckId check = 0;                                       // the check of its files, which must be over first; 0: none
+    bool asked = false;                                      // whether the executor was asked
+    ShownFields fields = {};                                 // once it waits for the field that it is about: that field alone
+    std::shared_ptr<const VolumeSummary> summary = nullptr;  // once it waits for voxels of a level, but is about all of them
     // Other entries that it waits for; without a name: none.
     Use::Entry overlay = {}, labels = {};
 

@@ -15,12 +15,14 @@
 #include "common/planning/frame_plan.h"
 #include "common/planning/levels.h"
 #include "common/planning/shown_zones.h"
+#include "common/text/url.h"
 #include "common/volume/affine_map.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/joint_histogram.h"
 #include "coordinator/probe/percentiles.h"
 #include "coordinator/probe/pick.h"
+#include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {
@@ -63,8 +65,9 @@ Result<TransferFunction> TransferOf(const SummaryQuery& query, const VolumeSumma
   return std::move(look->transfer);
 }
 
+// `summary`: what is told. Pictures are shown by that of all times.
 Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary, const AnswerQuestion& asked) {
-  Result<TransferFunction> transfer = TransferOf(query, summary, asked.fields);
+  Result<TransferFunction> transfer = TransferOf(query, *asked.summary, asked.fields);
   if (!transfer.ok()) return transfer.status();
   SummaryReply reply{.nonce = query.nonce,
                      .description = summary.description,
@@ -80,6 +83,23 @@ Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSumma
   }
   for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
   return QuestionReply(std::move(reply));
+}
+
+// Of the time that the question names alone.
+Result<QuestionReply> AnswerAtTime(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
+  VolumeSummary summary = *asked.summary;
+  std::shared_ptr<const VolumeSummary> own = samples.own;
+  if (const auto& source = samples.in_parts.source != nullptr ? samples.in_parts.source : samples.read_from; source != nullptr) {
+    const bool far = summary.stored && !SchemeOf(summary.stored->source).empty();
+    const Result<Survey> survey = SurveySource(*source, far ? kFarSurvey : SurveyBytes());
+    if (!survey.ok()) return survey.status();
+    own = survey->summary;
+  }
+  if (own != nullptr) {
+    summary = WithStatistics(std::move(summary), *own);
+    summary.non_finite = own->non_finite;
+  }
+  return AnswerSummary(query, summary, asked);
 }
 
 Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) {
@@ -329,6 +349,7 @@ Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::S
   }
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary, asked);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+  if (asked.at_time) return AnswerAtTime(std::get<SummaryQuery>(asked.question), asked, samples);
   if (samples.in_parts.source != nullptr) {
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts, labels); }, asked.question);
   }

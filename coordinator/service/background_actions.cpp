@@ -142,11 +142,13 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 // A volume that was read as a whole.
 Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
   const std::shared_ptr<const Volume>& volume = loaded.volume;
-  VolumeSummary found = OverTimes(SummaryOf(*volume), loaded.other_times);
+  VoxelServer::Samples samples;
+  VolumeSummary found = SummaryOf(*volume);
+  if (action.source.statistics != nullptr || !loaded.other_times.empty()) samples.own = std::make_shared<const VolumeSummary>(found);
+  found = OverTimes(std::move(found), loaded.other_times);
   if (action.source.statistics != nullptr) found = WithStatistics(std::move(found), *action.source.statistics);
   found.labels = loaded.labels;
   auto summary = std::make_shared<const VolumeSummary>(std::move(found));
-  VoxelServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
   if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
   if (!held && MostBricksAreEqual(*summary)) {

@@ -49,6 +49,8 @@ class VoxelServer {
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
     std::shared_ptr<VolumeSource> read_from = nullptr;  // where `volume` was read from, if chunks tell what was read of it
+    // What is known of these voxels alone, where their dataset has the range and histogram of several times.
+    std::shared_ptr<const VolumeSummary> own = nullptr;
     std::optional<VolumeDescription> description = {};  // describes what is held; none: nobody can ask for its light volume
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }

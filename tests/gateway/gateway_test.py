@@ -396,6 +396,7 @@ class HttpTest(WithService):
             self.assertEqual(self.ask("histogram", dataset="times", time=time)["range"], [value, value])
             profile = self.ask("profile", **{"dataset": "times", "time": time, "from": "0,0,0", "to": "1,0,0", "samples": 2})
             self.assertEqual(profile["values"], [value, value])
+        self.assertEqual(self.ask("histogram", dataset="times")["range"], [1, 3], "of all times, as pictures are drawn")
         channels = self.datasets_with("channels")["channels"]
         self.assertEqual(channels["fields"], 2 * [{"name": "", "channel": True, "labels": False, "shown": True}])
         self.assertEqual((channels["times"], channels["field"], channels["time"]), ({"count": 1}, 0, 0))
@@ -728,6 +729,16 @@ class ViewTest(WithService):
         self.assertEqual({entry["worker"] for entry in statistics["timeline"]}, {w["worker"] for w in page.text("status")["workers"]})
         self.assertEqual(statistics["bytes"]["picture"], len(data))
         self.assertAlmostEqual(sum(v * v for v in header["geometry"]["right"]), 1)
+
+    def test_the_next_times_are_fetched_while_times_are_played(self):
+        page = self.page()
+        view = lambda time: page.final(page.view({"dataset": "times", "size": 32, "time": str(time)}))
+        view(0)
+        page.text("status", lambda status: any(each["name"] == "times" and "times" in each for each in status["datasets"]))
+        done = self.gateway.json("/api/v1/status")[1]["frames_done"]
+        view(1)
+        # It is drawn once, since there are no levels; and 2 and 0 are fetched, which follow 1.
+        wait_until(lambda: self.gateway.json("/api/v1/status")[1]["frames_done"] >= done + 3, "the next times")
 
     def test_the_latest_view_wins_and_a_slow_page_gets_few(self):
         page = self.page()
