@@ -4,6 +4,7 @@
     python3 bench/terabyte_store.py --port 8000 --delay 0.02       # each answer begins 20 ms after its request
     python3 bench/terabyte_store.py --port 8000 --blosc            # for readers that know no other codec and want every chunk
     python3 bench/terabyte_store.py --side 5120 --channels 4       # one terabyte in four channels
+    python3 bench/terabyte_store.py --side 5120 --labels           # one terabyte of labels of 64 bits, 1.2 million of them
     python3 bench/terabyte_store.py --side 512 --channels 2 --times 50 --bits 8
     python3 bench/terabyte_store.py --side 512 --channels 2 --times 50 --bits 8 --write cells.ome.zarr    # the same as a folder, then ends
 
@@ -11,6 +12,8 @@ An OME-Zarr 0.4 of 8192 x 8192 x 8192 values of 16 bits: 1.1 TB, in chunks of 64
 value is a sum of waves, from one along a side to one of eight voxels, and some noise; where the sum is low, it is 0: some 40 % of the volume.
 Each level has the waves that it can show. Chunks are packed with zstd, and chunks of zeros alone are not there. A chunk that was made once is
 kept; levels of at most 1024 voxels a side are made before the first request.
+
+With --labels there is a label of 64 bits where a value would be above 0: bent cells of some 48 voxels a side, each with a label of its own.
 
 With --channels or --times, channels have waves of their own, which move along x from time to time.
 
@@ -29,6 +32,7 @@ from numcodecs import Blosc, Zstd
 SIDE, CHUNK = 8192, 64
 MADE_BEFORE = 1024  # voxels of a side, at most: levels that are made before the first request
 EMPTY = 0.4
+CELL = 48  # voxels of a side
 TIME_STEP = 0.01  # of the side, that waves move
 NAME = "/volume.ome.zarr/"
 PAGES = b"Access-Control-Allow-Origin: *\r\n"  # of other servers may show it
@@ -51,6 +55,20 @@ class Formula:
         coarse = [self._sum(level, 0, 0, at) for at in numpy.ndindex((chunks_of(shape.side, level),) * 3)]
         self._least = numpy.quantile(coarse, EMPTY)
 
+    def _labels(self, level: int, chunk: tuple[int, int, int]) -> numpy.ndarray:
+        """Of the cell that holds the middle of each voxel."""
+        at = [(place * CHUNK + numpy.arange(CHUNK) + 0.5) * 2**level for place in chunk]
+        z, y, x = numpy.meshgrid(*at, indexing="ij", sparse=True)
+        bent = [a + CELL / 2 * numpy.sin(b / CELL) * numpy.sin(c / CELL) for a, b, c in ((z, y, x), (y, x, z), (x, z, y))]
+        count = numpy.uint64(self._shape.side // CELL + 3)
+        number = numpy.zeros((CHUNK,) * 3, numpy.uint64)
+        for along in bent:
+            number = number * count + numpy.floor(along / CELL + 1).astype(numpy.uint64)
+        # Bijective, so different cells have different labels; of 64 bits (a step of SplitMix64, Steele 2014).
+        number += numpy.uint64(1)
+        number = (number ^ (number >> numpy.uint64(30))) * numpy.uint64(0xBF58476D1CE4E5B9)
+        return number ^ (number >> numpy.uint64(27))
+
     def _sum(self, level: int, time: int, channel: int, chunk: tuple[int, int, int]) -> numpy.ndarray:
         side = self._shape.side
         shown = 2.0 ** numpy.arange(len(self._amplitude)) <= (side >> level) / 8  # eight voxels a wave
@@ -72,6 +90,8 @@ class Formula:
         above = self._sum(level, time, channel, chunk) - self._least
         if not self._shape.blosc and not (above > 0).any():
             return None
+        if self._shape.labels:
+            return self._codec.encode(numpy.where(above > 0, self._labels(level, chunk), 0).astype("<u8"))
         values = numpy.where(above > 0, 4000 + 30000 * above, 0).astype(numpy.uint16)
         values[above > 0] += self._noise[above > 0]
         return self._codec.encode(values if self._shape.bits == 16 else (values >> 8).astype(numpy.uint8))
@@ -109,12 +129,13 @@ def metadata(path: str, codec: dict, shape: argparse.Namespace) -> bytes | None:
         ]
         axes = [{"name": name, "type": {"t": "time", "c": "channel"}[name]} for name in before]
         axes += [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
-        return json.dumps({"multiscales": [{"version": "0.4", "name": "terabyte", "axes": axes, "datasets": levels}]}).encode()
+        labels = {"image-label": {"version": "0.4"}} if shape.labels else {}
+        return json.dumps({"multiscales": [{"version": "0.4", "name": "terabyte", "axes": axes, "datasets": levels}], **labels}).encode()
     level, _, file = path.partition("/")
     if file == ".zarray" and level.isdigit() and int(level) < levels_of(shape.side):
         sides = [*before.values()] + [shape.side >> int(level)] * 3
         array = {"zarr_format": 2, "shape": sides, "chunks": [1] * len(before) + [CHUNK] * 3, "order": "C", "fill_value": 0}
-        array |= {"dtype": "<u2" if shape.bits == 16 else "|u1", "compressor": codec, "filters": None, "dimension_separator": "/"}
+        array |= {"dtype": "<u8" if shape.labels else "<u2" if shape.bits == 16 else "|u1", "compressor": codec, "filters": None, "dimension_separator": "/"}
         return json.dumps(array).encode()
     return None
 
@@ -231,6 +252,7 @@ async def main() -> None:
     p.add_argument("--delay", type=float, default=0, metavar="SECONDS", help="between a request and its answer (default: 0)")
     p.add_argument("--side", type=int, default=SIDE, metavar="VOXELS", help=f"of the volume, in its finest level (default: {SIDE})")
     p.add_argument("--bits", type=int, default=16, choices=[8, 16], help="of a value (default: 16)")
+    p.add_argument("--labels", action="store_true", help="labels of 64 bits and no values")
     p.add_argument("--channels", type=int, default=1, help="(default: 1)")
     p.add_argument("--times", type=int, default=1, help="(default: 1)")
     p.add_argument("--write", metavar="FOLDER", type=pathlib.Path, help="write the volume there, whole, and serve nothing")
