@@ -128,7 +128,7 @@ Result<DatasetMachine::State::FieldSource> DatasetMachine::State::SourceOf(const
     entry.statistics[field] = found.levels != nullptr ? found.levels->overview : found.summary;
   }
   std::string name = PartName(dataset, field, time);
-  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field)), now);
+  parts_came |= datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field)), now);
   return FieldSource{name};
 }
 
@@ -582,7 +582,7 @@ std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time 
   if (!state.stopped) {
     if (now >= state.NextWake()) state.CheckEverything();
     state.AskExecutor();
-    state.ClosePartsThatNobodyWants();
+    if (std::exchange(state.parts_came, false)) state.ClosePartsThatNobodyWants();
     state.UnloadRetired();
     if (!state.news.uses.empty() || !state.news.unloaded.empty()) state.actions.emplace_back(std::exchange(state.news, {}));
   }

@@ -80,6 +80,7 @@ struct DatasetMachine::State {
   DatasetTable datasets;
   std::map<UseId, Use> uses;
   std::set<std::string> wait_for_room;  // entries that are loaded once a frame has ended
+  bool parts_came = false;              // fields at other times, in this Step
   std::map<OrderId, OpenOrder> orders;  // at most one of each client
   OrderId last_order = 0;
   std::map<QuestionId, OpenQuestion> questions;  // in order of arrival

@@ -95,9 +95,9 @@ void DatasetTable::RemoveParts(const std::string& name) {
   });
 }
 
-void DatasetTable::AddPart(const std::string& name, DataSource source, Time now) {
+bool DatasetTable::AddPart(const std::string& name, DataSource source, Time now) {
   CHECK(IsPart(name)) << name;
-  parts_.try_emplace(name, Entry{.source = std::move(source), .since = now});
+  return parts_.try_emplace(name, Entry{.source = std::move(source), .since = now}).second;
 }
 
 bool DatasetTable::ClosePart(const std::function<bool(const std::string&)>& is_wanted) {

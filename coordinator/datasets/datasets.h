@@ -66,7 +66,7 @@ class DatasetTable {
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
     std::shared_ptr<const DatasetFields> fields;   // of a dataset, once it was ready; null: it has one field, of which nothing is known
-    std::map<int, std::shared_ptr<const VolumeSummary>> statistics;  // of a dataset with several times: of its channels, as far as known
+    std::map<int, std::shared_ptr<const VolumeSummary>> statistics;  // of a dataset with several times: of its fields, as far as known
     std::shared_ptr<const FileStamp> stamp;                          // kReady only: of its files as they were read; null: they never change
     std::string error;                                               // kFailed only
     std::uint64_t bytes = 0;                                         // kReady only: memory of its voxels beside what the source holds
@@ -94,7 +94,7 @@ class DatasetTable {
   // ---- the catalogue
   void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
   void Await(const std::string& name, CheckId check);
-  void AddPart(const std::string& name, DataSource source, Time now);  // unless it is there
+  bool AddPart(const std::string& name, DataSource source, Time now);  // unless it is there: false
   // Forgets the field at a time that was used least recently, with its levels, if there are more than kMostParts parts. False: there are
   // not, or all are wanted.
   bool ClosePart(const std::function<bool(const std::string& name)>& is_wanted);

@@ -329,7 +329,6 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   const Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
   if (!colors.ok()) return colors.status();
   way.files.insert(way.files.end(), colors->files.begin(), colors->files.end());
-  if (!info.growth.empty()) way.files.push_back(info.growth);
   if (info.whole || !is_large || (labels && info.slices)) {
     way.read = [source, text = *std::move(text), named = data.label_colors] { return ReadWhole(*source, text, named); };
   } else if (info.slices) {
@@ -348,10 +347,10 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
 // Of all that was read. A source may have more files than its volume, which come with it.
 Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, const FileStamp& before) {
   const auto* const opened = std::get_if<OpenedSource>(&read);
+  const SourceInfo& info = opened != nullptr ? opened->source->info() : std::get<LoadedSource>(read).file;
+  if (info.growth != nullptr) return info.growth;
   if (opened == nullptr) return std::make_shared<const FileStamp>(before);
-  std::vector<std::string> files = opened->source->info().files;
-  if (const std::string& growth = opened->source->info().growth; !growth.empty()) files.push_back(growth);
-  Result<FileStamp> stamp = StampFiles(files);
+  Result<FileStamp> stamp = StampFiles(info.files);
   if (!stamp.ok()) return stamp.status();
   return std::make_shared<const FileStamp>(*std::move(stamp));
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/files/file_stamp.h"
 #include "common/text/natural_order.h"
 #include "common/text/wildcard.h"
 
@@ -60,6 +61,8 @@ Result<std::string> FirstFileOf(const std::string& pattern) {
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& pattern, const ReadOptions& options, const OpenFileFunction& open) {
+  const Result<FileStamp> growth = StampFiles({FolderOf(pattern)});
+  if (!growth.ok()) return growth.status();
   Result<std::vector<std::string>> files = FilesOf(pattern);
   if (!files.ok()) return files.status();
   ReadOptions of_file = options;
@@ -86,7 +89,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& pattern, 
   }
   info.times.count = count;
   info.time = time;
-  if (!options.time) info.growth = FolderOf(pattern);
+  if (!options.time) info.growth = std::make_shared<const FileStamp>(*growth);
   return std::shared_ptr<VolumeSource>(std::make_shared<FileAtTime>(*std::move(source), std::move(info)));
 }
 

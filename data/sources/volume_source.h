@@ -32,6 +32,8 @@
 
 namespace slabstream {
 
+struct FileStamp;
+
 struct SourceLevel {
   VolumeDescription description;  // type, mapping and axes are the same at all levels
   // Voxels along each axis of what one read of the source brings at least. Such blocks lie at multiples of it. Whoever cuts boxes there
@@ -66,9 +68,10 @@ struct SourceInfo {
   int time = 0;                          // which of them it shows
   // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
   std::vector<std::string> notes = {};
-  std::vector<std::string> files = {};    // whose time of change tells that it is another volume now (FileStamp)
-  std::uint64_t version = 0;              // the version of these files when it was opened (VersionOf); only an opened source has one
-  std::string growth = {};                // the folder in which files of further times may come; "": there is none
+  std::vector<std::string> files = {};  // whose time of change tells that it is another volume now (FileStamp)
+  std::uint64_t version = 0;            // the version of these files when it was opened (VersionOf); only an opened source has one
+  // Of times that are files: the state of their folder, in which more may come, before they were counted. Null: there are no such.
+  std::shared_ptr<const FileStamp> growth = {};
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
   // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).
