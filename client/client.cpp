@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <type_traits>
-#include <utility>
-#include <variant>
-#include <vector>
 
 #include "client/client_impl.h"
 #include "common/base/any_of.h"

@@ -24,6 +24,7 @@ namespace slabstream {
 struct Picture {
   ImageSize size;
   PictureGeometry geometry;
+  PictureKey key;      // empty unless the request asked for it
   PictureImage image;  // its bounds lie within `size`
   bool final = true;
   std::uint32_t groups_done = 1, group_count = 1;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "client/decode_picture.h"
 #include "common/base/log.h"

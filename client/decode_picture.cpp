@@ -72,6 +72,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const std::vector<Bytes>& runs,
   picture.image = *std::move(image);
   picture.size = reply.size;
   picture.geometry = reply.geometry;
+  picture.key = std::move(reply.key);
   picture.final = reply.groups_done == reply.group_count;
   picture.groups_done = reply.groups_done;
   picture.group_count = reply.group_count;

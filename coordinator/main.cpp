@@ -13,7 +13,6 @@
 #include "common/kernels/simd_target.h"
 #include "common/metrics/metrics_listener.h"
 #include "common/threads/stop_signals.h"
-#include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/service/service.h"
 #include "data/catalogue/catalogue.h"

@@ -4,7 +4,6 @@
 #include <array>
 #include <utility>
 
-#include "client/pictures/picture_writer.h"
 #include "client/report/frame_spans.h"
 #include "client/report/frame_summary.h"
 #include "client/request/camera_file.h"
@@ -59,6 +58,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
 RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
   RenderedView view;
   for (const Picture& picture : pictures) view.panes.push_back(picture.geometry);
+  view.key = std::move(pictures.front().key);
   view.statistics = std::move(pictures.front().statistics);
   for (const Picture& picture : pictures) view.latency = std::max(view.latency, picture.latency);
   view.size = {size.width * int(pictures.size()), size.height};

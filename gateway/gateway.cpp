@@ -29,7 +29,6 @@
 #include "gateway/request_trace.h"
 #include "gateway/service_link.h"
 #include "gateway/service_news.h"
-#include "gateway/uploads.h"
 #include "gateway/view_session.h"
 
 namespace slabstream {

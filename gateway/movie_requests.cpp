@@ -10,7 +10,6 @@
 
 #include "client/movie/movie_encoder.h"
 #include "client/movie/turntable.h"
-#include "client/pictures/picture_writer.h"
 #include "client/request/camera_file.h"
 #include "client/request/request_options.h"
 #include "common/cli/parse.h"

@@ -1,8 +1,6 @@
 #include "gateway/next_times.h"
 
 #include <algorithm>
-#include <optional>
-#include <string>
 
 #include "common/text/parse_number.h"
 
@@ -19,7 +17,7 @@ std::vector<FrameRequest> NextTimes(const FrameRequest& shown, const std::string
     if (time == *last) break;
     FrameRequest& frame = next.emplace_back(shown);
     frame.time = std::to_string(time);
-    frame.previews = false;
+    frame.previews = frame.key = false;
     frame.size = {std::max(1, shown.size.width / kPixelsToOne), std::max(1, shown.size.height / kPixelsToOne)};
     // A voxel is as many pixels of the whole picture wide as before.
     const double share = double(std::min(frame.size.width, frame.size.height)) / double(std::min(shown.size.width, shown.size.height));

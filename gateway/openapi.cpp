@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "client/movie/turntable.h"
-#include "client/pictures/picture_writer.h"
 #include "client/request/picture_fields.h"
 #include "common/base/version.h"
 #include "gateway/movie_requests.h"

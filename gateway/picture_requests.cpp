@@ -6,9 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "client/pictures/picture_writer.h"
 #include "client/request/picture_record.h"
-#include "common/classification/transfer_function.h"
 #include "common/threads/guarded.h"
 
 namespace slabstream {
@@ -25,9 +23,11 @@ HttpReply FileReply(PictureFileType type, const Result<std::vector<std::byte>>& 
 
 void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode,
                                ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
-  const Annotations& annotations = format.annotations;
-  for (FrameRequest& frame : frames) frame.straight8 = type == PictureFileType::kPng && HoldsStraight8(format);
-  if (const Status status = CheckCanDraw(annotations); !status.ok()) return reply(Failure(status));
+  for (FrameRequest& frame : frames) {
+    frame.straight8 = type == PictureFileType::kPng && HoldsStraight8(format);
+    frame.key = format.annotations.needs_key();
+  }
+  if (const Status status = CheckCanDraw(format.annotations); !status.ok()) return reply(Failure(status));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, type, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
                        asked = MonotonicNow()](Result<ServiceLink::Rendered> rendered) {
@@ -50,7 +50,7 @@ void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> f
         finish([type, file, renderer] { return FileReply(type, *file, renderer); });
       });
     };
-    return link_.Render(std::move(frames), annotations, kAnswerDeadline, {.progress = {}, .done = done});
+    return link_.Render(std::move(frames), kAnswerDeadline, {.progress = {}, .done = done});
   });
 }
 
@@ -63,7 +63,7 @@ void PictureRequests::Render(PictureFileType type, const PictureFields& fields, 
     const Picture& picture = rendered.pictures.front();
     const FrameRequest made = AsMade(request.frame, picture.statistics);
     const PictureNotes notes{.geometry = picture.geometry,
-                             .key = rendered.key,
+                             .key = picture.key,
                              .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return PictureFile(type, picture.image, picture.size, request.format, notes);
   };
@@ -78,7 +78,7 @@ void PictureRequests::Slice(PictureFileType type, const PictureFields& fields, R
   if (!frames.ok()) return reply(Failure(frames.status()));
   if (const Status status = CheckPictureSize(type, slice->size()); !status.ok()) return reply(Failure(status));
   const auto encode = [type, request = *slice](ServiceLink::Rendered rendered) {
-    PictureNotes notes{.key = std::move(rendered.key)};
+    PictureNotes notes{.key = std::move(rendered.pictures.front().key)};
     std::vector<PictureImage> images;
     for (Picture& picture : rendered.pictures) {
       images.push_back(std::move(picture.image));
@@ -96,14 +96,7 @@ void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& 
   record.source = render->frame.dataset;
   record.request = render->frame;
   record.format = render->format;
-  Json files = Json::object();  // those that the line names
-  const auto add = [&files](const auto& shown, const char* name) {
-    const auto* function = std::get_if<TransferFunction>(&shown.choice);
-    if (function != nullptr) files[name] = FormatParaViewColorMap(*function, name);
-  };
-  add(render->frame.transfer, kColorMapFile);
-  if (render->frame.overlay) add(*render->frame.overlay, kOverlayMapFile);
-  reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", std::move(files)}}));
+  reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", MapFilesOf(render->frame)}}));
 }
 
 }  // namespace slabstream

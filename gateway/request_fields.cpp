@@ -4,7 +4,6 @@
 
 #include <charconv>
 #include <optional>
-#include <utility>
 
 #include "common/text/split.h"
 

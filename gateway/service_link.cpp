@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/request/key_of_picture.h"
 #include "common/base/log.h"
 #include "common/threads/guarded.h"
 
@@ -45,11 +44,8 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
   return ticket;
 }
 
-ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline,
-                                        Handlers handlers) {
-  std::optional<Inquiry> question;
-  if (annotations.needs_key()) question = SummaryOf(frames.front());
-  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = std::move(question)});
+ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
+  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = {}});
 }
 
 ServiceLink::Ticket ServiceLink::Ask(Inquiry question, Duration deadline, AnswerHandler done) {
@@ -142,7 +138,6 @@ void ServiceLink::Begin(Task task) {
   }
   open.left = open.requests.size();
   for (const RequestId request : open.requests) requests_[request] = task.ticket;
-  if (!task.frames.empty()) open.first = std::move(task.frames.front());
 }
 
 void ServiceLink::Handle(ClientEvent event) {
@@ -167,10 +162,8 @@ void ServiceLink::Handle(ClientEvent event) {
     task.rendered.pictures[std::size_t(place)] = std::move(*picture);
   } else if (auto* status = std::get_if<StatusReply>(&event.what)) {
     task.rendered.answer = std::move(*status);
-  } else if (task.rendered.pictures.empty()) {
-    task.rendered.answer = std::get<QuestionReply>(std::move(event.what));
   } else {
-    task.rendered.key = KeyOf(task.first, std::get<SummaryReply>(std::get<QuestionReply>(event.what)));
+    task.rendered.answer = std::get<QuestionReply>(std::move(event.what));
   }
   requests_.erase(request);
   if (--task.left > 0) return;

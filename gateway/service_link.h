@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/pictures/picture_writer.h"
 #include "common/base/status.h"
 
 namespace slabstream {
@@ -28,7 +27,6 @@ class ServiceLink {
   using AnswerHandler = std::function<void(Result<Answer>)>;
   struct Rendered {
     std::vector<Picture> pictures;  // one for each frame
-    PictureKey key;                 // the key of the first frame, if it was asked for
     std::optional<Answer> answer;   // to a question without frames
   };
   struct Handlers {
@@ -42,9 +40,9 @@ class ServiceLink {
   ServiceLink(const ServiceLink&) = delete;
   ServiceLink& operator=(const ServiceLink&) = delete;
 
-  // Any thread. Renders `frames`, at least one, all at once, and asks for what `annotations` need; the first failure is that of all. The
-  // handlers are called on the link's thread. Unavailable: the service does not answer.
-  Ticket Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline, Handlers handlers);
+  // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
+  // thread. Unavailable: the service does not answer.
+  Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
   // Any thread. As Render; `done` is called on the link's thread, once, unless the ticket was cancelled before.
   Ticket Ask(Inquiry question, Duration deadline, AnswerHandler done);
   // Any thread. The handlers may still be called if they are about to be.
@@ -58,12 +56,11 @@ class ServiceLink {
     std::vector<FrameRequest> frames;
     Duration deadline{};
     Handlers handlers;
-    std::optional<Inquiry> question;  // instead of frames, or about the key of the first one
+    std::optional<Inquiry> question;  // instead of frames
   };
   struct OpenTask {
     Handlers handlers;
-    std::vector<RequestId> requests;  // one for each frame, and that of the question
-    FrameRequest first;               // frame
+    std::vector<RequestId> requests;  // one for each frame, or that of the question
     Rendered rendered;
     std::size_t left = 0;  // requests that are not finished
   };

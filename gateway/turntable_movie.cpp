@@ -9,7 +9,6 @@
 #include <cstring>
 #include <utility>
 
-#include "client/pictures/picture_writer.h"
 #include "gateway/requests_under_way.h"
 
 namespace slabstream {
@@ -47,25 +46,22 @@ Status TurntableMovie::RenderAndEncode() {
   const auto request = [&](int index) {
     FrameRequest frame = first;
     frame.view = (*views)[std::size_t(index)];
+    frame.key = request_.render.format.annotations.needs_key();
     const auto done = [this, index](Result<ServiceLink::Rendered> rendered) {
       const std::lock_guard lock(mutex_);
       pictures_.emplace(index, std::move(rendered));
       changed_.notify_one();
     };
-    // All frames have the key of the first.
-    const Annotations annotations = index == 0 ? request_.render.format.annotations : Annotations();
-    link.Render({std::move(frame)}, annotations, kAnswerDeadline, {.progress = {}, .done = done});
+    link.Render({std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
   };
-  PictureKey key;
   for (int i = 0, requested = 0; i < request_.frames; ++i) {
     while (requested < std::min(i + kInFlight, request_.frames)) request(requested++);
     const Result<ServiceLink::Rendered> rendered = Take(i);
     if (!rendered.ok()) return rendered.status();
-    if (i == 0) key = rendered->key;
     const Picture& picture = rendered->pictures.front();
     metrics_.CountFrame(picture.statistics, picture.latency);
     const auto composed =
-        ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(request_.render.format), picture.geometry, key);
+        ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(request_.render.format), picture.geometry, picture.key);
     if (!composed.ok()) return composed.status();
     const std::vector<std::byte> frame = MovieFrame(*composed);
     // Not before there is a frame: so an error of the service comes before the first byte.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <cctype>
-#include <optional>
 #include <utility>
 
 #include "common/base/printable.h"

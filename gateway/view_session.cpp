@@ -166,6 +166,7 @@ void ViewSession::Render(const ViewAction& action) {
   const bool shadowed = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return frame.shading.needs_light_volume(); });
   for (FrameRequest& frame : job->frames) {
     frame.straight8 = HoldsStraight8(job->format);
+    frame.key = job->format.annotations.needs_key();
     if (action.plain) frame.shading.shadows = frame.shading.ambient_occlusion = 0;
     frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
     if (coarseness > 1) frame.detail = std::min((frame.detail == 0 ? 1 : frame.detail) * coarseness, kMostDetail);
@@ -179,7 +180,7 @@ void ViewSession::Render(const ViewAction& action) {
   rendering.view.format = std::move(job->format);
   rendering.view.timeline = view_->timeline;
   const auto self = shared_from_this();
-  rendering.ticket = link_->Render(std::move(job->frames), rendering.view.format.annotations, kDeadline,
+  rendering.ticket = link_->Render(std::move(job->frames), kDeadline,
                                    {.progress =
                                         [self, order](const FrameProgress& progress) {
                                           asio::post(self->around_.io, [self, order, progress] { self->OnProgress(order, progress); });
@@ -222,7 +223,6 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
   }
   FetchNextTimes(rendering.frame);
   RenderedView view = JoinPictures(std::move(rendered->pictures), rendering.frame.size);
-  view.key = std::move(rendered->key);
   view.seq = rendering.view.seq;
   view.scale = rendering.view.scale;
   const bool finest = rendering.view.coarseness == 1 || AllFinest(view.statistics);
@@ -243,7 +243,7 @@ void ViewSession::FetchNextTimes(const FrameRequest& shown) {
   std::vector<FrameRequest> next = NextTimes(shown, before.time, times);
   if (next.empty()) return;
   if (fetching_ != 0) link_->Cancel(fetching_);
-  fetching_ = link_->Render(std::move(next), {}, kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
+  fetching_ = link_->Render(std::move(next), kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
 }
 
 void ViewSession::Encode(bool final, int quality) {

@@ -14,7 +14,6 @@
 #include "common/metrics/metrics_listener.h"
 #include "common/service/service_file.h"
 #include "common/threads/stop_signals.h"
-#include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/cache_option.h"
 #include "data/open/open_source.h"

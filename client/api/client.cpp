@@ -8,7 +8,6 @@
 #include "client/client.h"
 #include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
-#include "client/request/key_of_picture.h"
 #include "client/request/picture_fields.h"
 #include "client/request/picture_record.h"
 #include "client/service/service_state.h"
@@ -159,12 +158,6 @@ struct __attribute__((visibility("hidden"))) Service::Impl {
     return impl;
   }
 
-  // What colour bar and legend say.
-  PictureKey KeyFor(const RenderRequest& request) {
-    if (!request.format.annotations.needs_key()) return {};
-    return KeyOf(request.frame, ValueOf(client->Summarize(SummaryOf(request.frame))));
-  }
-
   std::mutex mutex;  // for the client
   Context context;
   std::optional<Client> client;
@@ -183,14 +176,14 @@ Image Service::Render(const std::string& dataset, const Options& options, const 
   }
   RenderRequest request = ParseRequest(dataset, options);
   request.frame.previews = call.on_preview != nullptr;
+  request.frame.key = request.format.annotations.needs_key();
   ThrowUnlessOk(CheckCanDraw(request.format.annotations));
 
   const std::lock_guard lock(impl_->mutex);
-  const PictureKey key = impl_->KeyFor(request);
   const auto image_of = [&](Picture picture) {
     const FrameRequest made = AsMade(request.frame, picture.statistics);
     PictureNotes notes{.geometry = picture.geometry,
-                       .key = key,
+                       .key = std::move(picture.key),
                        .record = RecordText(dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return Image(std::make_shared<const Image::Impl>(Image::Impl{std::move(picture), request.format, std::move(notes)}));
   };

@@ -68,23 +68,26 @@ Rgb Color(const std::vector<double>& numbers, std::size_t first) {
 }
 
 void ReadKey(const JsonValue& value, PictureKey& key) {
+  const auto named = [](std::string& name) {
+    return [&name](const JsonValue& v) {
+      name = v.Text();
+      if (const Status status = CheckTitle("the name", name); !status.ok()) v.Complain(status.message());
+    };
+  };
   const auto bar = [&](const JsonValue& v) {
-    PictureKey::Bar& read = key.bar.emplace();
+    PictureKey::Bar& read = key.bars.emplace_back();
     const auto color = [&](const JsonValue& point) {
       const std::vector<double> numbers = Numbers(point, 4);
       read.colors.push_back({numbers[0], Color(numbers, 1)});
     };
-    v.Fields({{"colors", [&](const JsonValue& colors) { colors.Each(color, 1); }},
-              {"low", JsonValue::Into(read.low, {-kMost, kMost})},
-              {"high", JsonValue::Into(read.high, {-kMost, kMost})}});
-    if (read.colors.empty() || !(read.low < read.high)) v.Complain("has no colours, or its ends do not rise");
+    v.Fields({{"name", named(read.name)}, {"colors", [&](const JsonValue& colors) { colors.Each(color, 2); }}});
+    if (read.colors.size() < 2 || !(read.low() < read.high())) v.Complain("has no two colours of rising values");
   };
   const auto entry = [&](const JsonValue& v) {
     PictureKey::Entry& read = key.entries.emplace_back();
-    v.Fields({{"name", JsonValue::Into(read.name)}, {"color", [&](const JsonValue& color) { read.color = Color(Numbers(color, 3), 0); }}});
-    if (const Status status = CheckTitle("the name", read.name); !status.ok()) v.Complain(status.message());
+    v.Fields({{"name", named(read.name)}, {"color", [&](const JsonValue& color) { read.color = Color(Numbers(color, 3), 0); }}});
   };
-  value.Fields({{"bar", bar}, {"entries", [&](const JsonValue& v) { v.Each(entry); }}});
+  value.Fields({{"bars", [&](const JsonValue& v) { v.Each(bar); }}, {"entries", [&](const JsonValue& v) { v.Each(entry); }}});
 }
 
 Result<Order> ParseOrder(const std::string& text) {

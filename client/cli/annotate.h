@@ -5,7 +5,7 @@
 //   {"size": [W, H], "panes": [the "geometry" of a picture's record, ...], "title", "scale_bar", "orientation_marker", "sides_only",
 //    "color_bar", "legend", "font_size", "dpi", "background": [R, G, B, A] (it lies behind the pixels already),
 //    "file": "jpg" or another ending, "depth", "quality",
-//    "key": {"bar": {"colors": [[value, r, g, b], ...], "low", "high"}, "entries": [{"name", "color": [r, g, b]}, ...]}}
+//    "key": {"bars": [{"name", "colors": [[value, r, g, b], ...]}, ...], "entries": [{"name", "color": [r, g, b]}, ...]}}
 // Only size and panes must be there. stdout: the file; without "file" the pixels with the annotations on them.
 #pragma once
 

@@ -7,10 +7,8 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "client/cli/annotate.h"
 #include "client/cli/completion.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"

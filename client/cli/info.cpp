@@ -23,7 +23,6 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_text.h"
 #include "client/pictures/picture_header.h"
-#include "client/report/value_text.h"
 #include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
@@ -107,7 +106,9 @@ Json IndexJson(const std::optional<IndexFacts>& index) {
 Result<VolumeFacts> FactsOf(const std::string& source) {
   ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
   const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
-  Result<ReadableSource> read = ReadSource(DataSource(source, ""), std::uint64_t(kExactBytes), tell);
+  DataSource file(source, "");
+  file.is_field = true;
+  Result<ReadableSource> read = ReadSource(file, std::uint64_t(kExactBytes), tell);
   if (!read.ok()) return read.status();
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     SourceInfo info = opened->source->info();

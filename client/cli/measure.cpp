@@ -12,7 +12,6 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
-#include "client/report/value_text.h"
 #include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "client/request/values.h"

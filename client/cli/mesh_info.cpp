@@ -9,7 +9,7 @@
 #include <span>
 
 #include "client/cli/commands.h"
-#include "client/report/value_text.h"
+#include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "common/renderers/registry.h"
 #include "common/volume/summary.h"

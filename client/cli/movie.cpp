@@ -36,7 +36,7 @@ Status Movie::OfFile(Status status) const {
 Status Movie::Put(const Picture& picture, const FrameJob&) {
   CHECK(picture.final && picture.size == options_.shape.size);
   const Result<ComposedPicture> composed =
-      ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(options_.format), picture.geometry, options_.key);
+      ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(options_.format), picture.geometry, picture.key);
   if (!composed.ok()) return composed.status();
   last_ = MovieFrame(*composed);
   return OfFile(encoder_->Put(last_));

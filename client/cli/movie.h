@@ -18,8 +18,7 @@ namespace slabstream {
 struct MovieOptions {
   std::string path;  // the movie's path, as MovieFormatOf has it
   MovieShape shape;
-  PictureFormat format;
-  PictureKey key = {};  // black shows through a transparent background
+  PictureFormat format;  // black shows through a transparent background
 };
 
 // For a message before the work begins. Errors of CheckShape and CheckHasMovieEncoder.

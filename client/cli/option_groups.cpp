@@ -10,11 +10,9 @@
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
-#include "common/base/find_named.h"
 #include "common/cli/add_option.h"
 #include "common/otlp/trace_sender.h"
 #include "common/volume/memory_budget.h"
-#include "common/wire/control_messages.h"
 #include "data/open/cache_option.h"
 #include "data/volume_io/read_options.h"
 
@@ -173,11 +171,8 @@ void AddSource(const Command& app, AskedVolume& volume) {
     Result<std::string> with_options = WithReadOptionsOfFile(app, volume.source, is_file);
     if (!with_options.ok()) return with_options.status();
     volume.source = *std::move(with_options);
-    for (const auto& [name, text] : {std::pair<const char*, std::string&>("channel", volume.field), {"time", volume.time}}) {
-      ReadOptions scratch;
-      if (!is_file || text.empty() || !FindNamed(ReadOptionList(), name)->set(scratch, name, text).ok()) continue;
-      volume.source = WithReadOption(volume.source, name, std::exchange(text, ""));
-    }
+    // A reader mixes it; it is no field of the file.
+    if (is_file && volume.field == "luminance") volume.source = WithReadOption(volume.source, "channel", std::exchange(volume.field, ""));
     return Status::Ok();
   });
 }

@@ -5,7 +5,7 @@
 namespace slabstream {
 
 Status PictureFiles::Put(const Picture& picture, const FrameJob& job) {
-  PictureNotes notes{.geometry = picture.geometry, .key = key_, .record = {}};
+  PictureNotes notes{.geometry = picture.geometry, .key = picture.key, .record = {}};
   if (record_) {
     notes.record =
         RecordText(job.source, AsMade(job.request, picture.statistics), format_, picture.geometry, layers_, picture.statistics.levels);

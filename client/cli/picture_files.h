@@ -12,8 +12,8 @@ namespace slabstream {
 class PictureFiles : public PictureSink {
  public:
   // `record`: the files say how they were made (picture_record.h), with these files of layers.
-  PictureFiles(const PictureFormat& format, PictureKey key, bool record, LayerFiles layers)
-      : format_(format), key_(std::move(key)), record_(record), layers_(std::move(layers)) {}
+  PictureFiles(const PictureFormat& format, bool record, LayerFiles layers)
+      : format_(format), record_(record), layers_(std::move(layers)) {}
 
   bool in_order() const override { return false; }
   bool TakesStraight8(const FrameJob& job) const override { return FileHoldsStraight8(job.output, format_); }
@@ -24,7 +24,6 @@ class PictureFiles : public PictureSink {
 
  private:
   const PictureFormat format_;
-  const PictureKey key_;
   const bool record_;
   const LayerFiles layers_;
 };

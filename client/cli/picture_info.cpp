@@ -54,12 +54,6 @@ std::string HeaderText(const PictureHeader& header) {
   return text;
 }
 
-// Null: a preset.
-const TransferFunction* OwnTransfer(const auto& shown) { return std::get_if<TransferFunction>(&shown.choice); }
-const TransferFunction* OverlayTransfer(const PictureRecord& record) {
-  return record.request.overlay ? OwnTransfer(*record.request.overlay) : nullptr;
-}
-
 std::string RecordLines(const PictureRecord& record, const std::string& output) {
   std::string text = fmt::format("made by      {}\nsource       {}\nrequest\n", record.program, record.source);
   AddLines("", record.json["request"], text);
@@ -74,8 +68,7 @@ std::string RecordLines(const PictureRecord& record, const std::string& output) 
   if (record.json.contains("levels")) text += "drawn from\n";
   AddLines("levels", record.json.value("levels", Json::array()), text);
   text += "command\n  " + CommandText(record, output) + "\n";
-  if (OwnTransfer(record.request.transfer) != nullptr) text += fmt::format("  {} is what --json prints as color_map\n", kColorMapFile);
-  if (OverlayTransfer(record) != nullptr) text += fmt::format("  {} is what --json prints as overlay_map\n", kOverlayMapFile);
+  for (const auto& [name, unused] : MapFilesOf(record.request)) text += fmt::format("  {} is what --json prints in files\n", name);
   return text;
 }
 
@@ -88,9 +81,7 @@ Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>
   if (!record) return json;
   for (const auto& [field, value] : record->json.items()) json[field] = value;
   json["command"] = RenderArguments(*record, output);
-  const auto map = [&](const TransferFunction& transfer) { return Json::Parse(FormatParaViewColorMap(transfer, record->source)).value(); };
-  if (const auto* own = OwnTransfer(record->request.transfer)) json["color_map"] = map(*own);
-  if (const auto* overlay = OverlayTransfer(*record)) json["overlay_map"] = map(*overlay);
+  for (const auto& [name, map] : MapFilesOf(record->request)) json["files"][name] = Json::Parse(map).value();
   return json;
 }
 

@@ -5,7 +5,6 @@
 #include <map>
 #include <string_view>
 
-#include "client/service/service_state.h"
 #include "common/frame/dataset_name.h"
 #include "data/open/source_name.h"
 #include "data/volume_io/read_options.h"

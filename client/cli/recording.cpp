@@ -9,7 +9,6 @@
 
 #include "client/request/json_value.h"
 #include "common/combining/schemes.h"
-#include "common/renderers/registry.h"
 #include "common/view/sheet_grid.h"
 
 namespace slabstream {

@@ -110,7 +110,7 @@ Status PlaceCameras(Client& client, const CameraMove& move, std::vector<FrameJob
 // The pictures of `jobs`, and the files beside them (--stats, --trace, --save-camera). `move`: of a sequence; null: the views are those of
 // the jobs. `open_pictures` is called just before the first frame: until then Ctrl-C ends the process at once, so there must be nothing to
 // clean up. `failures`, `label`: as in FrameLoopOptions.
-using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
+using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const CameraMove* move,
                                                 const OpenSink& open_pictures, int in_flight, std::vector<Status>* failures,
                                                 const std::string& label = "") {
@@ -121,9 +121,8 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   if (move != nullptr) {
     if (Status status = PlaceCameras(connection->client(), *move, jobs); !status.ok()) return status;
   }
-  const Result<PictureKey> key = KeyFor(connection->client(), options.format.annotations, jobs.front().request);
-  if (!key.ok()) return key.status();
-  const Result<std::unique_ptr<PictureSink>> pictures = open_pictures(*key);
+  for (FrameJob& job : jobs) job.request.key = options.format.annotations.needs_key();
+  const Result<std::unique_ptr<PictureSink>> pictures = open_pictures();
   if (!pictures.ok()) return pictures.status();
 
   FrameLoopOptions loop;
@@ -160,14 +159,13 @@ void Send(const FrameOptions& options, const std::string& command, Time begin, c
 }
 
 // `output`: one of the files.
-Result<std::unique_ptr<PictureSink>> FilesOf(const FrameOptions& options, const PictureKey& key, const std::string& output) {
+Result<std::unique_ptr<PictureSink>> FilesOf(const FrameOptions& options, const std::string& output) {
   if (Status status = CheckCanWritePicture(output); !status.ok()) return status;
-  return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.format, key, options.record, options.layers));
+  return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.format, options.record, options.layers));
 }
 
-MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}) {
-  MovieOptions movie{
-      .path = options.output.movie, .shape = {.size = options.frame.request.size}, .format = options.frame.format, .key = key};
+MovieOptions MovieOf(const TurntableOptions& options) {
+  MovieOptions movie{.path = options.output.movie, .shape = {.size = options.frame.request.size}, .format = options.frame.format};
   if (options.frames_per_second) movie.shape.frames_per_second = *options.frames_per_second;
   return movie;
 }
@@ -178,9 +176,9 @@ std::string FileOf(const TurntableOptions& options, int index) {
 }
 
 // Where the frames of a turntable go.
-Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const PictureKey& key) {
-  if (options.output.movie.empty()) return FilesOf(options.frame, key, FileOf(options, 0));
-  Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options, key));
+Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options) {
+  if (options.output.movie.empty()) return FilesOf(options.frame, FileOf(options, 0));
+  Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options));
   if (!movie.ok()) return movie.status();
   return std::unique_ptr<PictureSink>(*std::move(movie));
 }
@@ -255,7 +253,7 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
 Status RenderOne(const PictureOrder& order, const std::string& label) {
   const Time start = MonotonicNow();
   const FrameOptions& frame = order.frame;
-  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(frame, key, order.output); };
+  const auto open_pictures = [&] { return FilesOf(frame, order.output); };
   const auto frames = RenderPictures(frame, {{frame.request, order.output, frame.source}}, nullptr, open_pictures, 1, nullptr, label);
   if (!frames.ok()) return frames.status();
   const ImageSize size = frame.request.size;
@@ -296,7 +294,7 @@ Status RunTurntable(const TurntableOptions& given) {
   const Time start = MonotonicNow();
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
   if (!jobs.ok()) return jobs.status();
-  const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
+  const auto open_pictures = [&] { return OpenPictures(options); };
   std::vector<Status> failures;
   CameraMove move{.turns = options.turns};
   if (options.path) move.cameras = options.path->cameras;

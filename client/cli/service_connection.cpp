@@ -10,13 +10,11 @@
 #include "client/embedded/embedded_service.h"
 #include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
-#include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
 #include "data/stores/object_cache.h"
-#include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {

@@ -22,19 +22,19 @@ Status RunSlice(const SliceOptions& options) {
   Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
   if (!connection.ok()) return connection.status();
   slice.frame.dataset = connection->dataset();
+  slice.frame.key = slice.format.annotations.needs_key();
   slice.frame.straight8 = FileHoldsStraight8(options.output, slice.format);
   const Result<std::vector<FrameRequest>> frames = FramesOf(slice);
   if (!frames.ok()) return frames.status();
-  const Result<PictureKey> key = KeyFor(connection->client(), slice.format.annotations, frames->front());
-  if (!key.ok()) return key.status();
   if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
-  PictureNotes notes{.key = *key};
+  PictureNotes notes;
   std::vector<PictureImage> images;
   for (const FrameRequest& frame : *frames) {
     Result<Picture> picture = connection->client().Render(frame);
     if (!picture.ok()) return picture.status();
     images.push_back(std::move(picture->image));
     notes.panes.push_back(picture->geometry);
+    notes.key = std::move(picture->key);
   }
   const ImageSize whole = slice.size();
   const PictureImage all = SideBySide(images, slice.frame.size);

@@ -181,29 +181,84 @@ class Artist {
     PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
   }
 
-  // Between the top and what may stand at the bottom: values upwards, with ticks to the left of the bar and the caption above it.
-  void DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
+  // Between the top and what may stand at the bottom, below the caption. Several bars have their names above them and share the height; as
+  // many as there is room for.
+  void DrawColorBars(const std::vector<PictureKey::Bar>& bars, const std::string& caption) {
+    double top = top_ + 0.5 * scale_.letters;
+    const auto put_line = [&](const std::string& text, double below) {
+      top += (kAscender - 0.5) * scale_.letters;
+      PutText(text, {double(size_.width), top});
+      top += (kDescender + below) * scale_.letters;
+    };
+    if (!caption.empty()) put_line(caption, 0.5);
+    const double bottom = size_.height - scale_.margin - 2.5 * scale_.letters;
+    if (bars.size() == 1) return DrawColorBar(bars.front(), top, bottom, TicksOf(bars.front().low(), bars.front().high()));
+    const double least = 4 * scale_.letters, gap = 1.2 * scale_.letters;
+    const std::size_t shown = ShownOf(bars.size(), (bottom - top) / least), parts = std::max<std::size_t>(shown, 1);
+    const double part = (bottom - top - (shown < bars.size() ? 1.2 * scale_.letters : 0)) / double(parts);
+    for (std::size_t i = 0; i < shown; ++i) {
+      const double end = top + part - gap;
+      put_line(bars[i].name, 0.8);
+      DrawColorBar(bars[i], top, end, {bars[i].low(), bars[i].high()});
+      top = end + gap;
+    }
+    if (shown < bars.size()) put_line(MoreText(bars.size() - shown), 0);
+  }
+
+  // One line each, as many as there is room for: of fields, if there are several, the colours of their values, their names and these
+  // values; then the entries.
+  void DrawLegend(const PictureKey& key) {
+    const std::size_t fields = key.bars.size() > 1 ? key.bars.size() : 0, count = fields + key.entries.size();
+    const double line = 1.35 * scale_.letters, swatch = std::round(0.8 * scale_.letters), left = scale_.margin;
+    const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
+    const std::size_t shown = ShownOf(count, room / line);
+    double y = top_ + 0.2 * scale_.letters;
+    const auto put = [&](const std::string& text, double x) { PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
+    for (std::size_t i = 0; i < shown; ++i, y += line) {
+      const double width = i < fields ? 3 * swatch : swatch;
+      const InkPoint begin = {left, std::round(y + 0.1 * scale_.letters)}, end = {begin.x + width, begin.y + swatch};
+      Put({Frame(begin, end)}, palette_.letters);
+      if (i < fields) {
+        const PictureKey::Bar& bar = key.bars[i];
+        const TransferFunction colors{.colors = bar.colors, .opacities = {}};
+        for (double x = begin.x; x < end.x; ++x) {  // each part reaches to the end, so that no seams show
+          PutPlain(Rectangle{{x, begin.y}, end}, ColorOf(colors.Color(std::lerp(bar.low(), bar.high(), (x + 0.5 - begin.x) / width))));
+        }
+        put(fmt::format("{}  {:.4g} to {:.4g}", bar.name, bar.low(), bar.high()), end.x + 0.4 * swatch);
+      } else {
+        PutPlain(Rectangle{begin, end}, ColorOf(key.entries[i - fields].color));
+        put(key.entries[i - fields].name, end.x + 0.4 * swatch);
+      }
+    }
+    if (shown < count) put(MoreText(count - shown), left);
+  }
+
+  std::vector<Mark> TakeMarks() { return std::move(marks_); }
+
+ private:
+  // How many of `count` things are shown where there is room for `most`, the last of which may have to say how many more there are.
+  static std::size_t ShownOf(std::size_t count, double most) {
+    const auto places = std::size_t(std::max(most, 1.0));
+    return count <= places ? count : places - 1;
+  }
+  static std::string MoreText(std::size_t count) { return fmt::format("and {} more", count); }
+
+  // Values upwards, with ticks to the left of the bar.
+  void DrawColorBar(const PictureKey::Bar& bar, double top, double bottom, const std::vector<double>& ticks) {
     const double width = std::round(0.8 * scale_.letters), right = size_.width - scale_.margin, left = right - width,
                  tick = 0.3 * scale_.letters;
-    double top = top_ + 0.5 * scale_.letters;
-    if (!caption.empty()) {
-      top = top_ + kAscender * scale_.letters;
-      PutText(caption, {double(size_.width), top});
-      top += (kDescender + 0.5) * scale_.letters;
-    }
-    const double bottom = size_.height - scale_.margin - 2.5 * scale_.letters;
     const int rows = int(bottom - top);
     if (rows < 1) return;
     const TransferFunction colors{.colors = bar.colors, .opacities = {}};
     const double first = std::floor(top);
     ColorRows shown{{left, first}, {right, first + rows}, {}};
     for (int row = 0; row < rows; ++row) {
-      shown.colors.push_back(ColorOf(colors.Color(std::lerp(bar.high, bar.low, (row + 0.5) / rows))));
+      shown.colors.push_back(ColorOf(colors.Color(std::lerp(bar.high(), bar.low(), (row + 0.5) / rows))));
     }
     Shapes lines = {Frame(shown.begin, shown.end)};
     int widest = 0;
-    for (const double value : TicksOf(bar.low, bar.high)) {
-      const double y = first + rows * (bar.high - value) / (bar.high - bar.low);
+    for (const double value : ticks) {
+      const double y = first + rows * (bar.high() - value) / (bar.high() - bar.low());
       lines.emplace_back(Rectangle{{left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}});
       const std::string text = fmt::format("{:.6g}", value);
       const int text_width = font_->Width(text, scale_.letters);
@@ -213,29 +268,9 @@ class Artist {
     }
     Put(std::move(lines), palette_.letters);
     PutPlain(std::move(shown), {});
-    right_ = scale_.margin + width + 2 * tick + widest;
+    right_ = std::max(right_, scale_.margin + width + 2 * tick + widest);
   }
 
-  // One line each, as many as there is room for.
-  void DrawLegend(const std::vector<PictureKey::Entry>& entries) {
-    const double line = 1.35 * scale_.letters, swatch = std::round(0.8 * scale_.letters), left = scale_.margin;
-    const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
-    const std::size_t lines = std::max(std::size_t(std::max(room / line, 0.0)), std::size_t{1});
-    const std::size_t shown = entries.size() <= lines ? entries.size() : lines - 1;
-    double y = top_ + 0.2 * scale_.letters;
-    const auto put = [&](const std::string& text, double x) { PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
-    for (std::size_t i = 0; i < shown; ++i, y += line) {
-      const InkPoint begin = {left, std::round(y + 0.1 * scale_.letters)}, end = {begin.x + swatch, begin.y + swatch};
-      Put({Frame(begin, end)}, palette_.letters);
-      PutPlain(Rectangle{begin, end}, ColorOf(entries[i].color));
-      put(entries[i].name, left + 1.4 * swatch);
-    }
-    if (shown < entries.size()) put(fmt::format("and {} more", entries.size() - shown), left);
-  }
-
-  std::vector<Mark> TakeMarks() { return std::move(marks_); }
-
- private:
   // The shapes on their halo.
   void Put(Shapes shapes, MarkColor color) {
     for (Shape& shape : shapes) shape = MovedRight(std::move(shape), left_);
@@ -253,22 +288,22 @@ class Artist {
   // The text, with its baseline centred at `place`, but not beyond the picture's sides, and `right` pixels from the right one. One that is
   // too wide shrinks.
   void PutText(const std::string& text, InkPoint place, MarkColor color, double right = 0) {
-    TextLine line = Fitted(text);
+    TextLine line = Fitted(text, size_.width - 2 * scale_.margin);
     const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - line.width, least);
     line.begin = {double(std::clamp(int(std::lround(place.x - 0.5 * line.width)), least, most)), std::round(place.y)};
     Put({std::move(line)}, color);
   }
   void PutText(const std::string& text, InkPoint place) { PutText(text, place, palette_.letters); }
-  // Its baseline begins at `place`.
+  // Its baseline begins at `place`, and it ends before what stands on the right.
   void PutTextFrom(const std::string& text, InkPoint place) {
-    TextLine line = Fitted(text);
+    TextLine line = Fitted(text, size_.width - std::max(double(scale_.margin), right_) - place.x);
     line.begin = {std::round(place.x), std::round(place.y)};
     Put({std::move(line)}, palette_.letters);
   }
 
-  // The text with its size and width.
-  TextLine Fitted(const std::string& text) const {
-    const int room = std::max(size_.width - 2 * scale_.margin, 1);
+  // The text with its size and width, which is at most `most` if letters can be so small.
+  TextLine Fitted(const std::string& text, double most) const {
+    const int room = std::max(int(most), 1);
     int letters = scale_.letters, width = font_->Width(text, letters);
     while (width > room && letters > 1) {
       letters = std::clamp(int(std::int64_t{letters} * room / width), 1, letters - 1);
@@ -324,8 +359,8 @@ Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, s
 
   Artist whole(*font, size, 0, panes.front(), scale, palette);
   if (!annotations.title.empty()) whole.DrawTitle(annotations.title);
-  if (annotations.color_bar && key.bar) whole.DrawColorBar(*key.bar, *annotations.color_bar);
-  if (annotations.legend && !key.entries.empty()) whole.DrawLegend(key.entries);
+  if (annotations.color_bar && !key.bars.empty()) whole.DrawColorBars(key.bars, *annotations.color_bar);
+  if (annotations.legend) whole.DrawLegend(key);
   keep(whole.TakeMarks());
 
   for (std::size_t i = 0; i < panes.size(); ++i) {

@@ -3,7 +3,7 @@
 //
 //   top centre     the title; a patient's side below it
 //   top left       the legend, below the title
-//   left, right    a patient's sides; the colour bar on the right
+//   left, right    a patient's sides; colour bars on the right, one below the other
 //   bottom         the axes of the world on the left, a patient's side in the middle, the scale bar on the right
 //
 // Where several pictures stand side by side (slices), each has sides, axes and a scale bar of its own.
@@ -22,8 +22,8 @@
 #include "client/pictures/ink.h"
 #include "client/pictures/mark.h"
 #include "client/pictures/picture_format.h"
-#include "client/pictures/picture_key.h"
 #include "common/base/status.h"
+#include "common/classification/picture_key.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {

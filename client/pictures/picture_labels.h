@@ -1,11 +1,12 @@
-// What annotations of a picture say: the scale bar's length, the letters of a patient's sides, and where the world's axes point. Pure; who
-// draws them is another matter (client/pictures/annotations.h).
+// What annotations of a picture say: the scale bar's length, the letters of a patient's sides, where the world's axes point, and the ticks
+// of a colour bar. Pure; who draws them is another matter (client/pictures/annotations.h).
 #pragma once
 
 #include <array>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/view/picture_geometry.h"
 
@@ -35,5 +36,8 @@ struct ShownAxis {
 
 // Farthest tip first, which is the order to draw them in.
 std::array<ShownAxis, 3> ShownAxes(const PictureGeometry& geometry);
+
+// Values for the ticks of a bar: multiples of 1, 2 or 5 times a power of ten in [low, high], 3 to 7 of them. low < high, both finite.
+std::vector<double> TicksOf(double low, double high);
 
 }  // namespace slabstream

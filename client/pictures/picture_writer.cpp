@@ -5,12 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "client/pictures/ink.h"
 #include "client/pictures/picture_encoder.h"

@@ -8,7 +8,6 @@
 
 #include "client/report/volume_text.h"
 #include "common/base/printable.h"
-#include "common/json/json.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {

@@ -4,7 +4,6 @@
 
 #include "client/report/dataset_text.h"
 #include "common/base/printable.h"
-#include "common/json/json.h"
 #include "common/transport/keys.h"
 #include "common/volume/memory_budget.h"
 

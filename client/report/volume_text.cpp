@@ -7,9 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "client/report/value_text.h"
 #include "common/base/printable.h"
-#include "common/json/json.h"
 #include "common/view/picture_geometry.h"
 #include "common/volume/exact_value.h"
 
@@ -50,6 +48,13 @@ std::string Quoted(const std::string& field) {
 }
 
 }  // namespace
+
+std::string ValueText(double value) {
+  constexpr double kEnd = 0x1p64;
+  if (std::abs(value) <= kEnd && std::trunc(value) == value) return fmt::format("{}", Int128(value));
+  const auto single = float(value);
+  return double(single) == value ? fmt::format("{}", single) : fmt::format("{}", value);
+}
 
 Json HistogramJson(const std::string& dataset, const SummaryReply& summary) {
   Json percentiles = Json::object();

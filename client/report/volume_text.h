@@ -10,6 +10,10 @@
 
 namespace slabstream {
 
+// A data value with every digit that it has. Whole numbers in full up to 2^64; of others the shortest text that reads back the same: as a
+// float, if the value is one.
+std::string ValueText(double value);
+
 // {"dataset", "range", "counts", "non_finite", "percentiles": {"50": value, ...}}
 Json HistogramJson(const std::string& dataset, const SummaryReply& summary);
 

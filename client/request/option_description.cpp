@@ -1,7 +1,6 @@
 #include "client/request/option_description.h"
 
 #include <string>
-#include <vector>
 
 #include "client/request/request_options.h"
 #include "client/request/value_window.h"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstddef>
 #include <functional>
@@ -13,7 +14,6 @@
 #include <vector>
 
 #include "client/request/camera_file.h"
-#include "client/request/layer_options.h"
 #include "client/request/value_window.h"
 #include "client/request/values.h"
 #include "common/cli/add_option.h"
@@ -22,6 +22,7 @@
 #include "common/view/default_view.h"
 #include "common/view/named_view.h"
 #include "common/view/world_limits.h"
+#include "common/volume/field_info.h"
 
 namespace slabstream {
 namespace {
@@ -101,9 +102,10 @@ void AddAnnotationOptions(const Command& app, Annotations& annotations) {
         if (Status status = CheckTitle(option, text); !status.ok()) return status;
         return std::optional(text);
       },
-      "The colours of the transfer function with their data values; CAPTION stands above them, such as a unit")
+      "The colours of the transfer function, or of each field, with their data values; CAPTION stands above them, such as a unit")
       .TypeName("[=CAPTION]");
-  app.AddFlag("--legend", annotations.legend, "Names and colours of the labels that are shown, and of isosurfaces");
+  app.AddFlag("--legend", annotations.legend,
+              "Names and colours of fields with their ranges, if several are shown, of labels and of isosurfaces");
   const NumberRange sizes{kMinFontSize, kMaxFontSize};
   const auto points = [sizes](const std::string& option, const std::string& text) { return ParseNumber(option, text, sizes); };
   const Option font =
@@ -168,10 +170,51 @@ void LetSurfacesStandAlone(const Command& app, TransferChoice& transfer) {
   if (!transfer.isosurfaces.empty() && !app.FindOption("--transfer").given()) transfer.choice = std::string(kNoTransfer);
 }
 
+namespace {
+
+// Short forms: --overlay-range 3:8 says --channel-range overlay=3:8.
+void AddOverlayOptions(const Command& app, ColorMaps maps, FrameRequest& request) {
+  app.GroupOptions(FindRequestOption("label-mode")->group);
+  const std::initializer_list<std::array<const char*, 3>> forms = {{"--overlay-transfer", "channel-transfer", "TRANSFER"},
+                                                                   {"--overlay-range", "channel-range", "LOW:HIGH"},
+                                                                   {"--overlay-weight", "channel-opacity", "NUMBER"}};
+  for (const auto& [name, of, value] : forms) {
+    const auto set = [&request, maps, whole = FindRequestOption(of)](const std::string& option, const std::vector<std::string>& texts) {
+      return SetOption(*whole, option, std::vector{fmt::format("{}={}", kOverlayField, texts.back())}, maps, request);
+    };
+    app.AddOption(name, set, fmt::format("Shows the overlay, as --{} {}={}", of, kOverlayField, value)).TypeName(value);
+  }
+}
+
+}  // namespace
+
+void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown) {
+  app.GroupOptions(FindRequestOption("label-mode")->group);
+  const auto set_labels = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
+    if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
+    SetLabelFiles(texts.back(), files);
+    if (shown != nullptr && !shown->labels) shown->labels.emplace();
+    return Status::Ok();
+  };
+  app.AddOption("--labels", set_labels,
+                "A volume of labels, the numbers of structures, on any grid, and a table of their colours: .lut, FreeSurfer, ITK-SNAP, "
+                "ParaView (default: X.nii.lut beside X.nii.gz, else colours of our own); with --local")
+      .TypeName("FILE[:COLOURS]");
+  const auto set_overlay = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
+    if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
+    files.overlay = texts.back();
+    if (shown != nullptr) (void)ChoiceOf(std::string(kOverlayField), *shown);
+    return Status::Ok();
+  };
+  app.AddOption("--overlay", set_overlay, "A second volume of values, on any grid, such as a statistical map; with --local")
+      .TypeName("FILE");
+}
+
 void AddRenderPictureOptions(const Command& app, FrameRequest& request, PictureFormat& format, LayerFiles* files) {
   const ColorMaps maps = files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts;
   request.view = kUnstatedView;
   AddRequestOptions(app, request, maps, [](const RequestOption& option) { return option.name != "dataset" && option.name != "previews"; });
+  AddOverlayOptions(app, maps, request);
   AddWholeViews(app, request.view, files != nullptr);
   if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddPictureFormat(app, format);
@@ -220,9 +263,11 @@ void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles*
     if (option.path.starts_with("labels.")) return option.name != "label-opacity";
     if (option.path == "channels" || option.path.starts_with("fields.") || option.path == "blend" || option.path == "time") return true;
     return option.name == "size" || option.name == "transfer" || option.name == "scalar-range" || option.name == "opacity-distance" ||
-           option.path.starts_with("overlay.") || std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();
+           std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();
   };
-  AddRequestOptions(app, slice.frame, files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts, wanted);
+  const ColorMaps maps = files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts;
+  AddRequestOptions(app, slice.frame, maps, wanted);
+  AddOverlayOptions(app, maps, slice.frame);
   if (files != nullptr) AddLayerFiles(app, *files, &slice.frame);
   app.FindOption("--transfer").Excludes(window).Default("window");
   app.FindOption("--size").Group("Plane");

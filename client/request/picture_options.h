@@ -17,6 +17,9 @@ namespace slabstream {
 // Options under this heading are not shown in help texts: old spellings that still work, and options that cannot be used yet.
 inline constexpr char kHidden[] = "";
 
+// --labels and --overlay: the files of a volume's layers. `shown`: the request that shows a layer whose file is given; may be null.
+void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown = nullptr);
+
 // View, clipping, look, layers, annotations and policy. The view is the default one, as far as no option says something else.
 void AddRenderPictureOptions(const Command& app, FrameRequest& request, PictureFormat& format, LayerFiles* files);
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/request/request_options.h"
 #include "client/request/shell_word.h"
 #include "common/base/version.h"
+#include "common/volume/field_info.h"
 #include "common/wire/request_json.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
@@ -111,6 +111,16 @@ void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
   value.Fields({{"labels", [&](const JsonValue& v) { SetLabelFiles(v.Text(), files); }}, {"overlay", JsonValue::Into(files.overlay)}});
 }
 
+// Slabstream 0.1 has the look of the overlay apart.
+Json WithOverlayAsField(Json request) {
+  const bool is_apart = request.is_object() && request.contains("overlay") && request["overlay"].is_object();
+  if (!is_apart || !(request["fields"].is_null() || request["fields"].is_array())) return request;
+  request["overlay"]["field"] = kOverlayField;
+  request["fields"].push_back(request["overlay"]);
+  request.erase("overlay");
+  return request;
+}
+
 // Names of catalogues have no slashes, and hardly ever the ending of a volume file.
 bool IsFile(const std::string& source) {
   return source.find('/') != std::string::npos || LooksLikeVolumeFile(source.substr(0, source.find('?')));
@@ -161,7 +171,8 @@ FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers, const std::vector<LevelUse>& levels) {
   Json made = Json::Parse(RequestToJson(request)).value();
-  made.erase("dataset");  // the source says it
+  // The source says the dataset. How a picture travels is not what it shows.
+  for (const char* field : {"dataset", "straight8", "key"}) made.erase(field);
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
                {"source", ShownSource(source)},
                {"request", std::move(made)},
@@ -185,7 +196,7 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
   value.Fields({{"program", JsonValue::Into(record.program)},
                 {"source", JsonValue::Into(record.source)},
                 {"layers", [&](const JsonValue& v) { ReadLayerFiles(v, record.layers); }},
-                {"request", [&](const JsonValue&) { request = (*json)["request"].dump(); }},
+                {"request", [&](const JsonValue&) { request = WithOverlayAsField((*json)["request"]).dump(); }},
                 {"picture", [&](const JsonValue& v) { ReadFormat(v, record.format); }},
                 {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }},
                 {"levels", [](const JsonValue& v) { v.Each([](const JsonValue& level) { (void)level.Integer(0, kMaxLevels - 1); }); }}});

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <type_traits>
 #include <variant>
@@ -26,11 +25,13 @@ namespace {
 constexpr std::string_view kParameters = "parameters";
 constexpr std::string_view kOfFields = "fields.";  // options of single channels, as in "0=green,Actin=#f0f"
 
+constexpr char kColorMapFile[] = "color-map.json";
+std::string ChannelMapFile(std::size_t look) { return fmt::format("channel-map-{}.json", look + 1); }
+
 // Members of requests whose own members are fields with names.
 template <class T>
-concept Part =
-    std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> || std::is_same_v<T, Shading> ||
-    std::is_same_v<T, LabelChoice> || std::is_same_v<T, OverlayChoice> || std::is_same_v<T, FieldChoice> || std::is_same_v<T, Policy>;
+concept Part = std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> ||
+    std::is_same_v<T, Shading> || std::is_same_v<T, LabelChoice> || std::is_same_v<T, FieldChoice> || std::is_same_v<T, Policy>;
 
 // ---- the table
 
@@ -85,8 +86,7 @@ RequestOption Describe(const FieldAbout& field, const T&, std::string path, cons
   if (!field.list.empty()) {
     Choices choices = ChoicesOf(field.list);
     option.choices = std::move(choices.names);
-    const bool told_elsewhere = option.path == "overlay.preset";  // as --transfer
-    if (!told_elsewhere) option.help += choices.explained;
+    option.help += choices.explained;
   }
   if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
   const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };
@@ -299,14 +299,14 @@ std::string Text(const T& value) requires requires {
 { return TextOf(value); }
 
 template <class T>
-std::vector<std::string> Texts(const RequestOption& option, const FieldAbout& field, const T& value) {
+std::vector<std::string> Texts(const FieldAbout& field, const T& value) {
   if constexpr (std::is_same_v<T, bool>) {
     return value ? std::vector<std::string>{"true"} : std::vector<std::string>{};
   } else if constexpr (requires { value.number(); }) {
     return {field.words.at(std::size_t(value.number()) - 1)};
   } else if constexpr (requires { value.index(); }) {
     if (const auto* preset = std::get_if<std::string>(&value)) return {*preset};
-    return {option.path.starts_with("overlay") ? kOverlayMapFile : option.path.starts_with(kOfFields) ? kChannelMapFile : kColorMapFile};
+    return {kColorMapFile};
   } else if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
     std::vector<std::string> texts;
     for (const auto& item : value) texts.push_back(TextOf(item));
@@ -327,9 +327,10 @@ std::vector<std::string> Texts(const RequestOption& option, const FieldAbout& fi
 
 // ---- one field of the looks of single channels
 
-FieldChoice& LookOf(const std::string& field, FrameRequest& request) {
-  const auto found = std::ranges::find(request.fields, field, &FieldChoice::field);
-  return found != request.fields.end() ? *found : request.fields.emplace_back(FieldChoice{.field = field});
+std::vector<std::string> TextsOfLook(std::string_view path, const FieldChoice& look) {
+  std::vector<std::string> texts;
+  At(path, look, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(field, member); });
+  return texts;
 }
 
 Status SetOfFields(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
@@ -341,9 +342,11 @@ Status SetOfFields(const RequestOption& option, const std::string& shown, std::s
     const Result<std::vector<NamedText>> items = ParseNamedTexts(shown, text);
     if (!items.ok()) return items.status();
     for (const auto& [name, value] : *items) {
-      if (!named.insert(name).second) return Status::InvalidArgument(fmt::format("{} names '{}' twice", shown, name));
+      FieldChoice& look = ChoiceOf(name, request);
+      const bool said = TextsOfLook(path, look) != TextsOfLook(path, {});  // by a short form
+      if (!named.insert(name).second || said) return Status::InvalidArgument(fmt::format("{} names '{}' twice", shown, name));
       if (value.empty()) return Status::InvalidArgument(fmt::format("{} '{}' has no value for '{}'", shown, text, name));
-      At(path, LookOf(name, request), [&](const FieldAbout& field, auto& member, std::size_t most) {
+      At(path, look, [&](const FieldAbout& field, auto& member, std::size_t most) {
         const RequestOption of_one{.path = option.path, .value = "VALUE", .range = NumberRange{field.least, field.most}};
         OptionReader reader{.option = of_one, .shown = fmt::format("{} {}:", shown, name), .maps = maps, .most = most};
         reader.ReadAll(std::span(&value, 1), member);
@@ -359,17 +362,14 @@ Status SetOfFields(const RequestOption& option, const std::string& shown, std::s
 std::vector<std::string> TextsOfFields(const RequestOption& option, const FrameRequest& request) {
   const std::string_view path = std::string_view(option.path).substr(kOfFields.size());
   std::string joined;
-  for (FieldChoice look : request.fields) {
+  for (std::size_t i = 0; i < request.fields.size(); ++i) {
+    FieldChoice look = request.fields[i];
     const bool bare = look == FieldChoice{.field = look.field};
     if (!look.shown.value_or(true)) look.weight = 0;
-    const auto texts_of = [&](const FieldChoice& choice) {
-      std::vector<std::string> texts;
-      At(path, choice, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
-      return texts;
-    };
-    const std::vector<std::string> texts = texts_of(look);
-    if (texts == texts_of({}) && !(bare && path == "weight")) continue;
-    joined += fmt::format("{}{}={}", joined.empty() ? "" : ",", TextOfName(look.field), texts.front());
+    const std::vector<std::string> texts = TextsOfLook(path, look);
+    if (texts == TextsOfLook(path, {}) && !(bare && path == "weight")) continue;
+    const bool map = texts.front() == kColorMapFile && path == "preset";
+    joined += fmt::format("{}{}={}", joined.empty() ? "" : ",", TextOfName(look.field), map ? ChannelMapFile(i) : texts.front());
   }
   return joined.empty() ? std::vector<std::string>{} : std::vector{joined};
 }
@@ -377,7 +377,7 @@ std::vector<std::string> TextsOfFields(const RequestOption& option, const FrameR
 std::vector<std::string> AllTextsOf(const RequestOption& option, const FrameRequest& request) {
   if (option.path.starts_with(kOfFields)) return TextsOfFields(option, request);
   std::vector<std::string> texts;
-  At(option.path, request, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
+  At(option.path, request, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(field, member); });
   return texts;
 }
 
@@ -406,6 +406,11 @@ const RequestOption* FindRequestOption(std::string_view name) {
   return found == RequestOptions().end() ? nullptr : &*found;
 }
 
+FieldChoice& ChoiceOf(const std::string& field, FrameRequest& request) {
+  const auto found = std::ranges::find(request.fields, field, &FieldChoice::field);
+  return found != request.fields.end() ? *found : request.fields.emplace_back(FieldChoice{.field = field});
+}
+
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
                  FrameRequest& request) {
   if (IsParameter(option)) {
@@ -431,13 +436,21 @@ std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest
     FrameRequest standard;
     standard.view = kUnstatedView;
     standard.labels.emplace();
-    standard.overlay.emplace();
     return standard;
   }();
-  const bool shows_layer = option.path == "labels.mode" || option.path == "overlay.preset";
   std::vector<std::string> texts = AllTextsOf(option, request);
-  if (!shows_layer && texts == AllTextsOf(option, kStandard)) return {};
+  if (option.path != "labels.mode" && texts == AllTextsOf(option, kStandard)) return {};
   return texts;
+}
+
+std::map<std::string, std::string> MapFilesOf(const FrameRequest& request) {
+  std::map<std::string, std::string> files;
+  const auto add = [&files](const std::string& name, const auto& shown) {
+    if (const auto* function = std::get_if<TransferFunction>(&shown.choice)) files[name] = FormatParaViewColorMap(*function, name);
+  };
+  add(kColorMapFile, request.transfer);
+  for (std::size_t i = 0; i < request.fields.size(); ++i) add(ChannelMapFile(i), request.fields[i]);
+  return files;
 }
 
 std::optional<std::vector<std::string>> TextsOfJson(const Json& value, bool repeatable) {

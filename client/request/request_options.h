@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -44,17 +45,20 @@ const RequestOption* FindRequestOption(std::string_view name);
 // Colour maps may be files that texts name, or only texts themselves.
 enum class ColorMaps : bool { kTexts, kFilesToo };
 
+// The look of a channel or another field in the request; it is made if there is none.
+FieldChoice& ChoiceOf(const std::string& field, FrameRequest& request);
+
 // Sets the field. `texts`: one, or of a repeatable option one for each time. A flag: "true" or "false". An option of single channels sets
 // it in the looks of those that it names. InvalidArgument in one line that begins with `shown` ("--clip-box").
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
                  FrameRequest& request);
 
-// The texts that set the field to what it is in `request`; none if it has its standard value. A layer that is shown has
-// always one text. A transfer function that is no preset stands as the name of a file: see kColorMapFile.
+// The texts that set the field to what it is in `request`; none if it has its standard value. Labels that are
+// shown have always one text. A transfer function that is no preset stands as the name of a file: see MapFilesOf.
 std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest& request);
 
-// The files that a command line names for transfer functions that are not presets.
-inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json", kChannelMapFile[] = "channel-map.json";
+// The files that a command line names for transfer functions that are not presets, by their names, in ParaView's format.
+std::map<std::string, std::string> MapFilesOf(const FrameRequest& request);
 
 // The texts of an option's value in JSON: of a text, number, boolean or colour map; lists of numbers are joined by commas; lists of a
 // repeatable option are one text for each item. Nothing: the value is of another kind.

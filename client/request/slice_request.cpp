@@ -8,6 +8,7 @@
 #include "common/base/check.h"
 #include "common/renderers/registry.h"
 #include "common/view/named_view.h"
+#include "common/volume/field_info.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -47,7 +48,9 @@ SliceRequest::SliceRequest() {
 
 Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   if (Status status = Validate(slice.size()); !status.ok()) return status;
-  const bool layers = slice.frame.labels || slice.frame.overlay;
+  const bool overlay = std::ranges::count(slice.frame.fields, kOverlayField, &FieldChoice::field) > 0 ||
+                       std::ranges::count(slice.frame.channels, kOverlayField) > 0;
+  const bool layers = slice.frame.labels || overlay;
   if (layers && slice.thickness > 0) {
     return Status::InvalidArgument(fmt::format("--thickness {} is no plane, and layers are shown in planes only", slice.thickness));
   }
@@ -59,7 +62,7 @@ Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   for (const SlicePlane& plane : slice.planes) {
     FrameRequest& frame = frames.emplace_back(FrameOf(slice, plane));
     if (layers) {
-      frame.renderer = RendererThat([](const RendererKind& kind) { return kind.Can(Ability::kLabels) && kind.Can(Ability::kOverlay); });
+      frame.renderer = RendererThat([](const RendererKind& kind) { return kind.Can(Ability::kLabels) && kind.Can(Ability::kFields); });
       frame.shading.model = ShadingModel::kNone;
     }
     if (const auto window = slice.shown_window()) frame.transfer.choice = FunctionOf(*window);

@@ -6,7 +6,6 @@
 #include <array>
 #include <charconv>
 #include <optional>
-#include <vector>
 
 #include "client/request/named_colors.h"
 #include "common/base/did_you_mean.h"

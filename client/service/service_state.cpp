@@ -15,7 +15,6 @@
 #include <utility>
 
 #include "client/service/process.h"
-#include "common/base/time.h"
 #include "common/files/files.h"
 #include "common/json/json.h"
 #include "common/service/service_file.h"

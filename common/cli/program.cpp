@@ -1,5 +1,6 @@
 #include "common/cli/program.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -9,18 +10,16 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <iostream>
 #include <new>
-#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "common/base/did_you_mean.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/process_limits.h"
 #include "common/cli/add_option.h"
 #include "common/memory/large_buffers.h"
 #include "common/text/url.h"
@@ -39,6 +38,44 @@ std::uint64_t AllowOpenFiles() {
     if (::setrlimit(RLIMIT_NOFILE, &more) == 0) limit = more;
   }
   return limit.rlim_cur;
+}
+
+// Of the control group, such as a container's; empty: there is none.
+std::string GroupsThreads() {
+  std::ifstream groups("/proc/self/cgroup");
+  for (std::string line; std::getline(groups, line);) {
+    if (!line.starts_with("0::")) continue;
+    std::string most;
+    std::ifstream("/sys/fs/cgroup" + line.substr(3) + "/pids.max") >> most;
+    return most == "max" ? "" : most;
+  }
+  return "";
+}
+
+enum class Scarce { kMemory, kThreads };
+
+// "; this process may have 200000 KiB of data (ulimit -d)": the limits that somebody has set and that may be the reason. Empty: none is
+// set.
+std::string LimitsOf(Scarce what) {
+  std::string text;
+  const auto add = [&](const std::string& limit) { text += (text.empty() ? "; " : ", ") + limit; };
+  const auto limit = [](__rlimit_resource_t resource) {
+    rlimit found{};
+    return ::getrlimit(resource, &found) == 0 ? found.rlim_cur : RLIM_INFINITY;
+  };
+  if (const rlim_t bytes = limit(RLIMIT_DATA); bytes != RLIM_INFINITY) {
+    add(fmt::format("this process may have {} KiB of data (ulimit -d)", bytes >> 10));
+  }
+  if (const rlim_t bytes = limit(RLIMIT_AS); bytes != RLIM_INFINITY) {
+    add(fmt::format("this process may have {} KiB of address space (ulimit -v)", bytes >> 10));
+  }
+  if (what == Scarce::kMemory) return text;
+  if (const rlim_t threads = limit(RLIMIT_NPROC); threads != RLIM_INFINITY) {
+    add(fmt::format("this user may have {} processes and threads (ulimit -u)", threads));
+  }
+  if (const std::string threads = GroupsThreads(); !threads.empty())
+    add(fmt::format("its control group may have {} threads (pids.max)", threads));
+  return text;
 }
 
 // The command that was typed last: `keys rotate` of `slabstream`.

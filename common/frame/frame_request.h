@@ -65,14 +65,6 @@ struct TransferChoice {
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
-// How the overlay of a dataset is shown: as a TransferChoice without isosurfaces and opacity by gradient, which are of the volume alone.
-struct OverlayChoice {
-  std::variant<std::string, TransferFunction> choice = std::string("auto");
-  std::optional<ScalarRange> scalar_range = {};
-  double weight = 1;  // [0, 1]: factor of its density in the mix
-  friend bool operator==(const OverlayChoice&, const OverlayChoice&) = default;
-};
-
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
@@ -93,8 +85,7 @@ struct FrameRequest {
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
-  std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
-  std::optional<OverlayChoice> overlay = {};  // none: the dataset's overlay, if it has one, is not shown
+  std::optional<LabelChoice> labels = {};  // none: those of the dataset, if it has any, are not shown
   // Which channels of the dataset show, by name or number; empty: those that the dataset says. At most kMaxShownFields.
   std::vector<std::string> channels = {};
   std::vector<FieldChoice> fields = {};  // looks of fields, none named twice; at most kMaxFields
@@ -112,6 +103,7 @@ struct FrameRequest {
   bool previews = false;  // a picture after each group
   // Pictures may come without depths, and in the codes that a PNG of 8 bits has (ColorCoding::kStraight8): a quarter of the bytes.
   bool straight8 = false;
+  bool key = false;  // pictures come with what their colours mean (PictureKey)
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
 

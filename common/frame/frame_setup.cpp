@@ -1,6 +1,5 @@
 #include "common/frame/frame_setup.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/frame/frame_unit.h"

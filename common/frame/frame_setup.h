@@ -13,6 +13,7 @@
 #include "common/frame/frame_request.h"
 #include "common/frame/label_look.h"
 #include "common/frame/opaque_front.h"
+#include "common/frame/smooth_label.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
 #include "common/view/picture_geometry.h"
@@ -178,7 +179,7 @@ inline AffineMap MapTo(const FrameSetup& setup, const FieldSetup& field, std::ui
 inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup, const FieldSetup& field) {
   const AffineMap map = MapTo(setup, field, at.level);
   const Index3& size = LevelOf(field, at.level).description.geometry.size;
-  const Box voxels = CoveringVoxels(at.box, map, size, setup.halo);
+  const Box voxels = CoveringVoxels(at.box, map, size, std::max(setup.halo, field.labels && field.labels->smooth ? kSmoothReach : 0));
   // Voxels of the volume's halo have labels, too.
   if (!field.labels) return voxels;
   return Hull(voxels, CoveringVoxels(Grown(at.box, setup.halo, setup.description.geometry.bounds()), map, size, 0));

@@ -18,6 +18,9 @@ namespace slabstream {
 // stays as it is.
 enum class LabelMode : std::uint8_t { kTint = 1, kSurface = 2, kHighlight = 3 };
 
+// Of kSurface. kBlocky: a place has the label of the voxel that it lies in. kSmooth: labels are smoothed (common/frame/smooth_label.h).
+enum class LabelSurface : std::uint8_t { kBlocky = 1, kSmooth = 2 };
+
 inline constexpr double kDefaultTint = 0.6;
 inline constexpr std::size_t kMaxLabelRanges = std::size_t{1} << 18;
 
@@ -44,6 +47,7 @@ struct LabelChoice {
   // Opacities of labels; a label that is not named has 1, none is named twice; at most kMaxLabels.
   std::vector<LabelOpacity> opacities;
   std::vector<LabelRange> shown;  // empty: all; at most kMaxLabelRanges
+  LabelSurface surface = LabelSurface::kBlocky;
   friend bool operator==(const LabelChoice&, const LabelChoice&) = default;
 };
 
@@ -72,6 +76,7 @@ struct LabelLook {
   std::vector<Entry> entries;  // values rise; other labels have their StandardColor and the opacity 1
   std::vector<Span> shown;     // rise and do not touch; empty: all labels
   bool hides = false;          // labels that are not shown take their material away
+  bool smooth = false;         // LabelSurface::kSmooth; only of kSurface
   friend bool operator==(const LabelLook&, const LabelLook&) = default;
 };
 

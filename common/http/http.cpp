@@ -16,10 +16,8 @@
 #include <boost/beast/websocket/ssl.hpp>
 #include <deque>
 #include <map>
-#include <memory>
 #include <set>
 #include <utility>
-#include <variant>
 
 #include "common/base/limited_log.h"
 #include "common/text/split.h"

@@ -5,7 +5,6 @@
 #include <numeric>
 #include <queue>
 #include <tuple>
-#include <utility>
 
 namespace slabstream {
 

@@ -6,7 +6,6 @@
 #include <numeric>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 #include "common/calibration/calibration.h"

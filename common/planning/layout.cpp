@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <optional>
 
-#include "common/base/check.h"
 #include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
-#include "common/planning/clipped_cells.h"
 #include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
 #include "common/planning/other_bricks.h"
@@ -454,6 +451,14 @@ Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
     return state_->MakeByPredictedCost(policy, groups);
   }
   return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(metric), state_->request.resized), policy);
+}
+
+void EmptyClippedCells(const ClipRegion& clip, OccupancyGrid& grid) {
+  if (clip.empty()) return;
+  const Index3 cells = OccupancyCells(grid.size);
+  for (std::size_t i = 0; i < grid.cells.size(); ++i) {
+    if (grid.cells[i].voxels != 0 && !clip.MayKeep(OccupancyCellBox(PlaceIn(cells, i), grid.size))) grid.cells[i] = {};
+  }
 }
 
 Layout MakeLayout(const LayoutRequest& request) { return LayoutMaker(request).Make(*request.policy); }

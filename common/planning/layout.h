@@ -65,6 +65,9 @@ struct LayoutRequest {
 // views along x and along y and with the renderer's default parameters: a layout stays for all views.
 Layout MakeLayout(const LayoutRequest& request);
 
+// Empties the cells of which clipping leaves nothing. Cells that are clipped in part keep all their voxels.
+void EmptyClippedCells(const ClipRegion& clip, OccupancyGrid& grid);
+
 // Makes layouts by several policies; computes what they share once.
 class LayoutMaker {
  public:

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <string>
 #include <utility>
 
 #include "common/planning/frame_plan.h"

@@ -1,7 +1,6 @@
 #include "common/planning/measured_cost.h"
 
 #include <algorithm>
-#include <vector>
 
 #include "common/base/check.h"
 #include "common/volume/cells_along.h"

@@ -48,7 +48,7 @@ std::vector<std::uint8_t> OtherBricks(const VolumeSummary& summary, const Classi
     if (field.labels && field.labels->mode != LabelMode::kSurface) continue;
     if (field.labels) {
       const auto shows = [&](const Box& box) { return AnyMatter(*field.summary, *field.labels, box); };
-      AddField(summary, *field.summary, 0, shows, bricks);  // a sample has the label of one voxel, not a mix of several
+      AddField(summary, *field.summary, field.labels->smooth ? renderer.reach() : 0, shows, bricks);
     } else {
       const BrickVisibility visibility(*field.summary, renderer.DrawnTable(field.look.transfer, *field.summary));
       AddField(

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <map>
 #include <ranges>
-#include <set>
 
 #include "common/base/check.h"
 #include "common/combining/schemes.h"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "common/base/find_named.h"
@@ -68,6 +67,10 @@ std::vector<LabelLook::Span> Joined(std::vector<LabelLook::Span> spans) {
 // `slice`: of a slice, which keeps the grey values of hidden labels.
 Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table, bool slice) {
   LabelLook look{.mode = choice.mode == LabelMode::kHighlight ? LabelMode::kTint : choice.mode, .tint = choice.tint};
+  look.smooth = choice.surface == LabelSurface::kSmooth;
+  if (look.smooth && choice.mode != LabelMode::kSurface) {
+    return Status::InvalidArgument("label-surface is 'smooth', but label-mode is not 'surface', the mode in which labels have surfaces");
+  }
   look.hides = choice.mode == LabelMode::kTint && !slice;
   const auto rgb = [](const LabelColor& color) { return Rgb{color[0], color[1], color[2]}; };
   for (const Label& label : table.labels) look.entries.push_back({label.value, rgb(label.color)});
@@ -90,7 +93,7 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
 
 Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary) {
   if (IsOfLabels(summary.description.type)) {
-    return Status::InvalidArgument(fmt::format("dataset \"{}\" is one of labels (?ids), which need values that they name", dataset));
+    return Status::InvalidArgument(fmt::format("dataset \"{}\" is one of labels (?ids=yes), which need values that they name", dataset));
   }
   if (!renderer.Can(Ability::kCells) || !summary.cells.empty()) return Status::Ok();
   return Status::InvalidArgument(
@@ -159,6 +162,16 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
                                        ShownFields fields) {
   const VolumeGeometry& geometry = summary->description.geometry;
+  if (fields.dataset != nullptr && HasLabelsAlone(*fields.dataset)) {
+    const RendererKind* const named = FindRenderer(request.renderer);
+    if (!request.labels && named != nullptr && !named->Can(Ability::kLabels)) {
+      return Status::InvalidArgument(fmt::format(
+          "dataset \"{}\" has labels and no values, and renderer '{}' shows no labels; --label-mode surface chooses one that does",
+          request.dataset, request.renderer));
+    }
+    if (!request.labels) request.labels.emplace();
+    request.labels->mode = LabelMode::kSurface;
+  }
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
   const Result<std::vector<const RendererKind*>> able =
       RenderersFor(request, {fields.values(), std::ranges::any_of(request.fields, weighted)});

@@ -95,19 +95,6 @@ TransferFunction Ramp(const Rgb& color, const ScalarRange& range, double gamma, 
 
 }  // namespace
 
-FrameRequest WithOverlayAsField(FrameRequest request) {
-  if (!request.overlay) return request;
-  const OverlayChoice overlay = *std::exchange(request.overlay, std::nullopt);
-  // That it shows says nothing beside its look by the options of channels.
-  if (overlay == OverlayChoice() && std::ranges::count(request.fields, kOverlayField, &FieldChoice::field) > 0) return request;
-  request.fields.push_back({.field = std::string(kOverlayField),
-                            .shown = true,
-                            .choice = overlay.choice,
-                            .scalar_range = overlay.scalar_range,
-                            .weight = overlay.weight});
-  return request;
-}
-
 Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFields& dataset) {
   const int count = dataset.values();
   std::vector<bool> shows(std::size_t(count), false);
@@ -189,7 +176,9 @@ Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const
   for (const int number : found.numbers) {
     if (number != found.fields.volume) found.fields.others.push_back({.number = number});
   }
-  if (request.labels) {
+  const bool alone = HasLabelsAlone(*found.fields.dataset);
+  if (alone) found.fields.volume_shows = false;
+  if (request.labels || alone) {
     const std::optional<int> labels = found.fields.dataset->labels();
     if (!labels) {
       return Status::InvalidArgument(
@@ -209,10 +198,18 @@ Result<bool> ShowsAsChannel(const FrameRequest& request, const ShownFields& show
   const bool usual = preset != nullptr && (*preset == kAutomatic || (request.clipping.slab && *preset == "window"));  // that of slices
   const bool said =
       !usual || request.transfer.scalar_range || !request.transfer.isosurfaces.empty() || !request.transfer.gradient_opacities.empty();
+  if (said && HasLabelsAlone(*shown.dataset)) {
+    return Status::InvalidArgument(fmt::format(
+        "dataset \"{}\" has labels and no values, which transfer, scalar-range, isovalue and gradient-opacity are about", request.dataset));
+  }
   const bool own = ChoiceOf(request, *shown.dataset, shown.volume) != nullptr;
   const FieldInfo& volume = fields[std::size_t(shown.volume)];
+  const bool names_channel = std::ranges::any_of(request.fields, [&](const FieldChoice& choice) {
+    const Result<int> number = FieldNamed(choice.field, request, *shown.dataset);
+    return number.ok() && fields[std::size_t(*number)].channel;
+  });
   if (!said)
-    return own || !request.channels.empty() || (fields.size() > 1 && volume.channel && (volume.color || !request.fields.empty())) ||
+    return own || !request.channels.empty() || (fields.size() > 1 && volume.channel && (volume.color || names_channel)) ||
            std::ranges::any_of(shown.others, [&](const FieldVolume& other) { return fields[std::size_t(other.number)].channel; });
   const auto others =
       std::ranges::count_if(shown.others, [&](const FieldVolume& other) { return fields[std::size_t(other.number)].channel; });

@@ -45,8 +45,8 @@ struct ShownFields {
   std::size_t values() const { return 1 + others.size() - (!others.empty() && others.back().labels ? 1 : 0); }
 };
 
-// The request with its overlay as what it is: one of the fields.
-FrameRequest WithOverlayAsField(FrameRequest request);
+// Whether it has no values: its labels show without being asked for, and its volume is hollow (data/sources/hollow_source.h).
+inline bool HasLabelsAlone(const DatasetFields& dataset) { return dataset.labels() && dataset.fields.back().shown; }
 
 struct FieldNumbers {
   std::vector<int> numbers;  // ascending. The first one is the picture's volume: a channel, even if the request shows none

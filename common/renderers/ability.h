@@ -13,21 +13,21 @@ enum class Ability : std::uint8_t {
   kIsosurfaces = 1,      // draws TransferFunction::isosurfaces
   kGradientOpacity = 2,  // multiplies opacities by TransferFunction::gradient_opacities
   kLabels = 3,           // shows the labels of a dataset
-  kOverlay = 4,          // shows the overlay of a dataset
-  kCells = 5,            // draws the cells of unstructured grids; other datasets are refused
-  kLights = 6,           // lights surfaces (Shading)
-  kDepthShading = 7,     // lights them by ShadingModel::kDepthGradient, too
-  kTransfer = 8,         // shows values by the transfer function
-  kLevels = 9,           // draws boxes of one picture from several levels of the dataset
-  kShadows = 10,         // shows shadows and ambient occlusion (Shading)
-  kRegions = 11,         // shows TransferFunction::regions
-  kFields = 12,          // shows several fields of a dataset in one picture
+  kCells = 4,            // draws the cells of unstructured grids; other datasets are refused
+  kLights = 5,           // lights surfaces (Shading)
+  kDepthShading = 6,     // lights them by ShadingModel::kDepthGradient, too
+  kTransfer = 7,         // shows values by the transfer function
+  kLevels = 8,           // draws boxes of one picture from several levels of the dataset
+  kShadows = 9,          // shows shadows and ambient occlusion (Shading)
+  kRegions = 10,         // shows TransferFunction::regions
+  kFields = 11,          // shows several fields of a dataset in one picture
+  kSmoothLabels = 12,    // draws LabelSurface::kSmooth
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 13> kAbilityNames = {
-    "perspective",   "isosurfaces", "gradient-opacity", "labels",  "overlay", "cells", "lights",
-    "depth-shading", "transfer",    "levels",           "shadows", "regions", "fields"};
+inline constexpr std::array<std::string_view, 13> kAbilityNames = {"perspective", "isosurfaces",   "gradient-opacity", "labels", "cells",
+                                                                   "lights",      "depth-shading", "transfer",         "levels", "shadows",
+                                                                   "regions",     "fields",        "smooth-labels"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

@@ -47,7 +47,7 @@ std::vector<Need> NeedsOf(const FrameRequest& request, const FieldsKnown& fields
   need(request.shading.shadows != 0, Ability::kShadows, "shadows");
   need(request.shading.ambient_occlusion != 0, Ability::kShadows, "ambient-occlusion");
   need(request.labels.has_value(), Ability::kLabels, "labels");
-  need(request.overlay.has_value(), Ability::kOverlay, "overlay");
+  need(request.labels && request.labels->surface == LabelSurface::kSmooth, Ability::kSmoothLabels, "label-surface 'smooth'");
   need(fields.weighted, Ability::kFields, "channel-opacity");
   need(fields.count > 1, Ability::kFields, fmt::format("a picture of {} fields", fields.count));
   for (const auto& [name, text] : request.parameters) {

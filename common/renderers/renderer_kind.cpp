@@ -1,8 +1,6 @@
 #include "common/renderers/renderer_kind.h"
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"

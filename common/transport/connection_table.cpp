@@ -3,7 +3,6 @@
 #include <sys/socket.h>
 
 #include <algorithm>
-#include <string>
 #include <string_view>
 #include <utility>
 

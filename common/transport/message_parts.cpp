@@ -1,7 +1,6 @@
 #include "common/transport/message_parts.h"
 
 #include <cerrno>
-#include <memory>
 #include <span>
 #include <utility>
 

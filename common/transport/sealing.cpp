@@ -7,7 +7,6 @@
 #include <zmq.h>
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "common/base/check.h"

@@ -125,8 +125,5 @@ ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometr
 // `view` and `size` valid, and CheckView is ok. `farthest_voxel`: the width of voxels where the volume is farthest from the eye, for
 // supersampling; 0: supersample is 1.
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, double farthest_voxel = 0);
-inline Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
-  return MakeCamera(view, size, geometry, Least(geometry.spacing));
-}
 
 }  // namespace slabstream

@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <fstream>
 #include <limits>
 #include <optional>
 #include <sstream>
-#include <string>
 
 #include "common/text/parse_number.h"
 

@@ -1,6 +1,5 @@
 #include "common/volume/summary.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -220,7 +219,8 @@ VolumeSummary OverTimes(VolumeSummary own, std::span<const VolumeSummary> others
       }
     }
   }
-  std::ranges::transform(mean, over.histogram.begin(), [](double each) { return std::uint64_t(std::llround(each)); });
+  // What is rare stays.
+  std::ranges::transform(mean, over.histogram.begin(), [](double each) { return each > 0 ? std::uint64_t(std::max(each, 1.0) + 0.5) : 0; });
   return over;
 }
 

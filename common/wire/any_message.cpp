@@ -5,8 +5,6 @@
 
 #include <array>
 #include <string>
-#include <type_traits>
-#include <utility>
 
 #include "common/base/check.h"
 #include "common/image/local_image.h"

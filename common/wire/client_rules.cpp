@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <limits>
-#include <string>
 
 #include "common/frame/dataset_name.h"
 #include "common/renderers/registry.h"
@@ -25,6 +25,11 @@ void Rules(const PictureGeometry& m, Checker& check) {
   check.That(AreRightHanded(m.right, m.up, -m.forward), "right", "not of three right-handed unit vectors at right angles");
   if (m.projection == Projection::kPerspective) check.Positive("target_depth", m.target_depth);
   check.Positive("pixel_size", m.pixel_size);
+}
+
+void Rules(const PictureKey::Bar& m, Checker& check) {
+  check.That(m.colors.size() > 1 && std::ranges::is_sorted(m.colors, {}, &ColorPoint::value) && m.low() < m.high(), "colors",
+             "not of rising values");
 }
 
 void Rules(const FrameReply& m, Checker& check) {

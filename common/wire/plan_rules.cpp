@@ -66,7 +66,10 @@ void CheckCellsAndLabels(const FrameSetup& setup, Checker& check) {
   const RendererKind& renderer = *setup.renderer;
   if (renderer.Can(Ability::kCells)) check.That(setup.cells, "renderer", "one of cells, which the dataset does not have");
   check.That(!IsOfLabels(setup.description.type), "description.type", "one of labels");
-  if (LabelsOf(setup) != nullptr) check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
+  const FieldSetup* const labels = LabelsOf(setup);
+  if (labels == nullptr) return;
+  check.That(renderer.Can(Ability::kLabels), "renderer", "one that shows no labels");
+  check.That(!labels->labels->smooth || renderer.Can(Ability::kSmoothLabels), "renderer", "one that does not smooth labels");
 }
 
 void CheckFields(const FrameSetup& setup, Checker& check) {

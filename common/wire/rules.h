@@ -39,6 +39,7 @@ void Rules(const FrameImage&, Checker&);
 void Rules(const FrameRequest&, Checker&);
 void Rules(const FrameProgress&, Checker&);
 void Rules(const PictureGeometry&, Checker&);
+void Rules(const PictureKey::Bar&, Checker&);
 void Rules(const FrameReply&, Checker&);
 void Rules(const SummaryQuery&, Checker&);
 void Rules(const SummaryReply&, Checker&);

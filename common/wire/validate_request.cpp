@@ -168,7 +168,7 @@ Status CheckRules(const Shading& shading) {
 }
 
 Status CheckRules(const LabelChoice& labels) {
-  std::set<std::uint32_t> named;
+  std::set<std::uint64_t> named;
   for (const auto& [value, opacity] : labels.opacities) {
     if (!named.insert(value).second) return Status::InvalidArgument(fmt::format("labels.opacities names label {} twice", value));
   }
@@ -176,15 +176,6 @@ Status CheckRules(const LabelChoice& labels) {
     if (first > last) return Status::InvalidArgument(fmt::format("labels.shown has the range {} to {}, but must rise", first, last));
   }
   return Status::Ok();
-}
-
-// Overlays have no isosurfaces and nothing that depends on gradients.
-Status CheckRules(const OverlayChoice& overlay) {
-  const auto* function = std::get_if<TransferFunction>(&overlay.choice);
-  if (function != nullptr && !function->curves_alone()) {
-    return Status::InvalidArgument("overlay.function has isosurfaces, gradient_opacities or regions, which are of the volume alone");
-  }
-  return CheckRules(overlay.scalar_range, "overlay.scalar_range");
 }
 
 Status CheckRules(const FieldChoice& choice, const std::string& name) {
@@ -238,8 +229,7 @@ Status Validate(const FrameRequest& request) {
   if (Status s = CheckRules(request.transfer); !s.ok()) return s;
   if (Status s = CheckRules(request.shading); !s.ok()) return s;
   if (Status s = request.labels ? CheckRules(*request.labels) : Status::Ok(); !s.ok()) return s;
-  if (Status s = CheckRules(request.fields); !s.ok()) return s;
-  return request.overlay ? CheckRules(*request.overlay) : Status::Ok();
+  return CheckRules(request.fields);
 }
 
 }  // namespace slabstream

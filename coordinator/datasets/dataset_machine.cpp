@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 #include <utility>
 
 #include "common/volume/memory_budget.h"
@@ -338,7 +337,8 @@ bool DatasetMachine::State::IsAwaited(DatasetId dataset) const {
     return !use.begun() && std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
   };
   return std::ranges::any_of(uses, uses_it) || std::ranges::any_of(questions, [&](const auto& open) {
-           return !open.second.asked && (is_of(open.second.entry) || is_of(open.second.overlay.name) || is_of(open.second.labels.name));
+           const auto entries = open.second.entries();
+           return !open.second.asked && std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
          });
 }
 
@@ -432,6 +432,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     open.check = 0;
     open.fields = {};
     open.overlay = open.labels = {};
+    open.others = {};
   }
   const bool may_grow = datasets.Find(name)->MayGrow();
   datasets.Reset(name, now);
@@ -475,7 +476,8 @@ void DatasetMachine::State::ClosePartsThatNobodyWants() {
                                }) ||
            std::ranges::any_of(questions, [&](const auto& each) {
              const OpenQuestion& open = each.second;
-             return !open.asked && (is_of(open.entry, part) || is_of(open.overlay.name, part) || is_of(open.labels.name, part));
+             const auto entries = open.entries();
+             return !open.asked && std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is_of(entry.name, part); });
            });
   };
   while (datasets.ClosePart(is_wanted)) {

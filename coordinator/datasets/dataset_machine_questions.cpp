@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <array>
+#include <tuple>
 #include <utility>
 
 #include "coordinator/datasets/dataset_machine_state.h"
@@ -17,7 +17,6 @@ FrameRequest* FrameOf(Question& question) {
 }  // namespace
 
 void DatasetMachine::State::Ask(PeerToken client, Question question) {
-  if (FrameRequest* const frame = FrameOf(question)) *frame = WithOverlayAsField(std::move(*frame));
   const std::string& name = DatasetOf(question);
   OpenQuestion open{.client = client, .question = question, .entry = name};
   const auto of_client = std::ranges::count(questions, client, [](const auto& each) { return each.second.client; });
@@ -61,35 +60,41 @@ Status DatasetMachine::State::FindField(OpenQuestion& open) {
   Result<ShownAtTime> shown = WhatShows(picture, datasets.Find(picture.dataset)->fields);
   if (!shown.ok()) return shown.status();
   ShownFields found = std::move(shown->fields);
-  found.others.clear();  // the question is about the first one
+  if (FrameOf(open.question) == nullptr && !found.volume_shows) found.volume = shown->numbers[1];
   const DatasetFields& fields = *found.dataset;
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
+  const bool of_view = std::holds_alternative<ViewQuery>(open.question);
   const auto* const statistics = std::get_if<StatisticsQuery>(&open.question);
-  const bool of_labels =
-      of_points || (statistics != nullptr && statistics->labels) || picture.labels || std::holds_alternative<SummaryQuery>(open.question);
-  struct Needed {
-    int field = 0;
-    Use::Entry entry = {};
+  const bool of_labels = of_points || (statistics != nullptr && statistics->labels) || picture.labels || HasLabelsAlone(fields) ||
+                         std::holds_alternative<SummaryQuery>(open.question);
+  if (!of_view) found.others.clear();  // the question is about the first one
+  Status failed;
+  // False: something else must be ready first, or `failed`.
+  const auto find = [&](int field, Use::Entry& entry) {
+    const Result<FieldSource> source = SourceOf(picture.dataset, field, shown->time);
+    if (!source.ok()) {
+      failed = source.status();
+      return false;
+    }
+    entry = {source->entry, source->entry == open.entry ? open.check : Seek(source->entry)};
+    if (!source->ready) std::tie(open.entry, open.check) = std::tie(entry.name, entry.check);
+    return source->ready;
   };
-  std::optional<Needed> overlay, labels;
-  Needed volume{found.volume};
-  if (const int last = fields.values() - 1; of_points && !fields.fields[std::size_t(last)].channel) overlay = {last};
-  if (of_labels && fields.labels()) labels = {*fields.labels()};
-  for (Needed* const needed : {&volume, overlay ? &*overlay : nullptr, labels ? &*labels : nullptr}) {
-    if (needed == nullptr) continue;
-    const Result<FieldSource> source = SourceOf(picture.dataset, needed->field, shown->time);
-    if (!source.ok()) return source.status();
-    needed->entry = {source->entry, source->entry == open.entry ? open.check : Seek(source->entry)};
-    if (source->ready) continue;
-    open.entry = needed->entry.name;
-    open.check = needed->entry.check;
-    return Status::Ok();
+  Use::Entry volume, overlay, labels;
+  if (!find(found.volume, volume)) return failed;
+  const int last = fields.values() - 1;
+  if (of_points && !fields.fields[std::size_t(last)].channel && last != found.volume && !find(last, overlay)) return failed;
+  if (of_labels && fields.labels() && !find(*fields.labels(), labels)) return failed;
+  std::vector<Use::Entry> others(found.others.size());
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (!find(found.others[i].number, others[i])) return failed;
   }
   open.fields = std::move(found);
-  open.entry = volume.entry.name;
-  open.check = volume.entry.check;
-  if (overlay) open.overlay = overlay->entry;
-  if (labels) open.labels = labels->entry;
+  open.entry = volume.name;
+  open.check = volume.check;
+  open.overlay = std::move(overlay);
+  open.labels = std::move(labels);
+  open.others = std::move(others);
   return Status::Ok();
 }
 
@@ -102,9 +107,7 @@ void DatasetMachine::State::AskExecutor() {
       return entry.state == DatasetState::kReady && entry.checks.IsOver(check);
     };
     const auto can_be_asked = [&](const OpenQuestion& question) {
-      return is_there(question.entry, question.check) &&
-             std::ranges::all_of(std::array{question.overlay, question.labels},
-                                 [&](const Use::Entry& of) { return of.name.empty() || is_there(of.name, of.check); });
+      return std::ranges::all_of(question.entries(), [&](const Use::Entry& of) { return is_there(of.name, of.check); });
     };
     if (open.asked || !can_be_asked(open)) continue;
     if (open.fields.dataset == nullptr) {
@@ -159,8 +162,13 @@ void DatasetMachine::State::AskExecutor() {
     };
     ask.overlay = other(open.overlay);
     ask.labels = other(open.labels);
+    for (std::size_t i = 0; i < open.others.size(); ++i) {
+      const DatasetTable::Entry& found = *datasets.Find(open.others[i].name);
+      ask.fields.others[i].levels = {{1, found.levels != nullptr ? found.levels->overview : found.summary}};
+      ask.fields.others[i].of_volume = {0};
+    }
     const FrameRequest* const frame = FrameOf(open.question);
-    if (frame != nullptr && frame->labels) {
+    if (frame != nullptr && (frame->labels || HasLabelsAlone(*open.fields.dataset)) && !about_view) {
       const FieldVolume labels = {
           .number = *open.fields.dataset->labels(), .labels = true, .levels = {{ask.labels.dataset, ask.labels.summary}}, .of_volume = {0}};
       ask.fields.others.push_back(labels);

@@ -66,8 +66,20 @@ struct DatasetMachine::State {
     std::shared_ptr<const VolumeSummary> summary = nullptr;  // once it waits for voxels of a level, but is about all of them
     // Other entries that it waits for; without a name: none.
     Use::Entry overlay = {}, labels = {};
+    std::vector<Use::Entry> others = {};  // of a ViewQuery: fields.others
 
-    bool WaitsFor(const std::string& name) const { return entry == name || overlay.name == name || labels.name == name; }
+    // All of them.
+    std::vector<Use::Entry> entries() const {
+      std::vector<Use::Entry> all = {{entry, check}};
+      for (const Use::Entry& other : {overlay, labels}) {
+        if (!other.name.empty()) all.push_back(other);
+      }
+      all.insert(all.end(), others.begin(), others.end());
+      return all;
+    }
+    bool WaitsFor(const std::string& name) const {
+      return entry == name || overlay.name == name || labels.name == name || std::ranges::count(others, name, &Use::Entry::name) > 0;
+    }
   };
   // A dataset on its way from a client.
   struct OpenUpload {

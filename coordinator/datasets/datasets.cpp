@@ -1,12 +1,10 @@
 #include "coordinator/datasets/datasets.h"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <numeric>
-#include <string>
 #include <utility>
 
 #include "common/base/did_you_mean.h"

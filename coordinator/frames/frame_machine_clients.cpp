@@ -27,10 +27,8 @@ FrameKind KindOf(const FrameRequest& frame) {
 
 }  // namespace
 
-void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& submitted) {
+void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& message) {
   const PeerToken client = event.from;
-  SubmitFrame message = submitted;
-  message.frame = WithOverlayAsField(std::move(message.frame));
   clients.Meet(client, now);
   if (IsOpen(client, message.request)) return;
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);

@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "common/planning/key_of_picture.h"
 #include "coordinator/frames/frame_machine_state.h"
 
 namespace slabstream {
@@ -65,6 +66,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .shares = std::move(shares),
                    .statistics = {},
                    .geometry = PictureGeometryOf(frame->plan().setup)};
+  if (request.submit.frame.key) reply.key = KeyOf(*frame->planned()->asked.resolved);
   for (const PictureShare& share : reply.shares) {
     if (share.direct) clients.Sent(request.client, share.runs.encoded_bytes);
   }

@@ -1,6 +1,5 @@
 #include "coordinator/frames/request_queue.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace slabstream {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <iterator>
 #include <string>
-#include <utility>
 
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <utility>
 
 #include "common/planning/balance.h"
-#include "common/planning/clipped_cells.h"
 
 namespace slabstream {
 namespace {

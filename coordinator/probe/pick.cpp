@@ -1,11 +1,13 @@
 #include "coordinator/probe/pick.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "common/frame/label_look.h"
+#include "common/frame/smooth_label.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
@@ -134,10 +136,9 @@ class Matter {
   double Extinction(const Vec3& p, double stored) const {
     double factor = 1;
     if (const FieldSetup* const labels = LabelsOf(setup_)) {
-      const Box bounds = setup_.description.geometry.bounds();
-      const LabelStyle style = StyleOf(*labels->labels, volume_.label(Max(bounds.begin, Min(VoxelAt(p), bounds.end - Uniform(1)))));
-      if (style.shown && labels->labels->mode == LabelMode::kSurface) return -std::log1p(-double(style.opacity));
-      if (style.shown) factor = double(style.opacity);
+      const double opacity = LabelOpacityAt(p, *labels->labels);
+      if (opacity >= 0 && labels->labels->mode == LabelMode::kSurface) return -std::log1p(-opacity);
+      if (opacity >= 0) factor = opacity;
     }
     if (!std::isfinite(stored)) return 0;
     double opacity = factor * double(table_.opacity[std::size_t(table_.BinOf(stored))]);
@@ -151,6 +152,21 @@ class Matter {
   }
 
  private:
+  // LabelledVoxel::opacity at p, of labels on the volume's voxels.
+  double LabelOpacityAt(const Vec3& p, const LabelLook& look) const {
+    const auto at = [&](const Index3& voxel) {
+      const Box bounds = setup_.description.geometry.bounds();
+      const std::uint64_t label = volume_.label(Max(bounds.begin, Min(voxel, bounds.end - Uniform(1))));
+      const LabelStyle style = StyleOf(look, label);
+      return LabelledVoxel{label, style.shown ? double(style.opacity) : -1};
+    };
+    if (!look.smooth) return at(VoxelAt(p)).opacity;
+    const Index3 floor = VoxelAt(p - Vec3{0.5, 0.5, 0.5});
+    std::array<LabelledVoxel, 64> around;
+    for (std::int32_t i = 0; i < 64; ++i) around.at(std::size_t(i)) = at(floor + Index3{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1});
+    return SmoothLabel(around, p - ToVec3(floor)).opacity;
+  }
+
   // Data values per unit of the world.
   double Slope(const Vec3& p) const {
     Vec3 gradient;

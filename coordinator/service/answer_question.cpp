@@ -14,7 +14,6 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/levels.h"
-#include "common/planning/shown_zones.h"
 #include "common/text/url.h"
 #include "common/volume/affine_map.h"
 #include "common/volume/memory_budget.h"

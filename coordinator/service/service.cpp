@@ -21,7 +21,6 @@
 #include "common/threads/guarded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/other_version.h"
-#include "coordinator/service/background_actions.h"
 #include "coordinator/service/coordinator_metrics.h"
 #include "coordinator/service/peer_table.h"
 #include "coordinator/service/service_keys.h"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <utility>
 
 #include "common/base/check.h"
 #include "common/volume/memory_budget.h"

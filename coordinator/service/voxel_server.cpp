@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <utility>
 #include <variant>
-#include <vector>
 
 #include "common/base/log.h"
 #include "common/memory/pooled_vector.h"
@@ -115,8 +113,18 @@ Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& 
   return Bytes(std::move(cut));
 }
 
+Bytes VoxelServer::CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box) {
+  kept_cells_.DropIf([](const auto& entry) { return entry.value.of.expired(); });
+  if (const KeptCells* found = kept_cells_.Find({cells.get(), box})) return found->bytes;
+  Bytes bytes(EncodeMesh(cells->Cut(box)));
+  const std::size_t size = bytes.size();
+  const KeptCells& piece = kept_cells_.Put({cells.get(), box}, {cells, std::move(bytes)}, size);
+  kept_cells_.DropBeyond(kMostKept);
+  return piece.bytes;
+}
+
 Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
-  const Bytes all = cell_bytes_.Of(samples.cells, request.box);
+  const Bytes all = CellsIn(samples.cells, request.box);
   const std::uint64_t begin = BeginOfCellChunk(request.chunk);
   if (begin >= all.size()) {
     return Status::InvalidArgument(

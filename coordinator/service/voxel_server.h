@@ -9,6 +9,7 @@
 // except over inproc: they are raw there, and those of a whole volume refer to its own memory.
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <map>
 #include <memory>
@@ -21,13 +22,16 @@
 
 #include "common/base/check.h"
 #include "common/base/limited_log.h"
+#include "common/base/lru_map.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
+#include "common/mesh/mesh_part.h"
 #include "common/transport/mailbox.h"
 #include "common/transport/socket.h"
+#include "common/volume/box.h"
 #include "common/volume/bricks.h"
 #include "common/volume/sample_types.h"
 #include "common/wire/any_message.h"
-#include "coordinator/service/cell_bytes.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -100,6 +104,8 @@ class VoxelServer {
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
+  // The bytes of the cells in `box`, which is not empty, as EncodeMesh makes them.
+  Bytes CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
   // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
   Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
   static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
@@ -119,16 +125,22 @@ class VoxelServer {
     std::size_t begun = 0;                        // and not ended
   };
 
+  static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes of cells; those that were cut last stay in any case
+  struct KeptCells {
+    std::weak_ptr<const MeshCutter> of;  // a dataset that is gone takes no memory
+    Bytes bytes;
+  };
+
   const std::string endpoint_;
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, Samples> samples_;            // guarded by mutex_
-  std::map<DatasetId, DatasetId> light_volume_of_;  // by LightVolumeOf; guarded by mutex_
-  std::vector<std::string> unwanted_;               // users whose connections are to end; guarded by mutex_
-  CellBytes cell_bytes_;                            // the thread's
-  LimitedLog complaints_;                           // the thread's
-  std::map<DatasetId, Reads> reads_;                // the thread's
+  std::map<DatasetId, Samples> samples_;                             // guarded by mutex_
+  std::map<DatasetId, DatasetId> light_volume_of_;                   // by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;                                // users whose connections are to end; guarded by mutex_
+  LruMap<std::pair<const MeshCutter*, Box>, KeptCells> kept_cells_;  // a box is asked for chunk by chunk; the thread's
+  LimitedLog complaints_;                                            // the thread's
+  std::map<DatasetId, Reads> reads_;                                 // the thread's
   const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
   Socket socket_;                                                                          // the thread's
   std::jthread thread_;                                                                    // last member

@@ -26,10 +26,10 @@
 #include "data/open/read_volume.h"
 #include "data/open/source_name.h"
 #include "data/open/unchanged_source.h"
+#include "data/sources/hollow_source.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/read_progress.h"
 #include "data/volume_io/slice_stack.h"
 
 namespace slabstream {
@@ -319,7 +319,14 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   text->options.describe = true;
   const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(text->path, text->options, ProcessReadContext());
   if (!opened.ok()) return opened.status();
-  const std::shared_ptr<VolumeSource>& source = *opened;
+  std::shared_ptr<VolumeSource> source = *opened;
+  std::string place = PlaceOf(data, *text);
+  const bool labels_alone = source->info().labels && MayRoundLabels(source->info().exact.type);
+  if (!data.is_field && data.labels == nullptr && labels_alone) {
+    source = AsHollow(source);
+    place = WithReadOption(WithoutReadOption(place, "ids"), "hollow", "yes");
+    text->options.labels = false;
+  }
   const SourceInfo& info = source->info();
   WayToRead way{source, info.files, {}};
   const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
@@ -334,11 +341,12 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   } else if (info.slices) {
     way.read = [data, most_bytes, &progress] { return ReadStream(data, most_bytes, progress); };
   } else {
-    way.read = [source, data, place = PlaceOf(data, *text), text = *text, &progress]() -> Result<ReadableSource> {
+    way.read = [source, data, place = std::move(place), text = *text, &progress]() -> Result<ReadableSource> {
       WarnOfComponents(text, source->info());
       const Result<std::shared_ptr<const LabelTable>> known = KnownLabels(text, data.label_colors, source->info(), nullptr);
       if (!known.ok()) return known.status();
-      return Surveyed(source, place, FindIndex(data.path, source->info()), progress, data.statistics, *known);
+      const auto index = source->info().hollow ? nullptr : FindIndex(data.path, source->info());
+      return Surveyed(source, place, index, progress, data.statistics, *known);
     };
   }
   return way;
@@ -369,11 +377,18 @@ DataSource::DataSource(std::string from_path, std::string of_folder, const Layer
     : path(std::move(from_path)), folder(std::move(of_folder)) {
   if (!layers.overlay.empty()) overlay = std::make_shared<const DataSource>(layers.overlay, folder);
   if (layers.labels.empty()) return;
-  const Result<SourceText> text = ParseSourceText(layers.labels);
-  const bool given = text.ok() && text->options.labels;
-  DataSource of_labels(given ? layers.labels : WithReadOption(layers.labels, "ids", "yes"), folder);
+  DataSource of_labels = LabelsAt(DataSource(layers.labels, folder));
   of_labels.label_colors = layers.label_colors;
   labels = std::make_shared<const DataSource>(std::move(of_labels));
+}
+
+DataSource LabelsAt(DataSource source) {
+  source.overlay = source.labels = nullptr;
+  source.is_field = true;
+  source.path = WithoutReadOption(source.path, "hollow");
+  const Result<SourceText> text = ParseSourceText(source.path);
+  if (!text.ok() || !text->options.labels) source.path = WithReadOption(source.path, "ids", "yes");
+  return source;
 }
 
 const std::string* DataArgument::RelativePath() const {

@@ -61,8 +61,10 @@ struct DataSource {
 
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
-  // Fields with a grid of their own; null: there is none. Only a named dataset has them.
+  // Fields with a grid of their own; null: there is none. Only a named dataset has them. A source that names labels of 32 or 64 bits, and
+  // no values, is a dataset of labels alone: its volume is hollow (hollow_source.h), and its labels are those of the same files.
   std::shared_ptr<const DataSource> overlay = {}, labels = {};
+  bool is_field = false;          // of a dataset: labels are labels, and make no hollow volume
   std::string label_colors = {};  // of labels: the table of their colours (label_table.h)
   // Range and histogram of its field over the times of its dataset. Set: this is another time than the one that the dataset shows itself,
   // and is not surveyed. Null: they are those that a survey finds.
@@ -73,6 +75,9 @@ struct DataSource {
   std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it
   std::uint64_t held_bytes = 0;            // memory that the source itself takes, loaded or not, since a client has sent it
 };
+
+// The field of labels of a dataset whose volume comes from `source`.
+DataSource LabelsAt(DataSource source);
 
 // By name.
 using Catalogue = std::map<std::string, DataSource>;

@@ -35,11 +35,12 @@ std::shared_ptr<const DatasetFields> FieldsOf(const DataSource& source, const So
     fields.field = info.channel;
     if (info.components > 1) DescribeComponents(info, fields);
   }
-  const std::size_t others = (source.overlay != nullptr ? 1 : 0) + (source.labels != nullptr ? 1 : 0);
+  const bool has_labels = source.labels != nullptr || info.hollow;
+  const std::size_t others = (source.overlay != nullptr ? 1 : 0) + (has_labels ? 1 : 0);
   if (fields.fields.size() + others > kMaxFields) fields.fields.resize(kMaxFields - others);
   if (source.overlay != nullptr) fields.fields.push_back({.name = std::string(kOverlayField), .channel = false, .shown = false});
-  if (source.labels != nullptr) {
-    fields.fields.push_back({.name = std::string(kLabelsField), .channel = false, .labels = true, .shown = false});
+  if (has_labels) {
+    fields.fields.push_back({.name = std::string(kLabelsField), .channel = false, .labels = true, .shown = info.hollow});
   }
   if (fields == DatasetFields()) return nullptr;
   return std::make_shared<const DatasetFields>(std::move(fields));
@@ -48,7 +49,12 @@ std::shared_ptr<const DatasetFields> FieldsOf(const DataSource& source, const So
 DataSource AtFieldAndTime(const DataSource& source, const DatasetFields& fields, int field, int time,
                           std::shared_ptr<const VolumeSummary> statistics) {
   const FieldInfo& info = fields.fields[std::size_t(field)];
-  DataSource at = info.channel ? source : info.labels ? *source.labels : *source.overlay;
+  DataSource at = source;
+  if (info.labels) {
+    at = source.labels != nullptr ? *source.labels : LabelsAt(source);
+  } else if (!info.channel) {
+    at = *source.overlay;
+  }
   at.overlay = at.labels = nullptr;
   if (info.channel && field != fields.field) at.path = WithReadOption(at.path, "channel", std::to_string(field));
   if (time != fields.time) at.path = AtTime(at.path, time);

@@ -33,7 +33,7 @@ Result<VolumeSummary> SurveyTime(const std::string& source, int time, const Surv
 std::vector<VolumeSummary> SurveyOtherTimes(const std::string& source, const SourceInfo& info) {
   const Result<SourceText> text = ParseSourceText(source);
   const int count = info.times.count;
-  if (!text.ok() || count == 1 || text->options.time || text->options.labels) return {};
+  if (!text.ok() || count == 1 || text->options.time || text->options.labels || info.hollow) return {};
   if (!info.in_parts() && info.finest().voxel_bytes() > kMostInOrder / count) return {};
   const bool far = !SchemeOf(text->path).empty();
   const int most = std::min(far ? kMostOtherTimesFar : kMostOtherTimes, count - 1);

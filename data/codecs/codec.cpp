@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 namespace slabstream {
 
 std::uint64_t MostEncoded(const CodecChain& chain, std::uint64_t bytes) {

@@ -1,7 +1,6 @@
 #include <zstd.h>
 #include <zstd_errors.h>
 
-#include <algorithm>
 #include <new>
 
 #include "common/memory/pooled_vector.h"

@@ -1,7 +1,5 @@
 #include "data/hdf5/hdf5_library.h"
 
-#include <mutex>
-
 #include "common/base/printable.h"
 
 namespace slabstream {

@@ -14,6 +14,7 @@
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/positional/file_source.h"
+#include "data/sources/hollow_source.h"
 #include "data/sources/label_source.h"
 #include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
@@ -119,6 +120,7 @@ Result<std::shared_ptr<VolumeSource>> OpenValues(const std::string& path, const 
 
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   Result<std::shared_ptr<VolumeSource>> source = OpenValues(path, options, context);
+  if (source.ok() && options.hollow) return AsHollow(*std::move(source));
   if (source.ok() && options.labels) source = AsLabels(*std::move(source));
   return source;
 }

@@ -8,7 +8,6 @@
 #include <future>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <utility>
 #include <vector>
 

@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <optional>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 namespace slabstream {
 namespace {

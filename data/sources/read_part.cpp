@@ -1,6 +1,5 @@
 #include "data/sources/read_part.h"
 
-#include <memory>
 #include <span>
 #include <utility>
 

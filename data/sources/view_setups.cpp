@@ -11,8 +11,6 @@
 #include <initializer_list>
 #include <map>
 #include <span>
-#include <string>
-#include <string_view>
 
 #include "common/base/log.h"
 #include "common/files/files.h"

@@ -1,7 +1,6 @@
 #include "data/sources/volume_source.h"
 
 #include <future>
-#include <utility>
 
 #include "common/base/check.h"
 

@@ -60,6 +60,7 @@ struct SourceInfo {
   std::string file_type;                 // the type of samples as they are stored: "int16"
   ExactType exact = {};                  // the type of exact samples (BoxRoom::exact)
   bool labels = false;                   // samples are numbers of structures, not measurements
+  bool hollow = false;                   // it has no values (hollow_source.h)
   std::vector<StatedLabel> looks = {};   // looks of labels, by ascending values, as far as the source says it
   std::vector<FieldInfo> channels = {};  // empty: there is one, of which the source says nothing
   int channel = 0;                       // which of them it shows; of a luminance: 0

@@ -10,7 +10,6 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <utility>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "data/stores/store.h"
 
 #include <filesystem>
-#include <memory>
 #include <utility>
 
 #include "common/text/url.h"

@@ -7,12 +7,10 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -20,7 +18,6 @@
 #include "common/memory/pooled_vector.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/chunked_source.h"
-#include "data/sources/read_context.h"
 #include "data/volume_io/tiff_file.h"
 #include "data/volume_io/tiff_stack.h"
 #include "data/volume_io/world_placement.h"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <openjpeg.h>
 
-#include <algorithm>
 #include <array>
 #include <fstream>
 #include <memory>

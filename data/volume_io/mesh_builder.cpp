@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/raw_volume.h"

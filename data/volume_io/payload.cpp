@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <tuple>
-#include <vector>
 
 namespace slabstream {
 namespace {

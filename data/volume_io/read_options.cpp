@@ -173,6 +173,8 @@ const std::vector<ReadOption>& ReadOptionList() {
        SetYes<&ReadOptions::follow_links>, IsGiven<&ReadOptions::follow_links>},
       {"ids", "", "Values are labels: names of structures, which are kept to the last digit and never mixed", SetYes<&ReadOptions::labels>,
        IsGiven<&ReadOptions::labels>, false, true},
+      {"hollow", "", "Values are not read: there are labels alone", SetYes<&ReadOptions::hollow>, IsGiven<&ReadOptions::hollow>, false,
+       true},
       {"header", "NAME:@FILE", "A header of each request to a web server, with its value in a file; may be given several times", SetHeader,
        IsGiven<&ReadOptions::headers>, true},
   };

@@ -55,6 +55,7 @@ struct ReadOptions {
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
   bool labels = false;                 // samples are labels, which are kept as they are (data/sources/label_source.h)
+  bool hollow = false;                 // values are not read (data/sources/hollow_source.h)
   bool follow_links = false;           // in folders of objects: links that lead out of the folder, such as those of git-annex, are followed
   // For addresses.
   std::vector<std::string> headers;  // headers that go with each request: "NAME:VALUE", or "NAME:@FILE" with the value in a file
@@ -86,7 +87,7 @@ struct SourceText {
 
 // PATH or PATH?NAME=VALUE,NAME=VALUE... A text that is a file's name as a whole is its path. Does not check that the file exists.
 // What begins with a scheme, such as "https://", may have a query of its own, with the options behind it after a comma or another question
-// mark; and may be spelled as other programs spell it (other_spellings.h).
+// mark; and may be spelled as other programs spell it (source_text.cpp).
 // InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take; another scheme.
 Result<SourceText> ParseSourceText(const std::string& text);
 
@@ -95,6 +96,8 @@ bool MayBeThere(const SourceText& source);
 
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
+// The source without the option, wherever it gives it. `source` is right (ParseSourceText).
+std::string WithoutReadOption(const std::string& source, std::string_view name);
 // The source at one time, or at all that its file has; times that it names are replaced. `source` is right (ParseSourceText).
 std::string AtTime(const std::string& source, std::optional<int> time);
 

@@ -1,7 +1,5 @@
 #include "data/volume_io/vtk_legacy_file.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>

@@ -1,7 +1,5 @@
 #include "data/volume_io/vtk_xml.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -146,13 +146,4 @@ Result<ZarrArray> OpenArray(const ArrayContext& context, const ZarrNode& node) {
   return opened;
 }
 
-Result<ZarrArray> OpenZarrArray(const ArrayContext& context, const std::string& path) {
-  const Result<std::optional<ZarrNode>> node = NodeReading(*context.store, path).Get();
-  if (!node.ok()) return node.status();
-  if (!node->has_value() || !(*node)->array) {
-    return Status::NotFound(context.store->name() + (path.empty() ? "" : "/" + path) + ": no Zarr array is there");
-  }
-  return OpenArray(context, **node);
-}
-
 }  // namespace slabstream::zarr

@@ -32,7 +32,4 @@ ArrayContext MakeArrayContext(std::shared_ptr<Store> store, SourceContext source
 // `node` is an array. InvalidArgument: its metadata are wrong, or need something that is not supported.
 Result<ZarrArray> OpenArray(const ArrayContext& context, const ZarrNode& node);
 
-// The array at `path` of the store. Errors also of NodeReading; NotFound: no array is there. Waits.
-Result<ZarrArray> OpenZarrArray(const ArrayContext& context, const std::string& path);
-
 }  // namespace slabstream::zarr

@@ -1,10 +1,8 @@
 #include "laboratory/experiments/client_frames.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <string>
-#include <utility>
 
 #include "client/report/frame_summary.h"
 #include "common/planning/resolved_policy.h"

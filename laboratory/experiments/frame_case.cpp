@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,7 +16,6 @@
 #include "laboratory/experiments/client_frames.h"
 #include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/frame_keys.h"
-#include "laboratory/measure/box_costs.h"
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/lab_service.h"
 #include "laboratory/measure/validate.h"

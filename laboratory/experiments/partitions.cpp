@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <string_view>
 
 #include "common/planning/assignment.h"
 #include "laboratory/experiments/attachments.h"
 #include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/experiment.h"
-#include "laboratory/experiments/figures.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/experiments/subjects.h"

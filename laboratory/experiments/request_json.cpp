@@ -26,7 +26,7 @@ Json RequestJson(const FrameRequest& request) {
   Json json = Json::Parse(RequestToJson(request)).value();
   json["dataset"] = request.dataset;
   json["transfer"] = Shortened(json["transfer"]);
-  if (json.contains("overlay")) json["overlay"] = Shortened(json["overlay"]);
+  for (Json& field : json["fields"]) field = Shortened(field);
   return json;
 }
 

@@ -9,7 +9,6 @@
 #include "common/base/time.h"
 
 #include "common/planning/placement.h"
-#include "common/planning/policy_names.h"
 #include "common/planning/resolved_policy.h"
 #include "common/wire/any_message.h"
 #include "common/wire/control_messages.h"

@@ -1,7 +1,6 @@
 #include "laboratory/experiments/service_frames.h"
 
 #include <string>
-#include <utility>
 
 #include "client/cli/service_connection.h"
 #include "laboratory/experiments/client_frames.h"

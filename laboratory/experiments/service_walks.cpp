@@ -1,7 +1,5 @@
 #include "laboratory/experiments/service_walks.h"
 
-#include <utility>
-
 #include "client/report/frame_summary.h"
 #include "laboratory/experiments/client_frames.h"
 #include "laboratory/experiments/frame_keys.h"

@@ -5,7 +5,6 @@
 #include <iterator>
 #include <utility>
 
-#include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
 #include "common/wire/validate_request.h"
 #include "laboratory/experiments/frame_case.h"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -16,11 +15,9 @@
 #include "common/base/printable.h"
 #include "common/files/files.h"
 #include "common/json/json.h"
-#include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
 #include "common/wire/validate_request.h"
-#include "laboratory/experiments/request_json.h"
 
 namespace slabstream {
 namespace {
@@ -93,8 +90,9 @@ BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
   return volume;
 }
 
-// The name of a renderer, or an object with the parameters of that renderer and what else decides the look.
-SweepRenderer ReadRenderer(const JsonValue& value) {
+// The name of a renderer, or an object with the parameters of that renderer and what else decides the look: at a service also which fields
+// of its datasets show, and how.
+SweepRenderer ReadRenderer(const JsonValue& value, SweepPlace place) {
   const auto kind_of = [](const JsonValue& v) { return Renderers()[v.OneOf(RendererNames())]; };
   SweepRenderer read;
   if (value.Shown().starts_with('"')) {
@@ -103,6 +101,14 @@ SweepRenderer ReadRenderer(const JsonValue& value) {
     return read;
   }
   auto fields = OptionFields(read.look, {"parameters.", "shading.", "termination"});
+  for (auto& [name, take] : OptionFields(read.look, {"channels", "fields.", "labels.", "blend", "time"})) {
+    if (place == SweepPlace::kHere) {
+      take = [name = name](const JsonValue& v) {
+        v.Complain(fmt::format("'{}' is of datasets of a service; a file may be one channel at one time: \"FILE?channel=1,time=2\"", name));
+      };
+    }
+    fields.emplace_back(name, std::move(take));
+  }
   fields.emplace_back("name", [&](const JsonValue& v) { read.name = v.Text(); });
   fields.emplace_back("renderer", [&](const JsonValue& v) { read.kind = kind_of(v); });
   value.Fields(fields);
@@ -214,7 +220,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPl
   file.Fields({{"title", [&](const JsonValue& v) { sweep.title = v.Text(); }},
                {"size", [&](const JsonValue& v) { ReadSize(v, sweep.size); }},
                {"volumes", Into<BenchCase>(sweep.volumes, [&](const JsonValue& v) { return ReadVolume(v, place); })},
-               {"renderers", Into<SweepRenderer>(sweep.renderers, ReadRenderer)},
+               {"renderers", Into<SweepRenderer>(sweep.renderers, [&](const JsonValue& v) { return ReadRenderer(v, place); })},
                {"views", Into<SweepView>(sweep.views, [&](const JsonValue& v) { return ReadView(v, sweep.views.size()); })},
                {"policies", Into<NamedPolicy>(sweep.policies, ReadPolicy)},
                {"workers", Into<int>(sweep.workers, [](const JsonValue& v) { return v.Integer(1, kMaxSweepWorkers); })},

@@ -4,8 +4,6 @@
 #include <functional>
 #include <numeric>
 
-#include "common/planning/policy_names.h"
-
 namespace slabstream {
 namespace {
 

@@ -1,7 +1,6 @@
 #include "laboratory/experiments/walk.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <set>
 #include <utility>

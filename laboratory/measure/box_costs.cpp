@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 #include <type_traits>
-#include <utility>
 
 #include "common/base/check.h"
 #include "laboratory/measure/lab_worker.h"

@@ -9,7 +9,6 @@
 #include "common/image/run_image.h"
 #include "common/parallel/task_arena.h"
 #include "common/renderers/renderer_kind.h"
-#include "common/wire/payload.h"
 #include "coordinator/frames/clients.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"

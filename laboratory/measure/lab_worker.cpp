@@ -1,6 +1,5 @@
 #include "laboratory/measure/lab_worker.h"
 
-#include <atomic>
 #include <set>
 #include <utility>
 

@@ -11,7 +11,6 @@
 
 #include "common/combining/schemes.h"
 #include "common/planning/placement.h"
-#include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/text/parse_number.h"
 #include "laboratory/measure/calibrate.h"

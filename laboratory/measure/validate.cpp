@@ -10,7 +10,7 @@
 #include "laboratory/measure/frame_costs.h"
 #include "laboratory/measure/lab_service.h"
 #include "laboratory/measure/plan_renderings.h"
-#include "laboratory/measure/wake_up_probe.h"
+#include "simulator/simulate_frames.h"
 
 namespace slabstream {
 namespace {

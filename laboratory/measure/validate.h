@@ -17,7 +17,7 @@
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/volume/volume.h"
-#include "laboratory/measure/wake_up_fit.h"
+#include "laboratory/measure/wake_up_probe.h"
 #include "simulator/model/machine_model.h"
 
 namespace slabstream {

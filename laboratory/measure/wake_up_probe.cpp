@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "common/base/check.h"
 #include "common/volume/sphere.h"
 #include "laboratory/measure/lab_service.h"
 
@@ -46,6 +47,15 @@ std::shared_ptr<const Volume> Sphere(int size) {
 }
 
 }  // namespace
+
+WakeUpEstimates FitWakeUps(std::span<const FrameInstants> quick, std::span<const FrameInstants> slow) {
+  CHECK(!quick.empty() && !slow.empty()) << quick.size() << " quick frames and " << slow.size() << " slow ones";
+  const auto awake = [](const FrameInstants& f) {
+    return (f.render_begin - f.submitted + f.finish_begin - f.render_end + f.received - f.finish_end) / 10;
+  };
+  const auto asleep = [](const FrameInstants& f) { return (f.finish_begin - f.render_end) / 2; };
+  return {MedianOf(EachOf(quick, awake)), MedianOf(EachOf(slow, asleep))};
+}
 
 Status WakeUpProbe::Sample(int count) {
   static const std::vector<std::shared_ptr<const Volume>> volumes = {Sphere(kQuickVolume), Sphere(kSlowVolume)};

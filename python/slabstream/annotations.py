@@ -3,7 +3,6 @@ those of the command line; and files of types that it alone writes."""
 from __future__ import annotations
 
 import dataclasses
-import fnmatch
 import json
 from typing import Any, Sequence
 
@@ -33,37 +32,11 @@ class Annotations:
         return self.color_bar is not None or self.legend
 
 
-def _covers(each: Any, label: Any) -> bool:
-    if each.name:  # * and ? are all that a pattern knows
-        return fnmatch.fnmatchcase(label.name, each.name.replace("[", "[[]"))
-    return bool(each.first <= label.value <= each.last)
-
-
-def key_of(frame: Any, summary: Any) -> dict[str, Any]:
-    """What colour bar and legend say, from the frame's request and the dataset's summary under its transfer function, as
-    client/request/key_of_picture.h has it."""
-    brightness = frame.brightness if frame.HasField("brightness") else 1.0
-
-    def bright(color: Any) -> list[float]:
-        return [min(channel * brightness, 1.0) for channel in (color.r, color.g, color.b)]
-
-    key: dict[str, Any] = {}
-    colors, opacities = list(summary.transfer.colors), summary.transfer.opacities
-    if len(colors) == 1 and len(opacities) > 1 and opacities[0].opacity == 0:  # a channel: one colour, from clear to opaque
-        only = colors[0]
-        colors = [type(only)(value=opacities[0].value), type(only)(value=opacities[-1].value, r=only.r, g=only.g, b=only.b)]
-    if colors[0].value < colors[-1].value and any(point.opacity > 0 for point in opacities):
-        key["bar"] = {"colors": [[point.value, *bright(point)] for point in colors], "low": colors[0].value, "high": colors[-1].value}
-    entries = []
-    if frame.HasField("labels"):
-        shown = frame.labels.shown
-        for label in summary.labels:
-            if not shown or any(_covers(each, label) for each in shown):
-                entries.append({"name": label.name or str(label.value), "color": [label.red, label.green, label.blue]})
-    entries += [{"name": f"{surface.value:g}", "color": bright(surface)} for surface in frame.transfer.isosurfaces]
-    if entries:
-        key["entries"] = entries
-    return key
+def key_of(message: Any) -> dict[str, Any]:
+    """What colour bars and legend say."""
+    bars = [{"name": bar.name, "colors": [[point.value, point.r, point.g, point.b] for point in bar.colors]} for bar in message.bars]
+    entries = [{"name": entry.name, "color": [entry.red, entry.green, entry.blue]} for entry in message.entries]
+    return {name: values for name, values in (("bars", bars), ("entries", entries)) if values}
 
 
 _UNITS = {"file": "unknown", "millimetre": "mm", "micrometre": "µm", "nanometre": "nm", "angstrom": "Å", "centimetre": "cm", "metre": "m"}

@@ -72,7 +72,7 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     *outer, name = option.path.split(".")
     if outer == ["parameters"]:
         return _parameter(draft, option, value)
-    holder = functools.reduce(getattr, outer, draft.frame)
+    holder = _overlay(draft) if outer == ["overlay"] else functools.reduce(getattr, outer, draft.frame)
     field = holder.DESCRIPTOR.fields_by_name[name]
     if name == "preset":
         _transfer(draft, option, value, holder)
@@ -84,6 +84,12 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
         getattr(holder, name).CopyFrom(values.vec3(values.point(option.name, value)))
     else:
         getattr(holder, name).CopyFrom(_MESSAGES[field.message_type.name](option.name, value))
+
+
+def _overlay(draft: Draft) -> Any:
+    """Its look, among those of fields."""
+    looks = draft.frame.fields
+    return next((look for look in looks if look.field == "overlay"), None) or looks.add(field="overlay")
 
 
 _PRESET_OF_MAPS = "viridis"  # it spans values and has opacities as all colour maps do
@@ -208,7 +214,10 @@ def _layer(draft: Draft, option: Option, value: Any) -> None:
     """labels=True, overlay=True: shown as usual. Files belong to the dataset."""
     if value is not True:
         raise InvalidArgument(f"{option.name} {value!r} must be True: at a service, layers belong to the dataset (add_data, render of a file)")
-    getattr(draft.frame, option.name).SetInParent()
+    if option.name == "overlay":
+        _overlay(draft)
+    else:
+        draft.frame.labels.SetInParent()
 
 
 _MOST_TITLE_CHARACTERS = 120
@@ -333,6 +342,7 @@ def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     _put_all(draft, "render", given)
     if "isovalue" in given and "transfer" not in given:
         frame.transfer.preset = "none"  # they stand alone
+    frame.key = draft.format.annotations.need_key()
     if not frame.HasField("size"):
         _put(draft, COMMANDS["render"]["size"], COMMANDS["render"]["size"].default)  # replies are compared with it
     return draft
@@ -371,7 +381,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     planes = Draft(plane=COMMANDS["slice"]["plane"].default or "")
     planes.frame.transfer.preset = COMMANDS["slice"]["transfer"].default or ""
     _put_all(planes, "slice", given)
-    layers = planes.frame.HasField("labels") or planes.frame.HasField("overlay")
+    layers = planes.frame.HasField("labels") or "overlay" in (*planes.frame.channels, *(look.field for look in planes.frame.fields))
     if layers and planes.thickness > 0:
         raise InvalidArgument(f"thickness {planes.thickness:g} is no plane, and layers are shown in planes only")
     names = _SEVERAL_PLANES.get(planes.plane, (planes.plane,))
@@ -388,8 +398,9 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         draft.format = dataclasses.replace(planes.format, annotations=annotations)
         frame = draft.frame
         frame.MergeFrom(planes.frame)
+        frame.key = annotations.need_key()
         draft.colors = planes.colors
-        frame.renderer = _renderer_with("labels", "overlay") if layers else _renderer_with("projection-mode")
+        frame.renderer = _renderer_with("labels", "fields") if layers else _renderer_with("projection-mode")
         if layers:
             frame.shading.model = schema.SHADING_MODEL_NONE
         _look_from(frame.view, side, of_patient)

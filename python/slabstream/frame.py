@@ -9,6 +9,7 @@ import time
 from typing import Any, Callable, Iterator
 
 from . import schema
+from .annotations import key_of
 from .connection import Connection
 from .drafts import Draft
 from .errors import DataLoss, DeadlineExceeded, SlabstreamError
@@ -56,7 +57,8 @@ class _Waiting:
             raise DataLoss(f"FrameReply.shares are {len(reply.shares)}, asked for was 1")
         rgba, depth = compose(read_runs(reply.shares[0].runs, payload, width, height), width, height, self.draft.format)
         preview = reply.groups_done != reply.group_count
-        image = Image(rgba, depth, format=self.draft.format, geometry=geometry_of(reply.geometry),
+        format = dataclasses.replace(self.draft.format, key=key_of(reply.key))
+        image = Image(rgba, depth, format=format, geometry=geometry_of(reply.geometry),
                       statistics=None if preview else statistics_of(reply.statistics, latency), preview=preview)
         if preview:
             with self.changed:

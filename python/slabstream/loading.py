@@ -42,7 +42,7 @@ class Volume(contextlib.AbstractContextManager["Volume"]):
         return self.service.submit(self.name, **self._shows | options)
 
     @takes_options_of("render")
-    def turntable(self, frames: int, **options: Any) -> Iterator[Image]:
+    def turntable(self, frames: int | None = None, **options: Any) -> Iterator[Image]:
         """As Service.turntable."""
         return self.service.turntable(self.name, frames, **self._shows | options)
 

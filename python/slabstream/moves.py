@@ -15,6 +15,7 @@ from .errors import InvalidArgument
 from .values import json_of, number
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 1000
+_MOST_TIMES = 1 << 20
 _LEAST_ZOOM, _MOST_ZOOM = 1e-3, 1e4
 _LEAST_FOV, _MOST_FOV = 1.0, 60.0
 
@@ -30,6 +31,29 @@ def turned_views(first: Any, frames: int, turns: int) -> Iterator[Any]:
             # Back into one turn, so that a start near the limit of angles stays valid.
             view.azimuth_degrees = math.fmod(first.azimuth_degrees + 360.0 * turns * i / frames, 360.0)
         yield view
+
+
+def times_of(time: Any) -> list[str]:
+    """The numbers of "FIRST:LAST" or "FIRST:LAST:STEP"; of anything else none."""
+    parts = time.split(":") if isinstance(time, str) else []
+    if not 2 <= len(parts) <= 3:
+        return []
+    numbers = [int(part) for part in parts if part.isascii() and part.isdigit()]
+    if len(numbers) < len(parts) or numbers[0] > numbers[1] or max(numbers) >= _MOST_TIMES or 0 in numbers[2:]:
+        raise InvalidArgument(f"time '{time}' must be FIRST:LAST or FIRST:LAST:STEP: whole numbers below {_MOST_TIMES}, FIRST not above "
+                              "LAST, STEP not 0")
+    return [str(number) for number in range(numbers[0], numbers[1] + 1, *numbers[2:])]
+
+
+def ball_around(a: Any, b: Any) -> Any:
+    """The smallest ball around two."""
+    centre, other = numpy.array(schema.xyz(a.centre)), numpy.array(schema.xyz(b.centre))
+    apart = math.dist(centre, other)
+    if abs(a.radius - b.radius) >= apart:
+        return a if a.radius >= b.radius else b
+    radius = 0.5 * (apart + a.radius + b.radius)
+    x, y, z = (centre + (radius - a.radius) / apart * (other - centre)).tolist()
+    return schema.Ball(centre=schema.Vec3(x=x, y=y, z=z), radius=radius)
 
 
 def cameras_of(path: Any) -> tuple[list[float], list[dict[str, Any]]]:

@@ -6,17 +6,16 @@ import contextlib
 import copy
 import dataclasses
 import os
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterator, Sequence
 
 from . import probe, schema, values
 from .address import Address, find_service
-from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
 from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
-from .moves import Path, cameras_of, turned_views
+from .moves import Path, ball_around, cameras_of, times_of, turned_views
 from .options import COMMANDS, takes_options_of
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .status import Dataset, Status, dataset_of, status_of
@@ -41,12 +40,13 @@ def _of(field: int | str | None, time: int | str | None) -> dict[str, str]:
     return {name: text for name, text in of.items() if text is not None}
 
 
-def _with_views(draft: Draft, views: Iterator[Any]) -> Iterator[Draft]:
-    for view in views:
+def _with_views(draft: Draft, views: Iterator[Any], times: Sequence[str]) -> Iterator[Draft]:
+    for view, time in zip(views, times):
         moved = copy.copy(draft)
         moved.frame = schema.FrameRequest()
         moved.frame.CopyFrom(draft.frame)
         moved.frame.view.CopyFrom(view)
+        moved.frame.time = time
         yield moved
 
 
@@ -84,34 +84,48 @@ class Service(contextlib.AbstractContextManager["Service"]):
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
     @takes_options_of("render")
-    def turntable(self, dataset: str, frames: int, *, turns: int = 1, path: Any = None, in_flight: int = 2,
+    def turntable(self, dataset: str, frames: int | None = None, *, turns: int = 1, path: Any = None, in_flight: int = 2,
                   deadline: float = DEADLINE_SECONDS, **options: Any) -> Iterator[Image]:
         """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
-        the file of one (docs/movies.md). `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
+        the file of one (docs/movies.md). `time` may be several, "FIRST:LAST" or "FIRST:LAST:STEP": frames are spread evenly over them, and there is
+        one for each if `frames` is left out. `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
         that are open when the iterator is closed are cancelled."""
-        frames = values.integer("frames", frames, 1, _MOST_FRAMES)
+        several = times_of(options.get("time"))
+        frames = values.integer("frames", len(several) if frames is None and several else frames, 1, _MOST_FRAMES)
         turns = values.integer("turns", turns, 0, _MOST_TURNS)
         in_flight = values.integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
-        draft = draft_of(dataset, options)
+        draft = draft_of(dataset, {**options, "time": None} if several else options)
+        times = [several[i * len(several) // frames] if several else draft.frame.time for i in range(frames)]
         if path is None:
             if draft.frame.view.HasField("eye") and turns > 0:
                 raise InvalidArgument(
                     "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
                 )
-            views = turned_views(self._whole_view(draft), frames, turns)
+            views = turned_views(self._whole_view(draft, times), frames, turns)
         else:
             for name, value in options.items():
                 if value is not None and name in COMMANDS["render"]["camera"].excludes + ("camera",):
                     raise InvalidArgument(f"path excludes {name}")
-            times, cameras = cameras_of(path)
-            drafts = [camera_draft_of(dataset, options, i, camera) for i, camera in enumerate(cameras)]
-            views = Path(times, [self._whole_view(each) for each in drafts]).views(frames)
+            seconds, cameras = cameras_of(path)
+            drafts = [camera_draft_of(dataset, {**options, "time": None}, i, camera) for i, camera in enumerate(cameras)]
+            views = Path(seconds, [self._whole_view(each, times) for each in drafts]).views(frames)
         self._settle([draft])
-        return self._pipelined(_with_views(draft, views), in_flight, deadline)
+        return self._pipelined(_with_views(draft, views, times), in_flight, deadline)
 
-    def _whole_view(self, draft: Draft) -> Any:
-        """The view of a picture, with what its options leave to the volume."""
-        return self._connection.ask("view_query", schema.ViewQuery(frame=draft.frame), _QUESTION_SECONDS).view
+    def _whole_view(self, draft: Draft, times: Sequence[str]) -> Any:
+        """The view of pictures at these times, with what its options leave to the volume: it frames what shows in any of them."""
+        query = schema.ViewQuery(frame=draft.frame)
+        framed = None
+        for time in dict.fromkeys(times):
+            query.frame.time = time
+            reply = self._connection.ask("view_query", query, _QUESTION_SECONDS)
+            if reply.HasField("framed"):
+                framed = reply.framed if framed is None else ball_around(framed, reply.framed)
+        if framed is not None and times[0] != times[-1]:
+            query.frame.time = times[0]
+            query.framed.CopyFrom(framed)
+            reply = self._connection.ask("view_query", query, _QUESTION_SECONDS)
+        return reply.view
 
     @property
     def address(self) -> Address:
@@ -230,7 +244,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
         return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer, **of), timeout)
 
     def _settle(self, drafts: list[Draft]) -> None:
-        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans, and what colour bar and legend say."""
+        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans."""
         draft = drafts[0]
         if draft.colors is not None:
             preset = self._transfer_of(draft).transfer
@@ -240,10 +254,6 @@ class Service(contextlib.AbstractContextManager["Service"]):
             for each in drafts:
                 each.frame.transfer.function.CopyFrom(mapped(draft.colors, *ends, opacities))
                 each.frame.transfer.ClearField("scalar_range")
-        if draft.format.annotations.need_key():
-            key = key_of(draft.frame, self._transfer_of(draft))
-            for each in drafts:
-                each.format = dataclasses.replace(each.format, key=key)
 
     def _transfer_of(self, draft: Draft) -> Any:
         """The dataset's summary under the transfer function of the draft."""

@@ -151,7 +151,7 @@ TEST_F(FieldRules, TheFirstChannelThatShowsIsTheVolume) {
 TEST_F(FieldRules, AnOverlayCoversTheVolumeAndIsReadFromItsOwnFile) {
   SubmitFrame submit = Showing(1, {"0"});
   submit.frame.transfer.choice = "ct-bone";
-  submit.frame.overlay = OverlayChoice{.choice = "hot", .weight = 0.5};
+  submit.frame.fields = {{.field = "overlay", .choice = "hot", .weight = 0.5}};
   script.Client(kClient, submit);
   const std::vector<GroupAssignment> groups = HandedOut(LoadedAll());
   ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 3, 0)));
@@ -263,6 +263,19 @@ TEST_F(FieldRules, WhoAsksForTheStatusHearsOfNewTimes) {
   const std::size_t before = script.loads.size();
   script.Step(DatasetSeen{asked[0].name, asked[0].load, true});
   EXPECT_THAT(LoadedNames(before), ElementsAre("block")) << "though nobody asks for a picture";
+}
+
+// A movie is framed by all that it shows, as a picture is.
+TEST_F(FieldRules, AQuestionAboutTheViewKnowsAllFieldsThatShow) {
+  script.Client(kClient, ViewQuery{.nonce = 1, .frame = Showing(1, {"0", "2", "overlay"}).frame});
+  const std::vector<AnswerQuestion> asked = Of<AnswerQuestion>(LoadedAll());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 2, 0), PartName("block", 3, 0)));
+  ASSERT_THAT(asked, SizeIs(1));
+  ASSERT_THAT(asked[0].fields.others, SizeIs(2));
+  for (const FieldVolume& field : asked[0].fields.others) {
+    ASSERT_THAT(field.levels, SizeIs(1));
+    EXPECT_EQ(field.levels[0].summary->description, BlockSummary()->description);
+  }
 }
 
 // Movies of any number of times: what was shown long ago is closed, what a frame waits for is not.

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <functional>
 
+#include "common/json/json.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 
@@ -128,6 +129,33 @@ TEST_F(FieldsTest, AnOverlayCoversTheVolumeWhereItIsOpaque) {
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(covered.At(24, 24, c), alone.At(24, 24, c), 0.02);
   EXPECT_GT(LargestDifference(covered, Rendered("a.zarr", {"--renderer", "raycast", "--no-fit", "--shading", "none", "--channel", "0"})),
             0.1);
+}
+
+TEST_F(FieldsTest, AnOverlayWithoutWeightLeavesThePictureAsItIs) {
+  MakeStore("a.zarr", Blob, red_ + "," + green_);
+  const std::string volume = "a.zarr?channel=0,time=0", overlay = "a.zarr?channel=1,time=0";
+  const auto alone = Rendered(volume, {"--renderer", "raycast"});
+  EXPECT_EQ(LargestDifference(alone, Rendered(volume, {"--renderer", "raycast", "--overlay", overlay, "--overlay-weight", "0"})), 0);
+  EXPECT_GT(LargestDifference(alone, Rendered(volume, {"--renderer", "raycast", "--overlay", overlay})), 0.1);
+}
+
+TEST_F(FieldsTest, QuestionsAreAboutTheFieldThatIsNamed) {
+  MakeStore("a.zarr", Blob, R"({"label": "1", "color": "FF0000"}, {"label": "Actin", "color": "00FF00"})");
+  const auto value = [this](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"value", "a.zarr", "--local=1", "--at", "12,11,12", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Json json = Json::Parse(MustRun(arguments).out).value();
+    return json[0]["value"].get<int>();
+  };
+  EXPECT_EQ(value({"--channel", "1"}), Blob(0, 0, 12, 11, 12)) << "a name goes before a number";
+  EXPECT_EQ(value({"--channel", "0"}), Blob(0, 0, 12, 11, 12));
+  EXPECT_EQ(value({"--channel", "Actin", "--time", "last"}), Blob(1, 2, 12, 11, 12));
+  // The overlay is the second channel at another time.
+  EXPECT_EQ(value({"--channel", "overlay", "--overlay", "a.zarr?channel=1,time=1"}), Blob(1, 1, 12, 11, 12));
+  EXPECT_EQ(value({"--overlay", "a.zarr?channel=1,time=1"}), Blob(0, 0, 12, 11, 12));
+  const Json box =
+      Json::Parse(MustRun({"measure", "a.zarr", "--local=1", "--channel", "1", "--box", "12:13,11:12,12:13", "--json"}).out).value();
+  EXPECT_THAT(box.dump(), testing::HasSubstr(std::to_string(Blob(0, 0, 12, 11, 12))));
 }
 
 TEST_F(FieldsTest, OptionsOfChannelsSayHowAnOverlayOfAFileLooks) {

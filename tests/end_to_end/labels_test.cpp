@@ -88,5 +88,85 @@ TEST_F(LabelsTest, HaveNamesBesideTheirNumbers) {
                 "labels.shown: no label is named 'Postcentral_*'; there are Precentral_L, Precentral_R");
 }
 
+TEST_F(LabelsTest, SmoothSurfacesAreOfSurfacesAlone) {
+  std::ofstream file(Path("ball.nrrd"), std::ios::binary);
+  file << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 32 32 32\nencoding: raw\n\n";
+  for (int i = 0; i < 32 * 32 * 32; ++i) {
+    const double x = i % 32 - 15.4, y = i / 32 % 32 - 15.7, z = i / 1024 - 16.2;
+    file.put(x * x + y * y + z * z < 81 ? 1 : 0);
+  }
+  file.close();
+  std::vector<std::string> options = {"--labels", "ball.nrrd", "--label-mode", "surface", "--transfer", "none"};
+  const PictureFile blocky = Picture("render", options);
+  options.insert(options.end(), {"--label-surface", "smooth"});
+  EXPECT_GT(LargestDifference(Picture("render", options), blocky), 0.1);
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& why) {
+    std::vector<std::string> arguments = {"render", "ramp.nrrd", "--local=1", "-o", "x.png", "--labels", "sides.nrrd", "--label-surface"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ExpectRefused(arguments, why);
+  };
+  refused({"smooth", "--label-mode", "tint"}, "label-surface is 'smooth', but label-mode is not 'surface'");
+  refused({"smooth", "--label-mode", "surface", "--renderer", "zbuffer"},
+          "renderer is 'zbuffer', but label-surface 'smooth' needs one of: raycast");
+  refused({"round", "--label-mode", "surface"}, "round");
+}
+
+// ---- labels alone
+
+class LabelsAloneTest : public LabelsTest {
+ protected:
+  // Two balls of labels of 64 bits that touch.
+  LabelsAloneTest() {
+    std::ofstream file(Path("seg.nrrd"), std::ios::binary);
+    file << "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 32 32 32\nencoding: raw\nendian: little\n\n";
+    for (int i = 0; i < 32 * 32 * 32; ++i) {
+      const auto in_ball = [&](double x) { return std::hypot(i % 32 - x, i / 32 % 32 - 15.3, i / 1024 - 16.2) < 7.5; };
+      const std::uint64_t label = in_ball(9.4) ? std::uint64_t{5} << 40 : in_ball(21.7) ? 70000 : 0;
+      file.write(reinterpret_cast<const char*>(&label), sizeof(label));
+    }
+  }
+  PictureFile Shown(const std::string& source, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"render", source, "--local=2", "--size", "64", "--no-fit", "-o", Path("picture.png")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadPicture(Path("picture.png"));
+  }
+};
+
+TEST_F(LabelsAloneTest, ShowAsSurfacesWithoutBeingAsked) {
+  for (const std::string renderer : {"raycast", "zbuffer"}) {
+    SCOPED_TRACE(renderer);
+    const PictureFile alone = Shown("seg.nrrd?ids=yes", {"--renderer", renderer});
+    const PictureFile expected =
+        Shown("ramp.nrrd", {"--renderer", renderer, "--labels", "seg.nrrd", "--label-mode", "surface", "--transfer", "none"});
+    EXPECT_LE(LargestDifference(alone, expected), 1 / 255.0 + 1e-6);
+    int seen = 0;
+    for (int y = 0; y < alone.height; ++y) {
+      for (int x = 0; x < alone.width; ++x) seen += alone.At(x, y, 3) > 0.99 ? 1 : 0;
+    }
+    EXPECT_GT(seen, 200);
+  }
+  const PictureFile raycast = Shown("seg.nrrd?ids=yes", {"--renderer", "raycast"});
+  EXPECT_EQ(LargestDifference(Shown("seg.nrrd?ids=yes", {}), raycast), 0) << "what auto chooses";
+  EXPECT_GT(LargestDifference(Shown("seg.nrrd?ids=yes", {"--labels-shown", "70000"}), raycast), 0.1);
+}
+
+TEST_F(LabelsAloneTest, ComeFromStoresThatSayThatTheyAreLabels) {
+  MustRun({"convert", "seg.nrrd", "seg.ome.zarr", "--ids"});
+  EXPECT_LE(LargestDifference(Shown("seg.ome.zarr", {}), Shown("seg.nrrd?ids=yes", {})), 1 / 255.0 + 1e-6);
+}
+
+TEST_F(LabelsAloneTest, WhatIsAboutValuesIsRefused) {
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    more.insert(more.begin() + 1, {"seg.nrrd?ids=yes", "--local=1", "-o", "x.png"});
+    ExpectRefused(more, why);
+  };
+  refused({"render", "--renderer", "splat"}, "has labels and no values, and renderer 'splat' shows no labels");
+  refused({"render", "--transfer", "viridis"}, "has labels and no values, which transfer");
+  refused({"render", "--isovalue", "3"}, "has labels and no values, which transfer");
+  refused({"slice"}, "--label-mode surface chooses one that does");
+  MustRun({"slice", "seg.nrrd?ids=yes", "--local=1", "--label-mode", "surface", "-o", Path("slice.png")});
+}
+
 }  // namespace
 }  // namespace slabstream

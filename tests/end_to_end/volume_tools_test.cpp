@@ -108,7 +108,7 @@ TEST_F(VolumeToolsTest, InfoTellsTheLevelsOfAVolume) {
   EXPECT_EQ(info["levels"][1]["size"], (Json{50, 50, 50}));
   EXPECT_EQ(info["levels"][1]["spacing"], (Json{2.0, 2.0, 2.0}));
   EXPECT_EQ(info["levels"][1]["voxel_bytes"], 125000);
-  EXPECT_EQ(info["statistics"], (Json{{"level", 0}, {"sample", false}}));
+  EXPECT_EQ(info["statistics"], (Json{{"level", 0}, {"sample", false}, {"times", 1}}));
   EXPECT_FALSE(whole.contains("levels"));
 }
 
@@ -136,7 +136,7 @@ TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
   const Json image = {{"version", "0.4"}, {"axes", axes}, {"datasets", datasets}};
   write("large.zarr/.zattrs", {{"multiscales", Json::array({image})}});
   EXPECT_THAT(MustRun({"info", "large.zarr"}).out, HasSubstr("values       7 ... 7 of level 1\n"));
-  EXPECT_EQ(Info("large.zarr")["statistics"], (Json{{"level", 1}, {"sample", false}}));
+  EXPECT_EQ(Info("large.zarr")["statistics"], (Json{{"level", 1}, {"sample", false}, {"times", 1}}));
 
   std::ofstream(Path("large.raw"));
   std::filesystem::resize_file(Path("large.raw"), std::uintmax_t{1024} * 1024 * 1100);
@@ -144,7 +144,7 @@ TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
   std::vector<std::string> command = {"info", "large.raw"};
   command.insert(command.end(), raw.begin(), raw.end());
   EXPECT_THAT(MustRun(command).out, HasSubstr("values       0 ... 0 of a sample of level 0\n"));
-  EXPECT_EQ(Info("large.raw", raw)["statistics"], (Json{{"level", 0}, {"sample", true}}));
+  EXPECT_EQ(Info("large.raw", raw)["statistics"], (Json{{"level", 0}, {"sample", true}, {"times", 1}}));
 }
 
 // It cannot be read in parts.

@@ -248,6 +248,7 @@ class HttpTest(WithService):
             ("render", {"dataset": "channels", "channel": "1", "channel-color": "1=green,0=#f0f", "channel-range": "1=0:30"}),
             ("render", {"dataset": "channels", "channel": ["1"], "channel-transfer": "1=opaque", "channel-opacity": "1=0.5", "blend": "add"}),
             ("slice", {"dataset": "channels", "size": 160, "plane": "zyx", "channel": 0, "channel-gamma": "0=0.5", "color-bar": "true"}),
+            ("render", {"dataset": "channels", "size": 160, "channel": "0,1", "color-bar": "true", "legend": "true"}),
             ("render", {"dataset": "times", "time": "last", "transfer": "opaque"}),
         ]
         for kind, options in cases:

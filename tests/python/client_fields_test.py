@@ -33,6 +33,11 @@ ASKED: list[tuple[str, dict, dict]] = [
     ("render", {"renderer": "mip", "time": "1"}, {"renderer": "mip", "time": 1}),
     ("slice", {"plane": "z", "channel": "DAPI", "channel-color": "DAPI=white", "time": "1"},
      {"plane": "z", "channels": {"DAPI": {"color": "white"}}, "time": 1}),
+    ("render", {"overlay-transfer": "hot", "overlay-range": "20:150", "overlay-weight": "0.5"},
+     {"overlay_transfer": "hot", "overlay_range": (20, 150), "overlay_weight": 0.5}),
+    ("render", {"channel": "0,overlay"}, {"channels": [0, "overlay"]}),
+    ("render", {"channel-opacity": "overlay=1", "renderer": "raycast"}, {"overlay": True, "renderer": "raycast"}),
+    ("slice", {"plane": "z", "overlay-transfer": "hot"}, {"plane": "z", "overlay_transfer": "hot"}),
 ]
 FRAMES, TIMES = 48, 3
 
@@ -42,7 +47,8 @@ class Cells(InAFolder):
 
     def setUp(self) -> None:
         super().setUp()
-        self.running = RunningService(self.folder, "--data", f"cells={write_cells(self.folder)}")
+        cells = write_cells(self.folder)
+        self.running = RunningService(self.folder, "--data", f"cells={cells},overlay={cells}?channel=1,time=1")
         self.addCleanup(self.running.end)
         self.service = ss.connect(endpoint=self.running.endpoint)
         self.addCleanup(self.service.close)
@@ -92,6 +98,41 @@ class Cells(InAFolder):
                     np.testing.assert_array_equal(read_png(self.written(line[1:at] + line[at + 2 :], "again.png")), codes, str(line))
         for i, one in enumerate(seen):
             self.assertFalse(any(np.array_equal(one, other) for other in seen[:i]), "two requests look alike")
+
+    def test_a_turntable_shows_several_times_as_that_of_the_command_line(self) -> None:
+        for frames, shown in ((None, "0:2:2"), (4, "0:2"), (2, "1:1")):
+            with self.subTest(frames=frames, time=shown):
+                images = list(self.service.turntable("cells", frames, time=shown, size=48, turns=2))
+                words = [] if frames is None else ["--frames", str(frames)]
+                done = self.running.run("turntable", "cells", "--time", shown, "--turns", "2", "--size", "48", "-o", "t%d.png", *words,
+                                        "--endpoint", self.running.endpoint)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(len(images), frames or 2)
+                for i, image in enumerate(images):
+                    np.testing.assert_array_equal(np.asarray(image), read_png((self.folder / f"t{i}.png").read_bytes()))
+        for wrong in ("2:1", "0:2:0", "0:x", ":", "0:1:2:3", "0:9999999", "1:"):
+            with self.assertRaisesRegex(ss.InvalidArgument, f"time (is )?'{wrong}'"):
+                list(self.service.turntable("cells", 2, time=wrong))
+        with self.assertRaisesRegex(ss.InvalidArgument, "frames"):
+            self.service.turntable("cells")
+
+    def test_functions_of_several_channels_have_a_file_each(self) -> None:
+        maps = [{"RGBPoints": [0, 0, 0, 0, 200, *color]} for color in ((1, 0.5, 0), (0, 0.5, 1))]
+        asked = {"dataset": "cells", "size": 64, "channel": "0,1", "channel-transfer": f"0={json.dumps(maps[0])},1={json.dumps(maps[1])}"}
+        gateway = self.gateway()
+        status, _, body = gateway.request("/api/v1/command", "POST", body=json.dumps(asked))
+        self.assertEqual(status, 200, body)
+        told = json.loads(body)
+        self.assertEqual(sorted(told["files"]), ["channel-map-1.json", "channel-map-2.json"])
+        for name, text in told["files"].items():
+            (self.folder / name).write_text(text)
+        line = shlex.split(told["command"])
+        at = line.index("-o")
+        by_shell = self.written(line[1:at] + line[at + 2 :], "shell.png")
+        status, _, picture = gateway.request("/api/v1/render.png", "POST", body=json.dumps(asked))
+        self.assertEqual((status, picture), (200, by_shell))
+        of_record = json.loads(self.running.run("info", "shell.png", "--json").stdout)["files"]
+        self.assertEqual(of_record, {name: json.loads(text) for name, text in told["files"].items()})
 
     def whole_frames(self, renderer: str, tolerance: int) -> None:
         options = {"renderer": renderer, "size": 160}

@@ -110,6 +110,8 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"renderer": "raycast", "labels": True}, [*RAYCAST, "--label-mode", "tint"]),
     ({"renderer": "raycast", "label_mode": "surface", "label_opacity": {1: 0.2, 3: 0}},
      [*RAYCAST, "--label-mode", "surface", "--label-opacity", "1=0.2,3=0"]),
+    ({"renderer": "raycast", "label_mode": "surface", "label_surface": "smooth"},
+     [*RAYCAST, "--label-mode", "surface", "--label-surface", "smooth"]),
     ({"renderer": "raycast", "label_tint": 1, "labels_shown": [1, (3, 5)]}, [*RAYCAST, "--label-tint", "1", "--labels-shown", "1,3-5"]),
     ({"renderer": "raycast", "overlay": True}, [*RAYCAST, "--overlay-weight", "1"]),
     ({"renderer": "raycast", "overlay_transfer": "gray-ramp", "overlay_weight": 0.2},
@@ -147,6 +149,8 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
      ["--plane", "z", "--projection-mode", "mean", "--sampling-rate", "2", "--thickness", "8"]),
     ({"plane": "axial", "labels": True}, ["--plane", "axial", "--label-mode", "tint"]),
     ({"plane": "axial", "label_mode": "surface", "labels_shown": 2}, ["--plane", "axial", "--label-mode", "surface", "--labels-shown", "2"]),
+    ({"plane": "axial", "label_mode": "surface", "label_surface": "smooth"},
+     ["--plane", "axial", "--label-mode", "surface", "--label-surface", "smooth"]),
     ({"plane": "axial", "label_mode": "highlight", "labels_shown": "right_*"},
      ["--plane", "axial", "--label-mode", "highlight", "--labels-shown", "right_*"]),
     ({"plane": "axial", "label_tint": 0.3, "overlay": True}, ["--plane", "axial", "--label-tint", "0.3", "--overlay-transfer", "auto"]),
@@ -169,6 +173,8 @@ CHANNEL_CASES: list[tuple[dict, list[str]]] = [
       "--channel-opacity", "DAPI=0.5", "--time", "last"]),
     ({"channels": {0: {"transfer": "viridis", "range": "2%:98%"}}}, ["--channel", "0", "--channel-transfer", "0=viridis", "--channel-range", "0=2%:98%"]),
     ({"channels": ["Actin"], "color_bar": True, "size": 96}, ["--channel", "Actin", "--color-bar", "--size", "96"]),
+    ({"channels": [0, "Actin"], "color_bar": "K", "legend": True, "size": 160},
+     ["--channel", "0,Actin", "--color-bar=K", "--legend", "--size", "160"]),
     ({"blend": "add"}, ["--blend", "add"]),
 ]
 CHANNEL_SLICE_CASES: list[tuple[dict, list[str]]] = [
@@ -318,7 +324,8 @@ class Drift(unittest.TestCase):
             for option in command.values():
                 *outer, field = option.path.split(".")
                 if option.path and outer != ["parameters"]:
-                    holder = functools.reduce(getattr, outer, schema.FrameRequest())
+                    of_overlay = outer == ["overlay"]  # a short form
+                    holder = schema.FieldChoice() if of_overlay else functools.reduce(getattr, outer, schema.FrameRequest())
                     self.assertIn(field, holder.DESCRIPTOR.fields_by_name, option.path)
 
     def test_signatures_and_help_show_them(self) -> None:

@@ -132,7 +132,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
 
   // Layers that there are not are refused in one line.
   FrameRequest overlay = request;
-  overlay.overlay.emplace();
+  overlay.fields = {{.field = "overlay"}};
   EXPECT_THAT(client_->Render(overlay).status().message(), testing::HasSubstr("dataset \"layered\" has no field 'overlay'"));
   request.dataset = "ball";
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("dataset \"ball\" has no labels"));

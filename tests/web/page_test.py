@@ -312,10 +312,10 @@ class PageTest(unittest.TestCase):
                    "/api/v1/histogram": lambda fields, body: {"dataset": "patient", "range": [0, 250], "counts": [2 ** (i % 12) for i in range(256)], "percentiles": {}}}
         viewer = self.viewer(self.proxy(answers=answers).port, transfer="opaque")
         drawn = viewer.settled()
-        viewer.until("document.querySelectorAll('.plot .point.opacity').length === 3 && document.querySelector('.histogram').getAttribute('d') !== ''")
+        viewer.until("document.querySelectorAll('.editor .plot .point.opacity').length === 3 && document.querySelector('.histogram').getAttribute('d') !== ''")
         self.assertEqual(asked[0], {"dataset": "patient", "transfer": "opaque"})
         before = viewer.pixels()
-        viewer.js("document.querySelectorAll('.plot .point.opacity')[1].focus()")
+        viewer.js("document.querySelectorAll('.editor .plot .point.opacity')[1].focus()")
         viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_UP * 5, Keys.ARROW_RIGHT)
         edited = viewer.final("Array.isArray(o.transfer) && Math.abs(o.transfer[0].Points[5] - 0.25) < 1e-6")
         self.assertGreater(edited["options"]["transfer"][0]["Points"][4], 100)
@@ -324,11 +324,11 @@ class PageTest(unittest.TestCase):
         viewer.save(SHOTS, "function")
 
         # A click adds a point and a drag moves it; Delete takes it away.
-        x, y = viewer.js("(b => [b.left + b.width * 0.7, b.top + 60])(document.querySelector('.plot').getBoundingClientRect())")
+        x, y = viewer.js("(b => [b.left + b.width * 0.7, b.top + 60])(document.querySelector('.editor .plot').getBoundingClientRect())")
         for kind, dy in (("mousePressed", 0), ("mouseMoved", 30), ("mouseReleased", 30)):
             viewer.command("Input.dispatchMouseEvent", type=kind, x=x, y=y + dy, button="left", buttons=1, clickCount=1)
         viewer.final("o.transfer[0].Points.length === 16")
-        viewer.js("document.querySelector('.plot .point.selected').focus()")
+        viewer.js("document.querySelector('.editor .plot .point.selected').focus()")
         viewer.driver.switch_to.active_element.send_keys(Keys.DELETE)
         viewer.final("o.transfer[0].Points.length === 12")
         # Undo goes back to the preset, redo forth.
@@ -362,7 +362,7 @@ class PageTest(unittest.TestCase):
         viewer = self.viewer(self.proxy(answers=missing).port)
         viewer.settled()
         viewer.until("!document.querySelector('.editor .hint').hidden")
-        viewer.js("document.querySelectorAll('.plot .point.opacity')[1].focus()")
+        viewer.js("document.querySelectorAll('.editor .plot .point.opacity')[1].focus()")
         viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_DOWN)
         viewer.final("Array.isArray(o.transfer)")
 
@@ -438,7 +438,7 @@ class PageTest(unittest.TestCase):
         self.assertNotIn("RGBPoints", drawn["options"]["transfer"][0])
         before = viewer.pixels()
         self.assertSamePixels(before, self.command_line(drawn))
-        self.assertTrue(viewer.js("document.querySelector('.plot').parentElement.hidden"), "regions stand in the place of the curve")
+        self.assertTrue(viewer.js("document.querySelector('.editor .plot').parentElement.hidden"), "regions stand in the place of the curve")
 
         # A corner moves by the keyboard, a region by the pointer.
         viewer.js("(document.querySelector('.joint .region[data-index=\"1\"]').focus(), document.querySelector('.joint .point[data-index=\"0\"]').focus(), true)")
@@ -516,7 +516,7 @@ class PageTest(unittest.TestCase):
         viewer.final(f"{regions}?.length === 3")
         viewer.find(switch).click()
         viewer.final("o.transfer === 'auto'")
-        self.assertFalse(viewer.js("document.querySelector('.plot').parentElement.hidden"))
+        self.assertFalse(viewer.js("document.querySelector('.editor .plot').parentElement.hidden"))
         preset = "[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'ct-bone-2d'))"
         viewer.js(f"{choose}({renderer})", "mip")
         viewer.js(f"{choose}({preset})", "ct-bone-2d")
@@ -530,7 +530,7 @@ class PageTest(unittest.TestCase):
         viewer = self.viewer()
         viewer.settled()
         viewer.until("document.querySelector('.facts dd') !== null")
-        viewer.open_section("Layers")
+        viewer.open_section("Labels")
         viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
         viewer.final("o.renderer === 'auto' && o['label-mode'] === 'tint' && h.statistics.plan.renderer === 'raycast'")
         tinted = viewer.pixels()
@@ -606,24 +606,45 @@ class PageTest(unittest.TestCase):
         options = wrong.settled()["options"]
         self.assertTrue("energy" not in options and "polarity" not in options, options)
 
-    def test_an_overlay_has_its_colour_and_range(self):
-        viewer = self.viewer(overlay=1, renderer="raycast", label_mode="tint")
-        viewer.settled()
-        viewer.until("document.querySelector('.facts dd') !== null")
-        viewer.open_section("Layers")
-        choice = viewer.driver.find_element(By.XPATH, "//div[label[contains(., 'function')]]/select")
-        self.assertIn("Automatic", viewer.js("[...arguments[0].options].map(o => o.text)", choice))
-        self.assertFalse(viewer.js("[...document.querySelectorAll('option, button, label')].some(e => e.textContent === 'auto')"), "one word an idea")
+    def test_an_overlay_has_a_row_as_channels_have(self):
+        viewer = self.viewer(renderer="splat")
+        viewer.final("o['channel-opacity'] === undefined")
+        viewer.until("document.querySelectorAll('.channel').length === 1")
         before = viewer.pixels()
-        choice.find_element(By.XPATH, "option[. = 'One colour']").click()
-        viewer.js("(e => { e.value = '#00ff00'; e.dispatchEvent(new Event('input')); return true; })(document.querySelector('[aria-label=\"Colour of the overlay\"]'))")
-        drawn = viewer.final("Array.isArray(o['overlay-transfer']) && o['overlay-transfer'][0].RGBPoints.join() === '0,0,0,0,1,0,1,0'")
+        viewer.find("[aria-label='Show Overlay']").click()
+        drawn = viewer.final("o.renderer === 'raycast' && o['channel-opacity'] === 'overlay=1' && o.transfer === 'auto'")
         self.assertNotEqual(viewer.pixels(), before)
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelectorAll('.channel .of-channel[d^=M]').length === 1")
+        choice = viewer.driver.find_element(By.XPATH, "//div[label[. = 'Colours of Overlay']]/select")
+        self.assertIn("Automatic", viewer.js("[...arguments[0].options].map(o => o.text)", choice))
+        self.assertFalse(viewer.js("[...document.querySelectorAll('option, button, label')].some(e => e.textContent === 'auto')"), "one word an idea")
+        choice.find_element(By.XPATH, "option[. = 'Its colour']").click()
+        viewer.js("(e => { e.value = '#00ff00'; e.dispatchEvent(new Event('input')); return true; })(document.querySelector('[aria-label=\"Colour of Overlay\"]'))")
+        viewer.final("o['channel-color'] === 'overlay=#00ff00'")
+        viewer.find("[aria-label='Opacity of Overlay']").clear()
+        viewer.find("[aria-label='Opacity of Overlay']").send_keys("0.5", Keys.ENTER)
         for name, value in (("from", "20"), ("to", "150")):
-            viewer.find(f"[aria-label='Overlay {name}']").send_keys(value, Keys.ENTER)
-        self.assertFinal(viewer, "o['overlay-range'] === '20:150'")
+            viewer.find(f"[aria-label='Overlay, {name}']").clear()
+            viewer.find(f"[aria-label='Overlay, {name}']").send_keys(value, Keys.ENTER)
+        drawn = viewer.final("o['channel-range'] === 'overlay=20:150' && o['channel-opacity'] === 'overlay=0.5'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.save(SHOTS, "overlay")
+        choice.find_element(By.XPATH, "option[. = 'Hot']").click()
+        viewer.final("o['channel-transfer'] === 'overlay=hot' && o['channel-color'] === undefined")
+        viewer.until("location.hash.includes('overlay%3Dhot') || location.hash.includes('overlay=hot')")
+        other = self.at_the_same_address(viewer)
+        self.assertFinal(other, "o['channel-transfer'] === 'overlay=hot' && o['channel-range'] === 'overlay=20:150' && o['channel-opacity'] === 'overlay=0.5'")
+        viewer.find("[aria-label='Show Overlay']").click()
+        viewer.final("!Object.keys(o).some(name => name.startsWith('channel'))")
+
+    def test_a_link_says_with_short_forms_how_the_overlay_looks(self):
+        viewer = self.viewer(overlay=1, overlay_transfer="hot", overlay_range="20:150", overlay_weight="0.5", renderer="raycast", layout="quad")
+        asked = "o['channel-transfer'] === 'overlay=hot' && o['channel-range'] === 'overlay=20:150' && o['channel-opacity'] === 'overlay=0.5'"
+        drawn = viewer.final(f"{asked} && o.transfer === 'auto'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        of_slice = viewer.final(asked, "axial")
+        self.assertSamePixels(viewer.pixels("axial"), self.command_line(of_slice, "slice"))
 
     def test_lengths_have_the_unit_of_the_file(self):
         viewer = self.viewer(dataset="cells", layout="quad", measure="distance:0,0,0:3,4,0")
@@ -636,7 +657,7 @@ class PageTest(unittest.TestCase):
     def test_slices_are_grey_where_a_label_does_not_show(self):
         viewer = self.viewer(layout="quad", label_mode="tint", renderer="raycast")
         viewer.settled()
-        viewer.open_section("Layers")
+        viewer.open_section("Labels")
         viewer.find("[data-label='2'] input[type=checkbox]").click()
         drawn = viewer.final("o['labels-shown'] === '1,3'", "axial")
         self.assertSamePixels(viewer.pixels("axial"), self.command_line(drawn, "slice"))
@@ -648,7 +669,7 @@ class PageTest(unittest.TestCase):
         viewer.until(f"{legend} === 'left,middle,right'")
         colors = viewer.js("[...document.querySelectorAll('.label-legend rect')].map(r => r.getAttribute('fill'))")
         self.assertEqual(colors, viewer.js("[...document.querySelectorAll('.label-row .swatch')].map(s => '#' + s.style.background.match(/\\d+/g).map(n => (+n).toString(16).padStart(2, '0')).join(''))"))
-        viewer.open_section("Layers")
+        viewer.open_section("Labels")
         viewer.find("[data-label='2'] input[type=checkbox]").click()
         viewer.until(f"{legend} === 'left,right'")
         viewer.save(SHOTS, "legend")
@@ -696,7 +717,7 @@ class PageTest(unittest.TestCase):
         self.assertFinal(viewer, "o.azimuth !== 180")
         viewer.until("document.querySelector('.facts dd') !== null")
         viewer.until("document.querySelector('.editor .histogram').getAttribute('d') !== ''")
-        viewer.open_section("Layers")
+        viewer.open_section("Labels")
         viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
         viewer.until("document.querySelectorAll('[data-label]').length === 3")
         viewer.keys("c")
@@ -893,7 +914,7 @@ class PageTest(unittest.TestCase):
         viewer.until("document.querySelector('.facts dd') !== null")
         press = lambda *keys: viewer.actions().send_keys(*keys).perform()
         for number, selector in enumerate((".panel select", ".panel input[type=range]", ".panel summary", ".bar .share", ".panel input[role=switch]")):
-            viewer.js("(document.querySelector(arguments[0]).focus(), true)", selector)
+            viewer.js("([...document.querySelectorAll(arguments[0])].find(e => e.checkVisibility()).focus(), true)", selector)
             press("l")
             viewer.until(f"document.querySelectorAll('.pane').length === {1 if number % 2 else 4}")
         azimuth, density = viewer.settled()["options"]["azimuth"], viewer.js("document.querySelector('.panel input[type=range]').value")
@@ -902,7 +923,7 @@ class PageTest(unittest.TestCase):
         viewer.until("document.querySelector('.panel input[type=range]').value !== arguments[0]", density)
         self.assertEqual(viewer.drawn()["options"]["azimuth"], azimuth, "a slider keeps its arrows")
         panes = viewer.js("document.querySelectorAll('.pane').length")
-        viewer.js("(document.querySelector('.panel input[type=number]').focus(), true)")
+        viewer.js("([...document.querySelectorAll('.panel input[type=number]')].find(e => e.checkVisibility()).focus(), true)")
         press("l")
         press(Keys.TAB)
         self.assertEqual(viewer.js("document.querySelectorAll('.pane').length"), panes, "in fields letters are text")
@@ -995,10 +1016,10 @@ class PageTest(unittest.TestCase):
 
     def test_no_curve_is_made_up_while_a_dataset_is_read(self):
         viewer = self.viewer(dataset="later")
-        viewer.until("document.querySelector('.plot .curve') !== null && document.querySelector('.progress-text').textContent.startsWith('Reading')")
-        self.assertEqual(viewer.js("[document.querySelector('.plot .curve').getAttribute('d') || '', document.querySelectorAll('.plot .point').length]"), ["", 0])
+        viewer.until("document.querySelector('.editor .plot .curve') !== null && document.querySelector('.progress-text').textContent.startsWith('Reading')")
+        self.assertEqual(viewer.js("[document.querySelector('.editor .plot .curve').getAttribute('d') || '', document.querySelectorAll('.editor .plot .point').length]"), ["", 0])
         viewer.settled()
-        viewer.until("document.querySelector('.plot .curve').getAttribute('d').length > 10")
+        viewer.until("document.querySelector('.editor .plot .curve').getAttribute('d').length > 10")
 
     def test_a_colour_bar_tells_values(self):
         viewer = self.viewer(color_bar=1, background="#ffffff")
@@ -1088,6 +1109,14 @@ class PageTest(unittest.TestCase):
         answers = {"/api/v1/histogram": lambda fields, body: note(fields) or histogram, "/api/v1/transfer": lambda fields, body: note(fields) or [{"RGBPoints": [0, 0, 0, 0, 250, 1, 1, 1]}]}
         return {"port": self.proxy(delay, answers).port, "script": MORE.replace("ARGUMENT", json.dumps(more))}
 
+    def test_names_in_the_picture_have_the_ranges_of_channels(self):
+        viewer = self.viewer(**self.more([], fields=CHANNELS), color_bar=1)
+        rows = "[...document.querySelectorAll('[data-pane=\"3d\"] .label-legend g')].map(g => [g.querySelector('text').textContent, g.querySelector('rect').getAttribute('fill')])"
+        viewer.until(f"{rows}.length === 2")
+        names = viewer.js(rows)
+        self.assertRegex(names[0][0], r"  20 to 120$")
+        self.assertEqual([color for _, color in names], ["#0000ff", "#00ff00"])
+
     def test_channels_have_a_row_each(self):
         asked = []
         more = self.more(asked, fields=CHANNELS)
@@ -1147,6 +1176,15 @@ class PageTest(unittest.TestCase):
         self.assertFinal(viewer, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
         other = self.at_the_same_address(viewer)
         self.assertFinal(other, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
+        # A channel's transfer function: a preset, or its points.
+        points = "mine,1|20,0,0,1;200,1,1,0|20,0;200,0.5"
+        viewer = self.viewer(dataset="dyes", channel="0,1", channel_transfer=f"0=viridis,1={urllib.parse.quote(points)}", channel_gamma="0=2")
+        function = "JSON.parse(/,1=(.*)$/.exec(o['channel-transfer'])[1])[0]"
+        viewer.until("!document.querySelector('.player').hidden")  # the pane is smaller then
+        shows = f"o['look-at'] && d.header.size[1] < 592 && o['channel-transfer']?.startsWith('0=viridis,1=') && {function}.RGBPoints.join() === '20,0,0,1,200,1,1,0' && o['channel-gamma'] === undefined"
+        drawn = viewer.final(shows)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertFinal(self.at_the_same_address(viewer), shows)
         viewer = self.viewer(dataset="dyes", channel="1", time="last")
         self.assertFinal(viewer, "o.channel === '1' && o.time === '2'")
 
@@ -1231,7 +1269,7 @@ class PageTest(unittest.TestCase):
         viewer.save(SHOTS, "times-help")
         press(Keys.ESCAPE)
         # In text fields keys are text; on buttons, Space presses.
-        viewer.js("(document.querySelector('.panel input[type=number]').focus(), true)")
+        viewer.js("([...document.querySelectorAll('.panel input[type=number]')].find(e => e.checkVisibility()).focus(), true)")
         press(" ", ".")
         press(Keys.TAB)
         self.assertEqual(viewer.js(f"[{present(5)}, document.querySelector('[aria-label=Play]').getAttribute('aria-pressed')]"), [True, "false"])
@@ -1402,7 +1440,7 @@ class PageTest(unittest.TestCase):
             self.assertTrue(ring, f"no ring: {name}")
             press(Keys.TAB)
         self.assertEqual(reached[0], "Skip to the picture")
-        for name in ("Views", "Help", "Settings", "Save as a file", "Layers"):
+        for name in ("Views", "Help", "Settings", "Save as a file", "Labels"):
             self.assertIn(name, reached)
 
     def test_names_roles_and_contrasts(self):

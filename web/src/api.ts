@@ -10,9 +10,9 @@ export class ApiError extends Error {
 
 // What requests call fields and times; the link, too.
 export const NAMES = {
-  channels: "channel", channelColors: "channel-color", channelRanges: "channel-range", channelGammas: "channel-gamma", channelOpacities: "channel-opacity", blend: "blend", time: "time", field: "field",
+  channels: "channel", channelTransfers: "channel-transfer", channelColors: "channel-color", channelRanges: "channel-range", channelGammas: "channel-gamma", channelOpacities: "channel-opacity", blend: "blend", time: "time", field: "field",
 } as const;
-export interface Field { name: string; channel: boolean; color: string | null; window: [number, number] | null; shown: boolean }
+export interface Field { name: string; channel: boolean; labels?: boolean; color: string | null; window: [number, number] | null; shown: boolean }
 export interface Times { count: number; step?: number | null; unit?: string } // `step`: from a time to the next one, if it is known
 export type Source = Record<string, string>; // of what is asked about: the dataset, and which of its fields and times
 
@@ -20,7 +20,7 @@ export interface Level { size: [number, number, number]; spacing: [number, numbe
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
-  layers?: { labels: number | boolean; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
+  layers?: { labels: number | boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
   fields?: Field[]; times?: Times; field?: number; time?: number; // absent: one field, one time
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }

@@ -3,6 +3,7 @@ import type { LegendEntry } from "./annotations";
 import type { Histogram } from "./api";
 import { type Channel, colorOf, ownOf, shownChannels, sourceOf, withOwn } from "./channels";
 import type { Context } from "./context";
+import { shown as text } from "./dom";
 import type { Histograms } from "./histograms";
 import { rounded } from "./vec";
 
@@ -66,6 +67,9 @@ export class ChannelRanges {
 
   legend(): readonly LegendEntry[] {
     const { state } = this.context.store;
-    return state.colorBar ? shownChannels(state).map(channel => ({ name: channel.name, color: colorOf(state, channel) })) : [];
+    return state.colorBar ? shownChannels(state).map(channel => {
+      const [low, high] = this.of(channel);
+      return { name: `${channel.name}  ${text(low)} to ${text(high)}`, color: colorOf(state, channel) };
+    }) : [];
   }
 }

@@ -1,20 +1,24 @@
-// The channels of the dataset that is shown: which of them show, how they look, and what the service is asked for.
+// The channels and the overlay of the dataset that is shown: which of them show, how they look, and what the service is asked for.
 import { type Dataset, NAMES, type Options, type Source } from "./api";
 import { shownDataset } from "./offers";
 import type { State } from "./state";
 import { timeOptions } from "./times";
+import { type ColorMap, toParaView } from "./transfer";
 
 export interface Channel { key: string; name: string; color: string; window: readonly [number, number] | null; shown: boolean } // `key`: in requests and links
 
 export const GAMMAS = [0.01, 100] as const;
-export const AS_SAID: Pick<State, "channels" | Looks | "blend"> = { channels: null, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto" };
+export const AS_SAID: Pick<State, "overlay" | "channels" | Looks | "blend"> = { overlay: false, channels: null, channelTransfers: {}, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto" };
 
 // What the service takes where a file says nothing: colours by number, and how many show.
 const COLORS = ["#ff00ff", "#00ff00", "#00ffff", "#ffff00", "#ff0000", "#3366ff", "#ff8000", "#ffffff"] as const;
 const SHOWN_UNASKED = 4, MOST_SHOWN = 16;
 
-export type Looks = "channelColors" | "channelRanges" | "channelGammas" | "channelOpacities";
-const TEXTS: { [K in Looks]: (value: State[K][string]) => string } = { channelColors: String, channelRanges: range => range.join(":"), channelGammas: String, channelOpacities: String };
+export type Looks = "channelTransfers" | "channelColors" | "channelRanges" | "channelGammas" | "channelOpacities";
+const TEXTS: { [K in Looks]: (value: State[K][string]) => string } = {
+  channelTransfers: transfer => (typeof transfer === "string" ? transfer : JSON.stringify(toParaView(transfer))), channelColors: String, channelRanges: range => range.join(":"), channelGammas: String, channelOpacities: String,
+};
+const LOOKS = Object.keys(TEXTS) as Looks[];
 
 // Those of a dataset that has several, else none.
 export function channelsOf({ fields = [] }: Dataset): readonly Channel[] {
@@ -25,6 +29,9 @@ export function channelsOf({ fields = [] }: Dataset): readonly Channel[] {
   }] : []));
   return all.length > 1 ? all : [];
 }
+
+export const OVERLAY: Channel = { key: "overlay", name: "Overlay", color: "#ff4fd8", window: null, shown: false };
+export const hasOverlay = (dataset: Dataset | null): boolean => dataset?.fields?.some(({ channel, labels }) => !channel && !labels) ?? false;
 
 let known: Dataset | null = null, ofKnown: readonly Channel[] | null = null;
 // Of the shown dataset; null: they are not known yet.
@@ -47,27 +54,41 @@ export function shownChannels({ channels: wanted }: State): readonly Channel[] {
   return listed.length > 0 || wanted?.length === 0 ? listed : all.filter(({ shown }) => shown);
 }
 export const colorOf = (state: State, channel: Channel): string => ownOf(state.channelColors, channel) ?? channel.color;
-export const isAsSaid = (state: State): boolean => state.channels === null && state.blend === "auto" && (Object.keys(TEXTS) as Looks[]).every(look => Object.keys(state[look]).length === 0);
+// What its colour map is: a preset or a function; "": from clear to its colour; "auto": of the overlay, what the service takes.
+export const transferOf = (state: State, channel: Channel): string | ColorMap =>
+  ownOf(state.channelTransfers, channel) ?? (channel === OVERLAY && !ownOf(state.channelColors, channel) ? "auto" : "");
 
-const hasChannels = (state: State): boolean => (channels() ? channels()?.length !== 0 : !isAsSaid(state));
+// `but`: what is said of this one does not count.
+const isSaid = (state: State, but = ""): boolean => state.channels !== null || state.blend !== "auto" || LOOKS.some(look => Object.keys(state[look]).some(key => key !== but));
+export const isAsSaid = (state: State): boolean => !state.overlay && !isSaid(state);
+
+const hasChannels = (state: State): boolean => (channels() ? channels()?.length !== 0 : isSaid(state, OVERLAY.key));
 // Whether the transfer function can be that of what shows: it is one function, and channels have looks of their own.
 export const takesFunction = (state: State): boolean => !hasChannels(state) || (channels() ? shownChannels(state) : state.channels ?? []).length === 1;
 
-function lookOptions(state: State, look: Looks, shown: readonly Channel[]): Options {
-  const write = TEXTS[look] as (value: unknown) => string, record: Readonly<Record<string, unknown>> = state[look];
-  const each = channels() ? shown.flatMap(channel => { const own = ownOf(record, channel); return own === undefined ? [] : [[channel.key, own] as const]; }) : Object.entries(record);
-  return each.length > 0 ? { [NAMES[look]]: each.map(([key, value]) => `${key}=${write(value)}`).join(",") } : {};
+// Any look of the overlay shows it.
+function lookOf(state: State, channel: Channel, look: Looks): string | null {
+  const own = ownOf(state[look] as Readonly<Record<string, unknown>>, channel), replaced = (look === "channelColors" || look === "channelGammas") && transferOf(state, channel) !== "";
+  return own !== undefined && !replaced ? (TEXTS[look] as (value: unknown) => string)(own) : look === "channelOpacities" && channel === OVERLAY ? "1" : null;
 }
+function looksOf(state: State, shown: readonly Channel[]): Record<string, string> {
+  const each = LOOKS.map(look => [NAMES[look], shown.flatMap(channel => { const own = lookOf(state, channel, look); return own === null ? [] : [`${channel.key}=${own}`]; }).join(",")] as const);
+  return Object.fromEntries([...each.filter(([, text]) => text !== ""), ...(state.blend === "auto" ? [] : [[NAMES.blend, state.blend] as const])]);
+}
+// Channels of which a state says something.
+const told = (state: State): Channel[] => [...new Set(LOOKS.flatMap(look => Object.keys(state[look])))].filter(key => key !== OVERLAY.key).map(key => ({ key, name: key, color: "", window: null, shown: true }));
 
 // `own`: options of the transfer function and the like. They count if they say something, and then the only channel has no other look.
-export function channelOptions(state: State, own: Options): Options {
-  if (!hasChannels(state)) return own;
-  const known = channels(), shown = shownChannels(state), keys = known ? shown.map(channel => channel.key) : state.channels, first = known?.[0]?.key ?? "0";
-  if (keys?.length === 0) return { [NAMES.channels]: first, [NAMES.channelOpacities]: `${first}=0` }; // nothing shows
+// `several`: the renderer shows more than one.
+export function channelOptions(state: State, own: Options, several: boolean): Options {
+  const known = channels(), over = state.overlay && several && (!known || hasOverlay(shownDataset())) ? [OVERLAY] : [];
+  const overlaid = over.length > 0 ? looksOf(state, over) : {};
+  if (!hasChannels(state)) return { ...own, ...overlaid };
+  const shown = known ? shownChannels(state) : told(state), keys = known ? shown.map(channel => channel.key) : state.channels, first = known?.[0]?.key ?? "0";
+  if (keys?.length === 0) return { ...overlaid, [NAMES.channels]: first, [NAMES.channelOpacities]: [`${first}=0`, overlaid[NAMES.channelOpacities]].filter(Boolean).join(",") }; // none shows
   const which = state.channels && keys ? { [NAMES.channels]: keys.join(",") } : {};
   const says = takesFunction(state) && Object.entries(own).some(([name, value]) => name !== "opacity-distance" && value !== "auto");
-  if (says) return { ...which, ...own };
-  return Object.assign(which, ...(Object.keys(TEXTS) as Looks[]).map(look => lookOptions(state, look, shown)), state.blend !== "auto" && { [NAMES.blend]: state.blend });
+  return { ...which, ...(says ? { ...own, ...overlaid } : looksOf(state, [...shown, ...over])) };
 }
 
 // What questions are about: a channel, or the first one that shows.

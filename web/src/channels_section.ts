@@ -1,11 +1,11 @@
-// Section of the panel: the channels of a dataset, a row each.
+// Section of the panel: the channels of a dataset and its overlay, a row each.
 import type { ChannelRanges } from "./channel_ranges";
-import { AS_SAID, type Channel, channels, colorOf, GAMMAS, isAsSaid, type Looks, ownOf, shownChannels, withOwn } from "./channels";
-import type { Context } from "./context";
+import { AS_SAID, type Channel, channels, colorOf, GAMMAS, hasOverlay, isAsSaid, type Looks, OVERLAY, ownOf, shownChannels, transferOf, withOwn } from "./channels";
+import { type Context, follow } from "./context";
 import { button, choice, colorField, iconButton, numberField, section, toggle, undoButtons } from "./controls";
 import { h, put, shown, svg } from "./dom";
 import type { Histograms } from "./histograms";
-import { words } from "./offers";
+import { hasRegions, presetChoices, shownDataset, turnTo, words } from "./offers";
 import { histogramPath, Scale } from "./plot";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { LOOK, type State } from "./state";
@@ -13,6 +13,7 @@ import { clamp } from "./vec";
 
 const HEIGHT = 64, CURVE_STEPS = 24, KEY_STEPS = 100;
 const ENDS = ["darkest", "brightest"] as const;
+const OWN = "own"; // a function from a link
 
 interface Row { element: HTMLElement; refresh(): void }
 
@@ -46,27 +47,36 @@ function rangePlot({ store }: Context, ranges: ChannelRanges, channel: Channel):
 }
 
 function channelRow(context: Context, ranges: ChannelRanges, channel: Channel, show: (shown: readonly Channel[], what: string) => void, solo: () => void): Row {
-  const { store } = context, { name, key } = channel;
-  const set = <T>(look: Looks, value: T | undefined): void => store.update({ [look]: withOwn(store.state[look] as Readonly<Record<string, T>>, channel, value) } as Partial<State>, `${look} ${key}`);
+  const { store } = context, { name, key } = channel, isOverlay = channel === OVERLAY;
+  const withLook = (look: Looks, value: unknown): Partial<State> => ({ [look]: withOwn(store.state[look] as Readonly<Record<string, unknown>>, channel, value) });
+  const set = (look: Looks, value: unknown): void => store.update(withLook(look, value), `${look} ${key}`);
   const factor = (what: string, look: "channelGammas" | "channelOpacities", [low, high]: readonly [number, number]) => numberField(`${what} of ${name}`, value => { const held = clamp(value, low, high); set(look, held === 1 ? undefined : held); }, "0.05");
-  const isOn = (): boolean => shownChannels(store.state).includes(channel), others = (): readonly Channel[] => shownChannels(store.state).filter(each => each !== channel);
-  const eye = iconButton(`Show ${name}`, "eye", () => show(isOn() ? others() : [...others(), channel], "channel"));
+  const isOn = (): boolean => (isOverlay ? store.state.overlay : shownChannels(store.state).includes(channel)), others = (): readonly Channel[] => shownChannels(store.state).filter(each => each !== channel);
+  const eye = iconButton(`Show ${name}`, "eye", () => (isOverlay ? store.update({ overlay: !isOn(), ...(isOn() ? {} : turnTo("fields", store.state.renderer)) }, "overlay") : show(isOn() ? others() : [...others(), channel], "channel")));
   const color = colorField(`Colour of ${name}`, value => set("channelColors", value));
   const auto = button("Auto", null, () => ranges.set(channel, ranges.usual(channel), `auto ${key}`), "quiet"), alone = button("Solo", null, solo, "quiet");
   auto.setAttribute("aria-label", `Auto: range of ${name} from its histogram`);
   alone.setAttribute("aria-label", `Solo: only ${name}`);
+  const presets = presetChoices().filter(([preset]) => !hasRegions(preset) && (preset !== "auto" || isOverlay)), first = transferOf(store.state, channel);
+  const map = choice(`Colours of ${name}`, [["", "Its colour"], ...presets, ...(typeof first === "string" ? [] : [[OWN, "A function of its own"] as const])], value => store.update({
+    ...withLook("channelTransfers", value === "" || value === "auto" ? undefined : value === OWN ? first : value),
+    ...(isOverlay && { ...withLook("channelColors", value === "" ? colorOf(store.state, channel) : undefined) }),
+  }, `map ${key}`));
   const ends = ["from", "to"].map((end, i) => numberField(`${name}, ${end}`, value => ranges.move(channel, i, value)));
   const gamma = factor("Gamma", "channelGammas", GAMMAS), opacity = factor("Opacity", "channelOpacities", [0, 1]);
   const plot = rangePlot(context, ranges, channel);
   const fields = h("div", { class: "fields fourths" }, ...(["From", "To", "Gamma", "Opacity"] as const).map((text, i) => h("label", {}, h("span", {}, text), ([...ends, gamma, opacity][i] as typeof gamma).input)));
   return {
-    element: h("div", { class: "channel", role: "group", "aria-label": name, "data-channel": key }, h("div", { class: "channel-head" }, eye, color.input, h("span", { class: "label-name", title: name }, name), auto, alone), plot.element, fields),
+    element: h("div", { class: "channel", role: "group", "aria-label": name, "data-channel": key }, h("div", { class: "channel-head" }, eye, color.input, h("span", { class: "label-name", title: name }, name), auto, alone), map.element, plot.element, fields),
     refresh: () => {
-      const { state } = store, on = isOn();
+      const { state } = store, on = isOn(), transfer = transferOf(state, channel);
       put(eye, "aria-pressed", String(on));
       put(alone, "aria-pressed", String(on && others().length === 0));
+      alone.hidden = isOverlay;
       color.set(colorOf(state, channel));
-      auto.hidden = plot.element.hidden = fields.hidden = !on;
+      color.input.disabled = gamma.input.disabled = transfer !== "";
+      auto.hidden = map.element.hidden = plot.element.hidden = fields.hidden = !on;
+      map.set(typeof transfer === "string" ? transfer : OWN);
       if (!on) return;
       ends.forEach((end, i) => end.set(ranges.of(channel)[i] as number));
       gamma.set(ownOf(state.channelGammas, channel) ?? 1);
@@ -80,6 +90,7 @@ export function channelsSection(context: Context, ranges: ChannelRanges, histogr
   const { store } = context, list = h("div", { class: "list" });
   let made: readonly Channel[] = [], rows: readonly Row[] = [], before: State["channels"] = null; // before: what showed before one was alone
   const all = (): readonly Channel[] => channels() ?? [];
+  const rowsOf = (): readonly Channel[] => [...all(), ...(hasOverlay(shownDataset()) ? [OVERLAY] : [])];
   const show = (wanted: readonly Channel[], what: string): void => store.update({ channels: all().filter(channel => wanted.includes(channel)).map(channel => channel.key) }, what);
   const solo = (channel: Channel): void => {
     const now = shownChannels(store.state);
@@ -92,10 +103,11 @@ export function channelsSection(context: Context, ranges: ChannelRanges, histogr
   const undo = undoButtons(store), reset = button("As the file says", "reset", () => store.update(AS_SAID, "channels"), "quiet");
   const element = section("Channels", true, list, blend.element, legend.element, h("div", { class: "button-row" }, ...undo.elements, reset));
   const update = (): void => {
-    element.hidden = all().length === 0;
+    const wanted = rowsOf();
+    element.hidden = wanted.length === 0;
     if (element.hidden) return;
-    if (made !== all()) {
-      made = all();
+    if (made.length !== wanted.length || made.some((channel, i) => channel !== wanted[i])) {
+      made = wanted;
       before = null;
       rows = made.map(channel => channelRow(context, ranges, channel, show, () => solo(channel)));
       list.replaceChildren(...rows.map(row => row.element));
@@ -106,9 +118,7 @@ export function channelsSection(context: Context, ranges: ChannelRanges, histogr
     undo.refresh();
     reset.disabled = isAsSaid(store.state);
   };
-  store.subscribe(update, [...LOOK, "colorBar"]);
-  context.onVolume(update);
   histograms.onChange(update);
-  update();
+  follow(context, [...LOOK, "colorBar"], update);
   return element;
 }

@@ -1,8 +1,8 @@
 // Section of the panel: the clip box by numbers, planes, and what of them is shown.
 import { cornersOf, boxWith, wholeBox } from "./clip_handles";
 import { axesOf } from "./camera";
-import type { Context } from "./context";
-import { button, iconButton, numberField, row, section, segmented, toggle } from "./controls";
+import { type Context, follow } from "./context";
+import { button, iconButton, numberField, row, rows, section, segmented, toggle } from "./controls";
 import { h } from "./dom";
 import { type ClipPlane, LOOK } from "./state";
 import { AXES, AXIS_NAMES, dot, rounded } from "./vec";
@@ -21,20 +21,14 @@ export function clipSection(context: Context): HTMLDetailsElement {
   const grid = h("div", { class: "grid-fields" }, h("span", {}), h("span", { class: "label" }, "From"), h("span", { class: "label" }, "To"),
     ...AXES.flatMap(axis => [h("span", { class: "label" }, AXIS_NAMES[axis]), ...(fields[axis] ?? []).map(field => field.input)]));
   const resetBox = button("Whole volume", null, () => store.update({ clipBox: wholeBox }, "whole"), "quiet");
-  const planes = h("div", { class: "list" });
-  let planeFields: { set(value: number): void }[][] = [];
-  const drawPlanes = (list: readonly ClipPlane[]): void => {
-    if (planeFields.length !== list.length) {
-      const made = list.map((_, index) => ["x", "y", "z", "d"].map((name, i) => numberField(`Plane ${index + 1}, ${name}`, value => {
-        const changed = store.state.clipPlanes.map((plane, at) => (at === index ? (plane.map((old, j) => (j === i ? value : old)) as unknown as ClipPlane) : plane));
-        if (changed[index]?.slice(0, 3).some(c => c !== 0)) store.update({ clipPlanes: changed }, `plane ${index}`);
-      })));
-      planeFields = made;
-      planes.replaceChildren(...made.map((inputs, index) => h("div", { class: "list-row four" }, ...inputs.map(field => field.input),
-        iconButton(`Remove plane ${index + 1}`, "close", () => store.update({ clipPlanes: store.state.clipPlanes.filter((_, i) => i !== index) }, "no plane")))));
-    }
-    list.forEach((plane, index) => plane.forEach((value, i) => planeFields[index]?.[i]?.set(value)));
-  };
+  const planes = rows<ClipPlane>(index => {
+    const inputs = ["x", "y", "z", "d"].map((name, i) => numberField(`Plane ${index + 1}, ${name}`, value => {
+      const changed = store.state.clipPlanes.map((plane, at) => (at === index ? (plane.map((old, j) => (j === i ? value : old)) as unknown as ClipPlane) : plane));
+      if (changed[index]?.slice(0, 3).some(c => c !== 0)) store.update({ clipPlanes: changed }, `plane ${index}`);
+    }));
+    const remove = iconButton(`Remove plane ${index + 1}`, "close", () => store.update({ clipPlanes: store.state.clipPlanes.filter((_, i) => i !== index) }, "no plane"));
+    return { element: h("div", { class: "list-row four" }, ...inputs.map(field => field.input), remove), set: plane => plane.forEach((value, i) => inputs[i]?.set(value)) };
+  });
   const planeHead = h("div", { class: "list-head four", "aria-hidden": "true" }, ...["x", "y", "z", "d"].map(name => h("span", {}, name)));
   const planeHint = h("p", { class: "hint" }, "Keeps the points with x X + y Y + z Z + d ≥ 0.");
   const addPlane = button("Cut here, facing the view", "add", () => {
@@ -54,14 +48,12 @@ export function clipSection(context: Context): HTMLDetailsElement {
       for (const axis of AXES) for (const end of [0, 1] as const) fields[axis]?.[end]?.set(corners[end][axis]);
       unit.textContent = `Bounds in ${unitName(volume.unit)}`;
     }
-    drawPlanes(clipPlanes);
+    planes.set(clipPlanes);
     planeHead.hidden = planeHint.hidden = clipPlanes.length === 0;
     mode.set(clipMode);
     modeRow.hidden = clipBox === null && clipPlanes.length === 0;
     addPlane.disabled = clipPlanes.length >= MOST_PLANES;
   };
-  store.subscribe(update, LOOK);
-  context.onVolume(update);
-  update();
-  return section("Clipping", false, on.element, grid, h("div", { class: "button-row" }, resetBox, unit), planeHead, planes, planeHint, addPlane, modeRow);
+  follow(context, LOOK, update);
+  return section("Clipping", false, on.element, grid, h("div", { class: "button-row" }, resetBox, unit), planeHead, planes.element, planeHint, addPlane, modeRow);
 }

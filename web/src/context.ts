@@ -1,6 +1,6 @@
 // What the parts of the page share.
 import type { Api } from "./api";
-import type { Store } from "./state";
+import type { State, Store } from "./state";
 import type { Volume } from "./volume";
 
 export interface Context {
@@ -9,4 +9,11 @@ export interface Context {
   volume(): Volume | null;
   onVolume(listener: (volume: Volume | null) => void): void;
   say(message: string, kind?: "note" | "error"): void; // a short message that goes away
+}
+
+// Calls it now, and whenever the volume or one of these keys of the state changes.
+export function follow({ store, onVolume }: Context, keys: readonly (keyof State)[], update: () => void): void {
+  store.subscribe(update, keys);
+  onVolume(update);
+  update();
 }

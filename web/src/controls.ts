@@ -127,3 +127,16 @@ export function menu(opener: HTMLButtonElement, label: string, items: () => HTML
 
 export const menuItem = (label: string, key: string, press: () => void): HTMLElement =>
   h("button", { type: "button", role: "menuitem", class: "menu-item", onclick: press }, h("span", {}, label), key !== "" && h("kbd", {}, key));
+
+// Rows of a list in the state, made anew only when their number changes, so that the focus stays.
+export function rows<T>(make: (index: number) => { element: HTMLElement; set(item: T): void }): { element: HTMLElement; set(items: readonly T[]): void } {
+  const element = h("div", { class: "list" });
+  let made: { element: HTMLElement; set(item: T): void }[] = [];
+  return {
+    element,
+    set: items => {
+      if (made.length !== items.length) { made = items.map((_, i) => make(i)); element.replaceChildren(...made.map(each => each.element)); }
+      items.forEach((item, i) => made[i]?.set(item));
+    },
+  };
+}

@@ -1,5 +1,5 @@
 // The editor of gradient opacity: a curve of factors of opacity over the gradient's magnitude, as --gradient-opacity takes it.
-import type { Context } from "./context";
+import { type Context, follow } from "./context";
 import { iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
 import { can, turnTo } from "./offers";
@@ -39,9 +39,7 @@ export class GradientEditor {
       choose: circle => this.choose(Number(circle.dataset["index"])), insertAt: event => this.insert(...this.at(event)), dragTo: event => this.moveTo(...this.at(event)),
       step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
     });
-    context.onVolume(() => this.refresh());
-    context.store.subscribe(() => this.refresh(), LOOK);
-    this.refresh();
+    follow(context, LOOK, () => this.refresh());
   }
 
   // ---- drawing

@@ -1,7 +1,7 @@
 // The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
 import { NAMES } from "./api";
-import { GAMMAS } from "./channels";
+import { GAMMAS, OVERLAY } from "./channels";
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import { limitsOf, parametersIn } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST_KEY_FRAMES, type SlopePoint, type State, type Surface } from "./state";
@@ -34,7 +34,7 @@ const range = (name: string): Field<readonly [number, number]> => ({
   read: value => { const pair = numbers(value.replace(":", ","), 2); return pair && (pair[0] as number) < (pair[1] as number) ? (pair as [number, number]) : undefined; },
 });
 
-const COLOR = /^#[0-9a-f]{6}$/i;
+const COLOR = /^#[0-9a-f]{6}$/i, NAME = /^[a-z][a-z0-9-]{0,40}$/;
 const surfaces: Field<readonly Surface[]> = {
   name: "isovalue",
   write: value => value.map(s => `${s.value}:${s.color}:${s.opacity}`).join(","),
@@ -79,6 +79,7 @@ const regions: Field<readonly Region[]> = {
     return read && read.length <= MOST_REGIONS ? read : undefined;
   },
 };
+const decoded = (text: string): string => { try { return decodeURIComponent(text); } catch { return ""; } };
 const map: Field<ColorMap> = {
   name: "function",
   write: value => [encodeURIComponent(value.name), value.colors.map(p => [p.x, p.r, p.g, p.b].join(",")).join(";"),
@@ -93,7 +94,7 @@ const map: Field<ColorMap> = {
     });
     const areas = regionText ? regions.read(regionText) : [];
     if (!colors || !opacities || !areas || (areas.length === 0 && (colors.length === 0 || opacities.length === 0))) return undefined;
-    const map = { name: decodeURIComponent(name ?? ""), colors, opacities, ...(areas.length > 0 && { regions: areas }) };
+    const map = { name: decoded(name ?? ""), colors, opacities, ...(areas.length > 0 && { regions: areas }) };
     if (!materialText) return map;
     const texts = materialText.split(",");
     return { ...map, material: Object.fromEntries(MATERIAL.flatMap((each, i) => { const n = texts[i] ? number(texts[i] as string) : undefined; return n === undefined ? [] : [[each, n]]; })) };
@@ -108,6 +109,10 @@ const each = <T>(name: string, key: RegExp, { write, read }: Pick<Field<T>, "wri
   },
 });
 const share = within("", () => [0, 1]);
+const transfer: Field<string | ColorMap> = { // a list's own marks stay apart from those of a function
+  name: "", write: value => (typeof value === "string" ? value : encodeURIComponent(map.write(value))),
+  read: value => (NAME.test(value) ? value : map.read(decoded(value))),
+};
 const CHANNEL = /^[^,=]+$/, NO_CHANNEL = "none";
 const channels: Field<readonly string[]> = {
   name: NAMES.channels, write: value => value.join(",") || NO_CHANNEL,
@@ -136,7 +141,6 @@ const path: Field<readonly KeyFrame[]> = {
   },
 };
 
-const NAME = /^[a-z][a-z0-9-]{0,40}$/;
 type Named = Omit<State, "parameters">; // whose own names are those of their fields
 const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   dataset: text("dataset", /^.{0,256}$/),
@@ -147,9 +151,8 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
-  labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: each("label-opacity", /^\d+$/, share),
-  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
-  channels: nullable(channels), channelColors: each(NAMES.channelColors, CHANNEL, text("", COLOR)), channelRanges: each(NAMES.channelRanges, CHANNEL, range("")),
+  labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelSurface: oneOf("label-surface", "blocky", "smooth"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: each("label-opacity", /^\d+$/, share),
+  overlay: flag("overlay"), channels: nullable(channels), channelTransfers: each(NAMES.channelTransfers, CHANNEL, transfer), channelColors: each(NAMES.channelColors, CHANNEL, text("", COLOR)), channelRanges: each(NAMES.channelRanges, CHANNEL, range("")),
   channelGammas: each(NAMES.channelGammas, CHANNEL, within("", () => GAMMAS)), channelOpacities: each(NAMES.channelOpacities, CHANNEL, share), blend: oneOf(NAMES.blend, "auto", "add", "over", "max"),
   time: text(NAMES.time, /^(last|\d{1,9}|[\d.]+[a-zµ]{1,3})$/),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
@@ -171,9 +174,16 @@ export function fragmentOf(state: State): string {
   return parts.join("&");
 }
 
+// Short forms: overlay-range=3:8 says channel-range=overlay=3:8. In older links the function "one-color" stands beside a colour.
+const OF_OVERLAY = { transfer: NAMES.channelTransfers, range: NAMES.channelRanges, weight: NAMES.channelOpacities, color: NAMES.channelColors };
+
 // What is wrong or missing has its first value.
 export function stateOf(fragment: string): State {
   const given = new URLSearchParams(fragment.replace(/\+/g, "%2B"));
+  for (const [short, whole] of Object.entries(OF_OVERLAY)) {
+    const value = given.get(`overlay-${short}`);
+    if (value !== null && value !== "one-color") given.set(whole, [given.get(whole), `${OVERLAY.key}=${value}`].filter(Boolean).join(","));
+  }
   const state: State = { ...INITIAL, parameters: parametersIn(given) };
   const take = <K extends keyof Named>(key: K): void => {
     const value = given.get(FIELDS[key].name);

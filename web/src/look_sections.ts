@@ -1,8 +1,8 @@
 // Sections of the panel: renderer, isosurfaces, light and background.
 import { axesOf } from "./camera";
 import { takesFunction } from "./channels";
-import type { Context } from "./context";
-import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, slider, toggle } from "./controls";
+import { type Context, follow } from "./context";
+import { button, choice, colorField, iconButton, numberField, parameterField, row, rows, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
 import { automaticRenderer, can, limitsOf, type Offer, parametersOf, renderers, titleOf, titlesThatCan, turnTo, words } from "./offers";
 import { projectionOf } from "./options";
@@ -42,7 +42,8 @@ function parameterRows(store: Store): { element: HTMLElement; set(state: State):
   };
 }
 
-export function renderingSection({ store, volume, onVolume }: Context): HTMLElement {
+export function renderingSection(context: Context): HTMLElement {
+  const { store, volume } = context;
   const renderer = choice("Renderer", rendererChoices(false), value => store.update({ renderer: value }, "renderer"));
   const parameters = parameterRows(store);
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
@@ -61,23 +62,8 @@ export function renderingSection({ store, volume, onVolume }: Context): HTMLElem
     background.set(state.background);
     shadingRow.hidden = !can("lights", state.renderer);
   };
-  store.subscribe(update, [...LOOK, "projection"]);
-  onVolume(update);
-  update();
+  follow(context, [...LOOK, "projection"], update);
   return section("Rendering", true, renderer.element, parameters.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
-}
-
-// Rows of a list in the state, made anew only when their number changes, so that the focus stays.
-function rows<T>(make: (index: number) => { element: HTMLElement; set(item: T): void }): { element: HTMLElement; set(items: readonly T[]): void } {
-  const element = h("div", { class: "list" });
-  let made: { element: HTMLElement; set(item: T): void }[] = [];
-  return {
-    element,
-    set: items => {
-      if (made.length !== items.length) { made = items.map((_, i) => make(i)); element.replaceChildren(...made.map(each => each.element)); }
-      items.forEach((item, i) => made[i]?.set(item));
-    },
-  };
 }
 
 const without = <T>(list: readonly T[], index: number): T[] => list.filter((_, i) => i !== index);
@@ -119,9 +105,7 @@ export function surfacesSection(context: Context): HTMLElement {
     hint.hidden = surfaces.length === 0 || can("isosurfaces", renderer);
     addButton.disabled = surfaces.length >= MOST_SURFACES;
   };
-  store.subscribe(update, LOOK);
-  context.onVolume(update);
-  update();
+  follow(context, LOOK, update);
   return element;
 }
 
@@ -168,8 +152,6 @@ export function lightSection(context: Context): HTMLElement {
     hint.hidden = !lit || lights.length > 0;
     for (const child of adders.children) (child as HTMLButtonElement).disabled = lights.length >= MOST_LIGHTS;
   };
-  store.subscribe(update, LOOK);
-  context.onVolume(update);
-  update();
+  follow(context, LOOK, update);
   return element;
 }

@@ -7,7 +7,7 @@ import { ChannelRanges } from "./channel_ranges";
 import { takesFunction } from "./channels";
 import { channelsSection } from "./channels_section";
 import { clipSection } from "./clip_section";
-import type { Context } from "./context";
+import { type Context, follow } from "./context";
 import { openSection, section, toggle } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h, putText } from "./dom";
@@ -18,7 +18,7 @@ import { keepView, keyFramesSection } from "./key_frames";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
 import { Labels } from "./labels";
-import { layersSection } from "./layers_section";
+import { labelsSection } from "./labels_section";
 import { lightSection, renderingSection, surfacesSection } from "./look_sections";
 import { Machine } from "./machine";
 import { MEASURE_KINDS, type MeasureKind } from "./measure";
@@ -74,7 +74,7 @@ class Page {
     const { store, notices, api } = this;
     const context: Context = this.context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
     const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
-    const labels = new Labels(context), layers = layersSection(context, labels);
+    const labels = new Labels(context);
     const histograms = new Histograms(context), ranges = new ChannelRanges(context, histograms);
     this.player = new Player(context);
     this.measuring = new Measuring(context);
@@ -88,7 +88,7 @@ class Page {
     store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
     bar.set(store.state.colorBar);
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
-    this.shell.panel.append(channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
+    this.shell.panel.append(channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
       drawn: ({ frame: { header, view } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); },
@@ -96,10 +96,7 @@ class Page {
     });
     this.shell.panes.append(this.viewer.pane.element);
     this.slices = new Slices(context, this.shell.panes, this.measuring, ranges, at => this.pointed.atPoint(at));
-    const showFunctions = (): void => { functions.hidden = !can("transfer", store.state.renderer) || !takesFunction(store.state); };
-    store.subscribe(showFunctions, LOOK);
-    context.onVolume(showFunctions);
-    showFunctions();
+    follow(context, LOOK, () => { functions.hidden = !can("transfer", store.state.renderer) || !takesFunction(store.state); });
     listenToKeys(() => this.keyGroups(), () => store.undo(), () => store.redo());
     store.subscribe((state, before) => {
       if (state.dataset !== before.dataset) this.forgetVolume();

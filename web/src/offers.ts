@@ -56,7 +56,7 @@ export function noteDataset(dataset: Dataset | undefined, cautious: boolean): vo
   shown = dataset?.state === "ready" ? dataset : cautious ? { name: "", state: "unloaded" } : null;
 }
 export const shownDataset = (): Dataset | null => shown;
-export const hasLayer = (name: "labels" | "overlay"): boolean => shown === null || Number(shown.layers?.[name] ?? 0) > 0;
+export const hasLabels = (): boolean => shown === null || Number(shown.layers?.labels ?? 0) > 0;
 
 // The renderer, or the automatic one if it draws cells and the dataset has none.
 export function fitting(renderer: string): string {

@@ -2,13 +2,11 @@
 import type { Options } from "./api";
 import { channelOptions } from "./channels";
 import { boxText, slopeText } from "./link";
-import { can, fitting, hasLayer, hasRegions, parametersOf } from "./offers";
-import { ONE_COLOR, type State } from "./state";
+import { can, fitting, hasLabels, hasRegions, parametersOf } from "./offers";
+import type { State } from "./state";
 import { timeOptions } from "./times";
-import { rampTo, toParaView } from "./transfer";
+import { toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
-
-const WHOLE_RANGE = "0%:99.9%"; // a few bright voxels darken nothing
 
 // The automatic function stands in for regions that the renderer does not show.
 function functionOf({ map, preset, renderer }: State): unknown {
@@ -27,17 +25,10 @@ function transferOptions(state: State): Options {
 function labelOptions(state: State, opacities: boolean): Options {
   const options: Options = { "label-mode": state.labels };
   if (state.labels !== "surface") options["label-tint"] = state.labelTint;
+  else if (state.labelSurface === "smooth" && can("smooth-labels", state.renderer)) options["label-surface"] = "smooth";
   if (state.labelsShown) options["labels-shown"] = state.labelsShown;
   const each = Object.entries(state.labelOpacities);
   if (opacities && each.length > 0) options["label-opacity"] = each.map(([label, opacity]) => `${label}=${opacity}`).join(",");
-  return options;
-}
-
-function overlayOptions(state: State): Options {
-  const one = state.overlayPreset === ONE_COLOR;
-  const options: Options = { "overlay-transfer": one ? toParaView(rampTo(state.overlayColor)) : state.overlayPreset, "overlay-weight": state.overlayWeight };
-  if (state.overlayRange) options["overlay-range"] = state.overlayRange.join(":");
-  else if (one) options["overlay-range"] = WHOLE_RANGE;
   return options;
 }
 
@@ -63,19 +54,17 @@ export function renderOptions(state: State): Options {
   const surfaces = can("isosurfaces", renderer) ? state.surfaces : [], look: Options = {};
   if (surfaces.length > 0) look["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
   if (can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(look, transferOptions(state));
-  Object.assign(options, channelOptions(state, look), timeOptions(state));
+  Object.assign(options, channelOptions(state, look, can("fields", renderer)), timeOptions(state));
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
-  if (state.labels !== "off" && hasLayer("labels") && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
-  if (state.overlay && hasLayer("overlay") && can("overlay", renderer)) Object.assign(options, overlayOptions(state));
+  if (state.labels !== "off" && hasLabels() && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
   return options;
 }
 
 export function sliceOptions(state: State, plane: string, at: Vec3): Options {
   const window: Options = state.window !== null && state.level !== null ? { window: state.window, level: state.level } : {};
-  const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background, ...channelOptions(state, window), ...timeOptions(state) };
-  if (state.labels !== "off" && hasLayer("labels")) Object.assign(options, labelOptions(state, false));
-  if (state.overlay && hasLayer("overlay")) Object.assign(options, overlayOptions(state));
+  const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background, ...channelOptions(state, window, true), ...timeOptions(state) };
+  if (state.labels !== "off" && hasLabels()) Object.assign(options, labelOptions(state, false));
   return options;
 }

@@ -1,6 +1,6 @@
 // Section of the panel: the cross-hair and the window of the slices, by numbers and by names.
 import { takesFunction } from "./channels";
-import type { Context } from "./context";
+import { type Context, follow } from "./context";
 import { choice, numberField, optionalField, section } from "./controls";
 import { h } from "./dom";
 import { namedWindows, words } from "./offers";
@@ -38,8 +38,6 @@ export function slicesSection(context: Context): HTMLElement {
     window.set(state.window);
     level.set(state.level);
   };
-  store.subscribe(update, ["layout", "crosshair", "window", "level", "channels"]);
-  context.onVolume(update);
-  update();
+  follow(context, ["layout", "crosshair", "window", "level", "channels"], update);
   return element;
 }

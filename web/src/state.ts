@@ -14,8 +14,6 @@ export interface KeyFrame extends Viewpoint { lookAt: Vec3 }
 
 export const MOST_KEY_FRAMES = 100;
 
-export const ONE_COLOR = "one-color"; // instead of a preset: from clear to this colour
-
 export interface State extends Viewpoint {
   dataset: string;
   projection: "orthographic" | "perspective";
@@ -39,15 +37,13 @@ export interface State extends Viewpoint {
   clipMode: "keep" | "cut-away";
   labels: "off" | "tint" | "highlight" | "surface";
   labelTint: number;
+  labelSurface: "blocky" | "smooth"; // of labels that are "surface"
   labelsShown: string; // as 1,5-9,Precentral_L,Temporal_*; empty: all
   labelOpacities: Readonly<Record<string, number>>;
-  overlay: boolean;
-  overlayPreset: string; // or ONE_COLOR
-  overlayColor: string;
-  overlayRange: readonly [number, number] | null;
-  overlayWeight: number;
-  // Channels, by number or name. Those that a record does not name look as the dataset says.
+  overlay: boolean; // it shows
+  // Channels, by number or name, and the overlay. Those that a record does not name look as the dataset says.
   channels: readonly string[] | null; // which show; null: as the dataset says
+  channelTransfers: Readonly<Record<string, string | ColorMap>>; // presets, or functions, instead of colour and gamma
   channelColors: Readonly<Record<string, string>>;
   channelRanges: Readonly<Record<string, readonly [number, number]>>;
   channelGammas: Readonly<Record<string, number>>;
@@ -76,17 +72,16 @@ export const INITIAL: State = {
   renderer: "", parameters: {}, shading: "phong", lights: [], shadows: 0, ambientOcclusion: 0, background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
-  labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
-  overlay: false, overlayPreset: "auto", overlayColor: "#ff4fd8", overlayRange: null, overlayWeight: 1,
-  channels: null, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
+  labels: "off", labelTint: 0.5, labelSurface: "blocky", labelsShown: "", labelOpacities: {},
+  overlay: false, channels: null, channelTransfers: {}, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
   layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
   marker: true, scaleBar: true, colorBar: false, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.
 export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
-  "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
-  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "channels", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "measures", "path"] as const;
+  "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelSurface", "labelsShown", "labelOpacities", "overlay",
+  "channels", "channelTransfers", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "measures", "path"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
 

@@ -69,12 +69,6 @@ export function ramp(low: number, high: number): ColorMap {
   };
 }
 
-// From clear and dark to a colour.
-export function rampTo(color: string): ColorMap {
-  const [r, g, b] = rgbOf(color);
-  return { name: color, colors: [{ x: 0, r: 0, g: 0, b: 0 }, { x: 1, r, g, b }], opacities: [{ x: 0, y: 0, mid: 0.5, sharp: 0 }, { x: 1, y: 1, mid: 0.5, sharp: 0 }] };
-}
-
 export function toParaView(map: ColorMap): object[] {
   const curves = { ColorSpace: "RGB", RGBPoints: map.colors.flatMap(p => [p.x, p.r, p.g, p.b]), Points: map.opacities.flatMap(p => [p.x, p.y, p.mid, p.sharp]) };
   return [{ Name: map.name, ...(map.regions ? { Regions: writeRegions(map.regions) } : curves), ...(map.material && { Material: map.material }) }];

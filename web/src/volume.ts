@@ -1,14 +1,14 @@
 // What the page knows of the dataset that it shows.
 import type { Dataset, Level } from "./api";
-import { type Channel, channelsOf } from "./channels";
+import { type Channel, channelsOf, hasOverlay, OVERLAY } from "./channels";
 import { Session } from "./session";
 import { add, rounded, scale, type Vec3 } from "./vec";
 
 export interface Volume {
   name: string; size: Vec3; spacing: Vec3; extent: Vec3; centre: Vec3; low: Vec3; high: Vec3; // extent, low, high: of the world
-  range: readonly [number, number]; type: string; memoryBytes: number; world: string; unit: string; labels: number; overlay: boolean; cells: number;
+  range: readonly [number, number]; type: string; memoryBytes: number; world: string; unit: string; labels: number; cells: number;
   levels: readonly Level[]; // finest first, at least one
-  channels: readonly Channel[]; // none, if there is one
+  channels: readonly Channel[]; // none, if there is one; and the overlay
 }
 
 export function volumeOf(dataset: Dataset, centre: Vec3, world: string, unit: string): Volume | null {
@@ -18,8 +18,8 @@ export function volumeOf(dataset: Dataset, centre: Vec3, world: string, unit: st
   return {
     name: dataset.name, size, spacing, extent, centre, low: add(centre, scale(extent, -0.5)), high: add(centre, scale(extent, 0.5)),
     range: [range.min, range.max], type: dataset.type ?? "", memoryBytes: dataset.memory_bytes ?? 0, world, unit,
-    labels: Number(dataset.layers?.labels ?? 0), overlay: dataset.layers?.overlay ?? false, cells: dataset.cells ?? 0,
-    levels: dataset.levels ?? [], channels: channelsOf(dataset),
+    labels: Number(dataset.layers?.labels ?? 0), cells: dataset.cells ?? 0,
+    levels: dataset.levels ?? [], channels: [...channelsOf(dataset), ...(hasOverlay(dataset) ? [OVERLAY] : [])],
   };
 }
 

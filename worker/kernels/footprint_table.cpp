@@ -1,6 +1,5 @@
 #include "worker/kernels/footprint_table.h"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 

@@ -8,11 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "common/classification/region_table.h"
 #include "common/memory/aligned_buffer.h"

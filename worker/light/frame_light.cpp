@@ -1,7 +1,6 @@
 #include "worker/light/frame_light.h"
 
 #include <algorithm>
-#include <cmath>
 #include <mutex>
 #include <optional>
 #include <span>

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <ranges>
 #include <string>
-#include <utility>
 
 #include "common/base/check.h"
 

@@ -2,10 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
-#include <optional>
-#include <set>
 #include <utility>
 
 #include "common/planning/frame_occlusion.h"

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <numeric>
 #include <unordered_set>
-#include <utility>
 
 #include "common/parallel/parallel.h"
 #include "common/parallel/per_thread.h"

@@ -1,8 +1,6 @@
 #include "worker/service/executor.h"
 
 #include <algorithm>
-#include <array>
-#include <string>
 #include <utility>
 
 #include "common/base/check.h"

@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <optional>
 #include <random>
 #include <span>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -24,7 +22,6 @@
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
 #include "common/wire/other_version.h"
-#include "worker/service/executor.h"
 #include "worker/service/images_endpoint.h"
 #include "worker/service/peer_sockets.h"
 #include "worker/service/picture_sockets.h"

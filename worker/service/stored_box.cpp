@@ -1,9 +1,7 @@
 #include "worker/service/stored_box.h"
 
 #include <algorithm>
-#include <span>
 #include <string>
-#include <utility>
 
 #include "common/base/check.h"
 

@@ -64,22 +64,22 @@ AnalyticCost CostOf(const CostBasis& basis) {
 class RaycastKind : public RendererKind {
  public:
   RaycastKind()
-      : RendererKind(
-            {.name = "raycast",
-             .title = "ray casting",
-             .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
-             .reach = kRayReach,
-             .derived_from_stored = kRayDerived,
-             .opacity_by_value = true,
-             .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels, Ability::kOverlay,
-                           Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions, Ability::kFields},
-             .parameters = {SamplingRate(kSamplesAVoxel),
-                            {.name = "jitter",
-                             .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "
-                                        "fixed pattern: rings become a fine grain",
-                             .standard = 0,
-                             .least = 0,
-                             .most = 1}}}) {}
+      : RendererKind({.name = "raycast",
+                      .title = "ray casting",
+                      .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
+                      .reach = kRayReach,
+                      .derived_from_stored = kRayDerived,
+                      .opacity_by_value = true,
+                      .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
+                                    Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions,
+                                    Ability::kFields, Ability::kSmoothLabels},
+                      .parameters = {SamplingRate(kSamplesAVoxel),
+                                     {.name = "jitter",
+                                      .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "
+                                                 "fixed pattern: rings become a fine grain",
+                                      .standard = 0,
+                                      .least = 0,
+                                      .most = 1}}}) {}
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);

@@ -1,5 +1,4 @@
 // The planning half of multi-pass shears: the frame is the picture, supersampled where it is minified; images blend front to back.
-#include <algorithm>
 
 #include "common/calibration/calibration.h"
 #include "common/renderers/interpolated_table.h"

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include "client/cli/option_groups.h"
 #include "common/cli/add_option.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/splat_loops.h"

@@ -1,5 +1,5 @@
 // Colour bars and legends: where they stand, what colours they have, and that pictures side by side have annotations of their own.
-#include "client/pictures/picture_key.h"
+#include "common/classification/picture_key.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "client/pictures/annotations.h"
+#include "client/pictures/picture_labels.h"
 
 namespace slabstream {
 namespace {
@@ -49,7 +51,10 @@ KeyDrawing DrawKey(const Annotations& annotations, const PictureKey& key, const 
   return drawing;
 }
 
-PictureKey::Bar RedToBlue() { return {.colors = {{-100, {1, 0, 0}}, {300, {0, 0, 1}}}, .low = -100, .high = 300}; }
+PictureKey::Bar RedToBlue() { return {.name = "volume", .colors = {{-100, {1, 0, 0}}, {300, {0, 0, 1}}}}; }
+
+// A channel: from black to its colour.
+PictureKey::Bar Ramp(const std::string& name, const Rgb& color) { return {.name = name, .colors = {{0, {0, 0, 0}}, {100, color}}}; }
 
 TEST(TicksOf, AreRoundNumbersInTheRange) {
   EXPECT_THAT(TicksOf(0, 1), ElementsAre(0, 0.2, 0.4, 0.6, 0.8, 1));
@@ -66,7 +71,7 @@ TEST(TicksOf, AreRoundNumbersInTheRange) {
 }
 
 TEST(ColorBar, StandsOnTheRightWithTheGreatestValueOnTop) {
-  const KeyDrawing drawing = DrawKey({.color_bar = ""}, {.bar = RedToBlue(), .entries = {}});
+  const KeyDrawing drawing = DrawKey({.color_bar = ""}, {.bars = {RedToBlue()}, .entries = {}});
   EXPECT_FALSE(drawing.AnyIn(0, 200));
   int first = kKeySize.height, last = 0;
   const int x = kKeySize.width - 12;  // inside of the bar
@@ -83,7 +88,7 @@ TEST(ColorBar, StandsOnTheRightWithTheGreatestValueOnTop) {
     EXPECT_NEAR(b, 1 - share, 0.02);
   }
   EXPECT_FALSE(DrawKey({.color_bar = ""}, {}).AnyIn(0, kKeySize.width)) << "there is nothing to show";
-  EXPECT_FALSE(DrawKey({}, {.bar = RedToBlue(), .entries = {}}).AnyIn(0, kKeySize.width)) << "nobody asked for it";
+  EXPECT_FALSE(DrawKey({}, {.bars = {RedToBlue()}, .entries = {}}).AnyIn(0, kKeySize.width)) << "nobody asked for it";
 }
 
 TEST(Legend, NamesWhatThereIsRoomFor) {
@@ -95,6 +100,69 @@ TEST(Legend, NamesWhatThereIsRoomFor) {
   EXPECT_GT(green, 20);
   EXPECT_LT(green, 120);
   EXPECT_FALSE(drawing.AnyIn(kKeySize.width / 2, kKeySize.width));
+}
+
+const std::array<Rgb, 4> kKeyColors = {{{1, 0, 1}, {0, 1, 0}, {0, 1, 1}, {1, 1, 0}}};
+
+PictureKey KeyOfChannels(int count, const std::string& name = "Actin") {
+  PictureKey key;
+  for (int i = 0; i < count; ++i) key.bars.push_back(Ramp(name, kKeyColors[std::size_t(i) % kKeyColors.size()]));
+  return key;
+}
+
+// Which channels' colours a column of pixels shows, nearly as bright as they are, from top to bottom; each once where it is many pixels.
+std::vector<int> ChannelsIn(const KeyDrawing& drawing, int x) {
+  std::vector<int> found;
+  for (int y = 0; y < drawing.size.height; ++y) {
+    const auto [r, g, b] = drawing.At(x, y);
+    for (int i = 0; i < 4; ++i) {
+      const Rgb& color = kKeyColors[std::size_t(i)];
+      const bool same = std::abs(r - color.r) + std::abs(g - color.g) + std::abs(b - color.b) < 0.25F;
+      if (same && (found.empty() || found.back() != i)) found.push_back(i);
+    }
+  }
+  return found;
+}
+
+TEST(ColorBars, OfSeveralFieldsStandOneBelowTheOtherInTheirOrder) {
+  const ImageSize size = {300, 400};
+  const auto bars = [&](int count) {
+    return ChannelsIn(DrawKey({.color_bar = ""}, KeyOfChannels(count), {{}}, size), size.width - 12);  // inside of the bars
+  };
+  EXPECT_THAT(bars(2), ElementsAre(0, 1));
+  EXPECT_THAT(bars(4), ElementsAre(0, 1, 2, 3));
+  const std::vector<int> many = bars(16);
+  EXPECT_GE(many.size(), 4U);
+  EXPECT_LT(many.size(), 16U) << "as many as can be read, and how many more there are";
+}
+
+TEST(Legend, HasARowForEachFieldIfThereAreSeveral) {
+  const ImageSize size = {300, 400};
+  const int right_end = 31;  // of the colours, where the greatest values are
+  const auto rows = [&](const PictureKey& key) { return ChannelsIn(DrawKey({.legend = true}, key, {{}}, size), right_end); };
+  EXPECT_THAT(rows(KeyOfChannels(4)), ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(rows(KeyOfChannels(16)).size(), 16U);
+  EXPECT_FALSE(DrawKey({.legend = true}, KeyOfChannels(1), {{}}, size).AnyIn(0, size.width)) << "there is nothing to tell apart";
+  PictureKey with_label = KeyOfChannels(2);
+  with_label.entries = {{"Nucleus", kKeyColors[3]}};
+  EXPECT_THAT(ChannelsIn(DrawKey({.legend = true}, with_label, {{}}, size), 8), ElementsAre(3)) << "its swatch is narrower";
+}
+
+TEST(Legend, LongNamesEndBeforeTheEdgeAndBeforeColourBars) {
+  const std::string name(60, 'W');
+  for (const int width : {120, 200, 300, 900}) {
+    const ImageSize size = {width, 300};
+    const KeyDrawing legend = DrawKey({.legend = true}, KeyOfChannels(3, name), {{}}, size);
+    EXPECT_FALSE(legend.AnyIn(width - 3, width)) << width;
+    const KeyDrawing bars = DrawKey({.color_bar = ""}, KeyOfChannels(3, name), {{}}, size);
+    EXPECT_FALSE(bars.AnyIn(0, 3) || bars.AnyIn(width - 3, width)) << width;
+  }
+  const ImageSize size = {300, 300};
+  const KeyDrawing bars = DrawKey({.color_bar = ""}, KeyOfChannels(2, "A"), {{}}, size);
+  const KeyDrawing both = DrawKey({.color_bar = "", .legend = true}, {KeyOfChannels(2, "A").bars, {{name, {1, 0, 0}}}}, {{}}, size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 265; x < size.width; ++x) ASSERT_EQ(both.At(x, y), bars.At(x, y)) << x << ", " << y;
+  }
 }
 
 TEST(Panes, HaveSidesAndBarsOfTheirOwn) {

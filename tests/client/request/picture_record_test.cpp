@@ -89,6 +89,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--transfer", "gray-ramp", "--scalar-range=-5.5:100"},
     {"--renderer", "raycast", "--label-mode", "tint"},
     {"--renderer", "raycast", "--label-mode", "surface", "--label-opacity", "3=0.30000000000000004,7=0", "--labels-shown", "1,5-9"},
+    {"--renderer", "raycast", "--label-mode", "surface", "--label-surface", "smooth"},
     {"--renderer", "raycast", "--label-mode", "highlight", "--labels-shown", "Temporal_*,7,H\xC3\xB6hle ?"},
     {"--renderer", "raycast", "--label-tint", "0.1", "--overlay-transfer", "gray-ramp", "--overlay-range=-3:1e-3", "--overlay-weight",
      "0.5"},
@@ -154,6 +155,27 @@ TEST(PictureRecordTest, ATransferFunctionOfAFileIsKeptWhole) {
   const PictureRecord record = RecordOf(typed);
   ExpectSamePicture(record, typed);
   EXPECT_EQ(Joined(RenderArguments(record, "b.png")), "render brain --transfer color-map.json -o b.png");
+}
+
+TEST(PictureRecordTest, OfSlabstream01AnOverlayIsAField) {
+  const PictureRecord record =
+      RecordOf(Parse({"-o", "a.png", "brain", "--renderer", "raycast", "--overlay-range", "3:8", "--channel-gamma", "0=2"}));
+  Json old = record.json;
+  old["request"]["fields"] = Json::array();
+  for (Json look : record.json["request"]["fields"]) {
+    const bool overlay = look["field"] == "overlay";
+    if (overlay) look.erase("field");
+    if (overlay) old["request"]["overlay"] = look;
+    if (!overlay) old["request"]["fields"].push_back(look);
+  }
+  ASSERT_TRUE(old["request"].contains("overlay"));
+  const Result<PictureRecord> read = ParseRecord(old.dump());
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_THAT(read->request.fields, testing::UnorderedElementsAreArray(record.request.fields));
+  for (const char* wrong : {"7", "[]", R"({"weight": "x"})"}) {
+    old["request"]["overlay"] = Json::Parse(wrong).value();
+    EXPECT_FALSE(ParseRecord(old.dump()).ok()) << wrong;
+  }
 }
 
 TEST(PictureRecordTest, TheTextIsAsciiAndNamesNoPlace) {

@@ -80,9 +80,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"label-tint", {"0.25", {}}},
     {"label-opacity", {"3=0.5", {}}},
     {"labels-shown", {"1,5-9", {}}},
-    {"overlay-transfer", {"gray-ramp", {}}},
-    {"overlay-range", {"-1:2", {}}},
-    {"overlay-weight", {"0.5", {}}},
+    {"label-surface", {"smooth", {}}},
     {"channel", {"0,Actin", {}}},
     {"channel-transfer", {"0=viridis", {}}},
     {"channel-color", {"0=0,1,0,Actin=1,0,1", {}}},
@@ -188,14 +186,12 @@ TEST(RequestOptionsTest, EveryOptionReachesRequestRecordAndKey) {
 
 // A renderer makes the picture of an option if it has the ability that the schema names, or the parameter; the service chooses by the same.
 TEST(RequestOptionsTest, AbilitiesOfTheSchemaDecideWhichRenderersCanDoIt) {
-  const std::map<std::string, std::string> by_value = {{"projection", "perspective"}};  // the value that kOthers has needs it
+  const std::map<std::string, std::string> by_value = {{"projection", "perspective"},
+                                                       {"label-surface", "smooth-labels"}};  // the value that kOthers has needs it
   for (const RequestOption& option : RequestOptions()) {
     if (!IsCompared(option) || option.path == "renderer") continue;
-    const bool labels = option.path.starts_with("labels."), overlay = option.path.starts_with("overlay.");
-    const std::string ability = labels                           ? "labels"
-                                : overlay                        ? "overlay"
-                                : by_value.contains(option.name) ? by_value.at(option.name)
-                                                                 : option.ability;
+    const bool labels = option.path.starts_with("labels.");
+    const std::string ability = by_value.contains(option.name) ? by_value.at(option.name) : labels ? "labels" : option.ability;
     FrameRequest request = Standard();
     ASSERT_TRUE(SetOption(option, option.name, std::vector{kOthers.at(option.name).first}, ColorMaps::kTexts, request).ok());
     for (const RendererKind* kind : Renderers()) {
@@ -263,10 +259,8 @@ TEST(RequestOptionsTest, WhatIsLeftOutHasItsStandardValue) {
   bare.set_dataset("head");
   EXPECT_EQ(Received(bare), Standard());
   bare.mutable_labels();
-  bare.mutable_overlay();
   bare.set_renderer("raycast");
   EXPECT_EQ(Received(bare).labels, LabelChoice());
-  EXPECT_EQ(Received(bare).overlay, OverlayChoice());
   for (const RequestOption& option : RequestOptions()) {
     if (!IsCompared(option)) continue;
     SCOPED_TRACE(option.name);
@@ -278,7 +272,6 @@ TEST(RequestOptionsTest, WhatIsLeftOutHasItsStandardValue) {
     holder->GetReflection()->ClearField(holder, field);
     FrameRequest expected = Asked(option, false);
     if (option.path.starts_with("labels.") && !expected.labels) expected.labels.emplace();
-    if (option.path.starts_with("overlay.") && !expected.overlay) expected.overlay.emplace();
     EXPECT_EQ(Received(message), expected);
   }
 }
@@ -289,7 +282,6 @@ TEST(RequestOptionsTest, StandardTextsOfTheSchemaAreThoseOfTheStruct) {
     SCOPED_TRACE(option.name);
     FrameRequest request = Asked(option, false), unchanged = request;
     if (option.path.starts_with("labels.") && !unchanged.labels) unchanged.labels.emplace();
-    if (option.path.starts_with("overlay.") && !unchanged.overlay) unchanged.overlay.emplace();
     EXPECT_TRUE(SetOption(option, option.name, std::vector{option.standard}, ColorMaps::kTexts, request).ok());
     EXPECT_EQ(request, unchanged);
   }
@@ -318,7 +310,7 @@ TEST(RequestOptionsTest, LooksOfChannelsAreMergedByName) {
   EXPECT_EQ(looks["2"].color, (Rgb{1, 0.5F, 0}));
   EXPECT_EQ(std::get<TransferFunction>(looks["4"].choice).colors.size(), 2U);
   EXPECT_EQ(std::get<std::string>(looks["5"].choice), "viridis");
-  EXPECT_THAT(TextsOf(*FindRequestOption("channel-transfer"), asked->frame), testing::ElementsAre("4=channel-map.json,5=viridis"));
+  EXPECT_THAT(TextsOf(*FindRequestOption("channel-transfer"), asked->frame), testing::ElementsAre("4=channel-map-1.json,5=viridis"));
 }
 
 TEST(RequestOptionsTest, TextsOfChannelsHoldWhatTheyShow) {
@@ -336,6 +328,42 @@ TEST(RequestOptionsTest, TextsOfChannelsHoldWhatTheyShow) {
   }
   EXPECT_EQ(again.channels, request.channels);
   EXPECT_EQ(again.fields.size(), 3U);
+}
+
+TEST(RequestOptionsTest, ShortFormsSayHowTheOverlayLooks) {
+  const std::vector<std::array<std::string, 3>> forms = {
+      {"overlay-transfer", "channel-transfer", "hot"},
+      {"overlay-range", "channel-range", "2%:98%"},
+      {"overlay-weight", "channel-opacity", "0.25"},
+      {"overlay-transfer", "channel-transfer", R"({"RGBPoints": [0, 1, 1, 1, 9, 1, 0, 0]})"}};
+  for (const auto& [name, whole, text] : forms) {
+    SCOPED_TRACE(name);
+    const PictureField of_dataset = {"dataset", "head"}, by_short = {name, text}, by_whole = {whole, "overlay=" + text};
+    const Result<RenderRequest> one = ParseRenderFields({of_dataset, by_short}), other = ParseRenderFields({of_dataset, by_whole});
+    ASSERT_TRUE(one.ok()) << one.status().message();
+    ASSERT_TRUE(other.ok()) << other.status().message();
+    EXPECT_EQ(one->frame, other->frame);
+    EXPECT_EQ(one->frame.fields.size(), 1U);
+    EXPECT_THAT(ParseRenderFields({of_dataset, by_short, by_whole}).status().message(), HasSubstr("names 'overlay' twice"));
+    EXPECT_THAT(ParseSliceFields({of_dataset, {"plane", "z"}, by_short}).value().frame.fields, one->frame.fields);
+  }
+  EXPECT_THAT(ParseRenderFields({{"dataset", "head"}, {"overlay-weight", "7"}}).status().message(),
+              HasSubstr("--overlay-weight overlay: 7 is out of range [0, 1]"));
+}
+
+TEST(RequestOptionsTest, EachOwnFunctionHasAFile) {
+  const std::string map = R"({"RGBPoints": [0, 1, 1, 1, 9, 1, 0, 0]})";
+  const Result<RenderRequest> asked =
+      ParseRenderFields({{"dataset", "head"}, {"channel-transfer", "a=hot,b=" + map + ",c=" + map}, {"transfer", map}});
+  ASSERT_TRUE(asked.ok()) << asked.status().message();
+  const std::map<std::string, std::string> files = MapFilesOf(asked->frame);
+  EXPECT_THAT(files, testing::UnorderedElementsAre(testing::Key("color-map.json"), testing::Key("channel-map-2.json"),
+                                                   testing::Key("channel-map-3.json")));
+  EXPECT_THAT(TextsOf(*FindRequestOption("channel-transfer"), asked->frame),
+              testing::ElementsAre("a=hot,b=channel-map-2.json,c=channel-map-3.json"));
+  const Result<TransferFunction> read = ParseParaViewColorMap(files.at("channel-map-3.json"), "map");
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(std::get<TransferFunction>(asked->frame.fields[2].choice), *read);
 }
 
 TEST(RequestOptionsTest, WrongTextsOfChannelsAreRefusedInOneLine) {

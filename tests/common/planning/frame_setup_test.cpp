@@ -78,7 +78,8 @@ TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   EXPECT_EQ(setup.description, summary.description);
   EXPECT_EQ(setup.range, summary.range);
   EXPECT_EQ(setup.renderer, ZBuffer());
-  EXPECT_EQ(setup.camera, MakeSupersampledCamera(request.view, request.size, summary.description.geometry));
+  EXPECT_EQ(setup.camera,
+            MakeCamera(request.view, request.size, summary.description.geometry, Least(summary.description.geometry.spacing)));
   EXPECT_EQ(setup.transfer.opacity_distance, 3);
   EXPECT_EQ(setup.shading, request.shading);
   EXPECT_EQ(setup.termination, 0.25);

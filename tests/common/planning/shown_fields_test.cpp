@@ -29,6 +29,16 @@ TEST(ShownFields, AreThoseThatTheDatasetSays) {
   EXPECT_THAT(Shown({}, dataset), ElementsAre(0, 1, 2, 3)) << "a file that shows nothing says nothing";
 }
 
+TEST(ShownFields, ALookOfTheOverlayDoesNotColourTheVolume) {
+  DatasetFields dataset = Channels(1);
+  dataset.fields.push_back({.name = "overlay", .channel = false, .shown = false});
+  const ShownFields shown = {.dataset = std::make_shared<const DatasetFields>(dataset), .others = {{.number = 1}}};
+  EXPECT_FALSE(ShowsAsChannel({}, shown).value());
+  EXPECT_FALSE(ShowsAsChannel({.fields = {{.field = "overlay", .choice = "hot"}}}, shown).value());
+  EXPECT_TRUE(ShowsAsChannel({.fields = {{.field = "0", .gamma = 2}}}, shown).value());
+  EXPECT_TRUE(ShowsAsChannel({.channels = {"0"}, .fields = {{.field = "overlay"}}}, shown).value());
+}
+
 TEST(ShownFields, AreThoseOfTheRequestByNameOrNumber) {
   DatasetFields dataset = Channels(3);
   dataset.fields[1].name = "2";  // a name counts before a number
@@ -65,6 +75,20 @@ TEST(ShownFields, ATimeIsANumberOrANumberWithAUnit) {
   for (const char* wrong : {"10", "-1", "1x", "s", "6min", "nan", "1e400s", "-20s", "0x1"}) {
     EXPECT_FALSE(TimeToShow({.time = wrong}, dataset).ok()) << wrong;
   }
+}
+
+TEST(ShownFields, AnOverlayLeavesTheLookOfTheVolumeAlone) {
+  const auto as_channel = [](const FrameRequest& request, int channels) {
+    DatasetFields dataset = Channels(channels);
+    dataset.fields.push_back({.name = "overlay", .channel = false, .shown = false});
+    const ShownAtTime shown = WhatShows(request, std::make_shared<const DatasetFields>(dataset)).value();
+    return ShowsAsChannel(request, shown.fields).value();
+  };
+  const FieldChoice overlay = {.field = "overlay", .shown = true};
+  EXPECT_FALSE(as_channel({.fields = {overlay}}, 1)) << "it is grey, not magenta";
+  EXPECT_TRUE(as_channel({.fields = {overlay, {.field = "0", .color = Rgb{0, 1, 0}}}}, 1));
+  EXPECT_TRUE(as_channel({.fields = {overlay}}, 2)) << "there are others to tell it from";
+  EXPECT_TRUE(as_channel({.fields = {overlay, {.field = "1", .shown = false}}}, 2));
 }
 
 TEST(ShownFields, LooksAreThoseOfTheRequestThenOfTheDatasetThenOfTheValues) {

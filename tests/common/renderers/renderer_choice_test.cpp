@@ -46,7 +46,7 @@ std::vector<Wish> Wishes() {
       {"shadows", [](auto& r) { r.shading.shadows = 0.5; }},
       {"ambient-occlusion", [](auto& r) { r.shading.ambient_occlusion = 0.5; }},
       {"labels", [](auto& r) { r.labels.emplace(); }},
-      {"overlay", [](auto& r) { r.overlay.emplace(); }},
+      {"smooth labels", [](auto& r) { r.labels = LabelChoice{.mode = LabelMode::kSurface, .surface = LabelSurface::kSmooth}; }},
   };
   for (const RendererKind* kind : Renderers()) {
     for (const RendererParameter& parameter : kind->parameters()) {

@@ -168,7 +168,7 @@ TEST(Camera, SupersamplesJustEnough) {
   for (int i = 0; i < 300; ++i) {
     ViewParameters view = RandomView(random);
     view.zoom = std::exp(random.Real(-4, 3));
-    const Camera camera = MakeSupersampledCamera(view, {64, 48}, kGeometry);
+    const Camera camera = MakeCamera(view, {64, 48}, kGeometry, Least(kGeometry.spacing));
     ASSERT_LT(camera.supersample, kMaxSupersample);
     EXPECT_EQ(camera.width, 64 * camera.supersample);
     EXPECT_EQ(camera.height, 48 * camera.supersample);
@@ -195,7 +195,7 @@ TEST(Camera, SupersamplingOnlyDividesPixels) {
   for (int i = 0; i < 100; ++i) {
     ViewParameters view = RandomView(random);
     view.zoom = std::exp(random.Real(-4, 1));
-    const Camera wide = MakeCamera(view, {64, 48}, kGeometry), fine = MakeSupersampledCamera(view, {64, 48}, kGeometry);
+    const Camera wide = MakeCamera(view, {64, 48}, kGeometry), fine = MakeCamera(view, {64, 48}, kGeometry, Least(kGeometry.spacing));
     EXPECT_EQ(wide.supersample, 1);
     const Vec3 point = {random.Real(-0.5, 39.5), random.Real(-0.5, 30.5), random.Real(-0.5, 16.5)};
     const auto in_wide = wide.Project(point), in_fine = fine.Project(point);
@@ -236,7 +236,7 @@ TEST(Camera, TraversesCloseSlices) {
 TEST(Camera, SupersamplingIsBounded) {
   ViewParameters view;
   view.zoom = kMinZoom;
-  const Camera camera = MakeSupersampledCamera(view, {1, 1}, {{4096, 4096, 4096}, {1, 1, 1}});
+  const Camera camera = MakeCamera(view, {1, 1}, {{4096, 4096, 4096}, {1, 1, 1}}, 1);
   EXPECT_EQ(camera.supersample, kMaxSupersample);
 }
 

@@ -157,6 +157,15 @@ TEST(OverTimes, IsThatOfTheVolumeWhereTimesAreEqual) {
   }
 }
 
+TEST(OverTimes, KeepsWhatIsRare) {
+  const auto of = [](float first) {
+    return Summarize(
+        MakeTestVolume({2, 2, 2}, ScalarType::kUint8, [=](const Index3& v) { return first + float(v.x + 2 * v.y + 4 * v.z); }));
+  };
+  const VolumeSummary over = OverTimes(of(0), std::vector{of(80), of(200)});
+  for (const int value : {0, 7, 80, 87, 200, 207}) EXPECT_GE(over.histogram.at(std::size_t(HistogramBin(over.range, value))), 1U) << value;
+}
+
 TEST(OverTimes, TakesTimesOfOneValueAndOfNone) {
   const auto of = [](float value) {
     return Summarize(MakeTestVolume({4, 4, 4}, ScalarType::kFloat32, [=](const Index3&) { return value; }));

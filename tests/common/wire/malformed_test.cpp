@@ -229,6 +229,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"shares", kMaxShares},
       {"web", kMaxWebServers},
       {"looks", kMaxFields},
+      {"bars", kMaxShownFields},
   };
   std::map<std::string, bool> seen;
   AlterEachField(
@@ -261,9 +262,9 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 18)
+  EXPECT_EQ(seen.size(), limits.size() + 20)
       << "reports and levels are in four messages, parameters, labels and fields in three; datasets, keys, isosurfaces, "
-         "gradients, opacities, traffic and labels that show in two";
+         "gradients, opacities, traffic, colors, entries and labels that show in two";
 }
 
 TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {

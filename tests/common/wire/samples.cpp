@@ -134,7 +134,8 @@ GroupAssignment WithLayers() {
                        .tint = 0,
                        .entries = {{1, {0, 0.5F, 1}, 0.25F}, {kMax64, {1, 1, 1}}},
                        .shown = {{1, 7}, {kMax64, kMax64}},
-                       .hides = true};
+                       .hides = true,
+                       .smooth = true};
   message.setup.fields = {{.levels = {{77, ids}}, .of_volume = {0}, .labels = look}};
   return message;
 }
@@ -378,7 +379,7 @@ std::vector<SubmitFrame> SamplesOf() {
   full.shading = ManyLights();
   full.termination = 0.5;
   full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
-  full.previews = full.straight8 = true;
+  full.previews = full.straight8 = full.key = true;
   FrameRequest sliced = Request();
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
   FrameRequest surfaces = Request();
@@ -388,9 +389,12 @@ std::vector<SubmitFrame> SamplesOf() {
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
   FrameRequest layers = Request();
   layers.renderer = "raycast";
-  layers.labels = LabelChoice{
-      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMax64, 0.25}}, .shown = {{1, kMax64}, {7, 7}, {.name = kUmlaut}}};
-  layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
+  layers.labels = LabelChoice{.mode = LabelMode::kSurface,
+                              .tint = 1,
+                              .opacities = {{1, 0}, {kMax64, 0.25}},
+                              .shown = {{1, kMax64}, {7, 7}, {.name = kUmlaut}},
+                              .surface = LabelSurface::kSmooth};
+  layers.fields = {{.field = "overlay", .choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5}};
   FrameRequest channels = Request();
   channels.channels = {"0", kUmlaut};
   channels.fields = {
@@ -434,11 +438,13 @@ std::vector<FrameReply> SamplesOf() {
       World::kScene, LengthUnit::kFile, Projection::kOrthographic, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {}, -7.5, 0.25};
   PictureGeometry in_metres = of_patient;
   in_metres.unit = LengthUnit::kMetre;
-  return {{1, {1, 1}, 0, 1, {{NoRuns()}}, {}, {}},
-          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}}, statistics, of_patient},
-          {kMax64, {30, 40}, 1024, 1024, {{StraightRuns()}}, statistics, of_patient},
-          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}, {SomeRuns(), true}}, whole, behind_the_eye_plane},
-          {kMax64, {30, 40}, 1024, 1024, std::vector<PictureShare>(kMaxShares, {SomeRuns(), true}), whole, in_metres}};
+  const PictureKey key = {{{kUmlaut, {{-1e300, {0, 0, 0}}, {7, {1, 0.5F, 0}}, {7, {0, 1, 1}}}}, {kLongName, {{0, {}}, {1, {1, 1, 1}}}}},
+                          {{kUmlaut, {1, 0, 0.25F}}}};
+  return {{1, {1, 1}, 0, 1, {{NoRuns()}}, {}, {}, {}},
+          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}}, statistics, of_patient, key},
+          {kMax64, {30, 40}, 1024, 1024, {{StraightRuns()}}, statistics, of_patient, {}},
+          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}, {SomeRuns(), true}}, whole, behind_the_eye_plane, {}},
+          {kMax64, {30, 40}, 1024, 1024, std::vector<PictureShare>(kMaxShares, {SomeRuns(), true}), whole, in_metres, {}}};
 }
 
 template <>

@@ -60,11 +60,6 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
        },
        "labels.shown[1].name has 257 bytes, but must have 0 to 256"},
       {[](auto& r) {
-         r.renderer = "zbuffer";
-         r.overlay.emplace();
-       },
-       "renderer is 'zbuffer', but overlay needs one of: raycast"},
-      {[](auto& r) {
          r.channels = {"a", ""};
        },
        "channels[1] has 0 bytes, but must have 1 to 256"},

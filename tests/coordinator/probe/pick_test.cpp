@@ -36,6 +36,42 @@ std::optional<Picked> PickIn(const Volume& volume, const FrameSetup& setup, doub
   return Pick(setup, {.voxels = VoxelBricks(volume.block)}, x, y);
 }
 
+TEST(Pick, SmoothSurfaceOfALabelIsHitWhereTheRayEntersIt) {
+  constexpr std::uint64_t kLabel = std::uint64_t{7} << 40;
+  const Volume ball = MakeBall({{30, 26, 34}, {1, 1.2, 0.9}});
+  const auto label = [&](const Index3& voxel) {
+    return ball.block.samples<float>()[ball.block.Offset(voxel)] > 0 ? kLabel : std::uint64_t{0};
+  };
+  VolumeDescription labels = ball.description;
+  labels.type = ScalarType::kUint64;
+  std::mt19937 random(9);
+  double error[2] = {0, 0};  // blocky, smooth
+  for (int i = 0; i < 6; ++i) {
+    SetupOptions options{.renderer = FindRenderer("raycast"), .view = RandomView(kProjections[i % 2], random)};
+    options.transfer = {.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0}}};
+    FrameSetup setup = MakeSetup(ball, options);
+    for (const bool smooth : {false, true}) {
+      setup.fields = {{.levels = {{3, labels}}, .of_volume = {0}, .labels = LabelLook{.mode = LabelMode::kSurface, .smooth = smooth}}};
+      for (int y = 2; y < 64; y += 5) {
+        for (int x = 2; x < 64; x += 5) {
+          double reach = 0;
+          const int s = setup.camera.supersample;
+          const auto truth = EntersBall(setup.camera.RayAt((x + 0.5) * s, (y + 0.5) * s), ball.description.geometry, reach);
+          const auto picked = Pick(setup, {.voxels = VoxelBricks(ball.block), .label = label}, x + 0.5, y + 0.5);
+          if (reach > 0.9 * kRadius && reach < 1.1 * kRadius) continue;
+          ASSERT_EQ(picked.has_value(), truth.has_value()) << x << ", " << y;
+          if (!truth) continue;
+          error[smooth ? 1 : 0] += std::abs(picked->depth - *truth);
+          if (smooth) {
+            EXPECT_NEAR(picked->depth, *truth, 0.7) << x << ", " << y;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_LT(error[1], 0.6 * error[0]);
+}
+
 TEST(Pick, IsosurfaceOfABallIsHitWhereTheRayEntersIt) {
   const Volume ball = MakeBall({{30, 26, 34}, {1, 1.2, 0.9}});
   for (const Projection projection : kProjections) {

@@ -11,7 +11,9 @@
 #include <span>
 
 #include "common/files/files.h"
+#include "common/planning/shown_fields.h"
 #include "data/catalogue/catalogue.h"
+#include "data/catalogue/dataset_fields.h"
 #include "data/layers/color_table.h"
 #include "data/layers/layer_files.h"
 #include "data/open/open_source.h"
@@ -117,6 +119,23 @@ TEST_F(LabelFields, BoxesOfASourceHaveTheSameLabelsAsAllOfIt) {
   std::array<std::uint32_t, 3> box{};
   ASSERT_TRUE(source->ReadNow(0, {{1, 0, 0}, {4, 1, 1}}, std::as_writable_bytes(std::span(box))).ok());
   EXPECT_THAT(box, ElementsAre(6, 0x7FFFFFFF, 8));
+}
+
+// Its volume has no values, whatever the labels are.
+TEST_F(LabelFields, AFileOfWideLabelsIsADatasetOfLabelsAlone) {
+  const DataSource source(WriteRaw<std::int32_t>("int32", {5, 0, 0x7FFFFFFF}) + "?ids=yes", "");
+  const LoadedSource volume = std::get<LoadedSource>(ReadSource(source, std::uint64_t{1} << 30).value());
+  EXPECT_EQ(volume.volume->description.type, ScalarType::kUint8);
+  EXPECT_THAT(std::span(volume.volume->block.samples<std::uint8_t>(), 3), testing::Each(0));
+  const std::shared_ptr<const DatasetFields> fields = FieldsOf(source, volume.file);
+  ASSERT_TRUE(HasLabelsAlone(*fields));
+  const DataSource labels = AtFieldAndTime(source, *fields, *fields->labels(), 0, nullptr);
+  EXPECT_THAT(Values(std::get<LoadedSource>(ReadSource(labels, std::uint64_t{1} << 30).value())), ElementsAre(5, 0, 0x7FFFFFFF));
+  // Narrow ones stay values.
+  const DataSource narrow(WriteRaw<std::uint16_t>("uint16", {5, 0, 70}) + "?ids=yes", "");
+  const LoadedSource values = std::get<LoadedSource>(ReadSource(narrow, std::uint64_t{1} << 30).value());
+  EXPECT_EQ(FieldsOf(narrow, values.file), nullptr);
+  EXPECT_EQ(values.volume->description.type, ScalarType::kUint16);
 }
 
 TEST_F(LabelFields, SlantedLabelsKeepTheirNumbers) {

@@ -13,8 +13,15 @@ SourceContext TestContext() {
   return context;
 }
 
+Result<zarr::ZarrArray> OpenTestArray(const std::shared_ptr<Store>& store, const std::string& path) {
+  const Result<std::optional<zarr::ZarrNode>> node = zarr::NodeReading(*store, path).Get();
+  if (!node.ok()) return node.status();
+  if (!node->has_value() || !(*node)->array) return Status::NotFound("no Zarr array is there");
+  return zarr::OpenArray(zarr::MakeArrayContext(store, TestContext()), **node);
+}
+
 Result<zarr::ZarrArray> OpenTestArray(const std::string& folder, const std::string& path) {
-  return zarr::OpenZarrArray(zarr::MakeArrayContext(FolderStore(folder), TestContext()), path);
+  return OpenTestArray(FolderStore(folder), path);
 }
 
 Result<std::optional<StoredChunk>> ReadChunkNow(ChunkedArray& array, const std::vector<std::uint64_t>& index) {

@@ -15,7 +15,8 @@ namespace slabstream {
 
 SourceContext TestContext();
 
-// The array at `path` of a folder.
+// The array at `path` of a store, or of a folder.
+Result<zarr::ZarrArray> OpenTestArray(const std::shared_ptr<Store>& store, const std::string& path = "");
 Result<zarr::ZarrArray> OpenTestArray(const std::string& folder, const std::string& path = "");
 
 Result<std::optional<StoredChunk>> ReadChunkNow(ChunkedArray& array, const std::vector<std::uint64_t>& index);

@@ -229,7 +229,7 @@ TEST(ZarrArrayTest, AnIndexIsReadOnceHoweverManyChunksAreAskedFor) {
   WriteZarrArray(folder.path(), {.version = 3, .shape = {16, 16}, .chunk = {2, 2}, .shard = {8, 8}, .separator = '/', .codec = "zstd"},
                  Element, [](std::span<const std::uint64_t> chunk) { return chunk[0] >= 4 && chunk[1] >= 4; });
   const auto store = std::make_shared<CountingStore>(FolderStore(folder.path()));
-  const auto array = zarr::OpenZarrArray(zarr::MakeArrayContext(store, TestContext()), "");
+  const auto array = OpenTestArray(store, "");
   ASSERT_TRUE(array.ok());
   const int metadata = store->chunks;
   std::atomic<int> left = 64, there = 0;

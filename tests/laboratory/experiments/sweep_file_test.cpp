@@ -1,4 +1,7 @@
 #include "laboratory/experiments/sweep_file.h"
+
+#include "client/request/picture_fields.h"
+#include "laboratory/experiments/request_json.h"
 #include "tests/support/renderers.h"
 
 #include <gmock/gmock.h>
@@ -49,6 +52,35 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->host.cores, 1);
   EXPECT_TRUE(sweep->host.encrypted);
   EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
+}
+
+TEST(SweepFile, FieldsOfAServicesDatasetsAreSaidAsOnTheCommandLine) {
+  const std::string text = R"({"volumes": [{"dataset": "cells"}], "policies": [{}], "renderers": ["mip",
+    {"renderer": "raycast", "channel": ["0", "Actin"], "channel-color": "0=#ff8000", "channel_range": "Actin=10:200",
+     "channel-opacity": "overlay=0.5", "blend": "over", "time": 2, "label-mode": "surface"}]})";
+  const Result<Sweep> sweep = ParseSweep("s.json", text, SweepPlace::kAtService);
+  ASSERT_TRUE(sweep.ok()) << sweep.status().message();
+  const FrameRequest& look = sweep->renderers.at(1).look;
+  const RenderRequest typed = ParseRenderFields({{"dataset", "cells"},
+                                                 {"channel", "0,Actin"},
+                                                 {"channel-color", "0=#ff8000"},
+                                                 {"channel-range", "Actin=10:200"},
+                                                 {"overlay-weight", "0.5"},
+                                                 {"blend", "over"},
+                                                 {"time", "2"},
+                                                 {"label-mode", "surface"}})
+                                  .value();
+  EXPECT_EQ(look.channels, typed.frame.channels);
+  EXPECT_THAT(look.fields, testing::UnorderedElementsAreArray(typed.frame.fields));
+  EXPECT_EQ(look.blend, typed.frame.blend);
+  EXPECT_EQ(look.time, typed.frame.time);
+  EXPECT_EQ(look.labels, typed.frame.labels);
+  EXPECT_THAT(RequestJson(RequestOf(FramesOf(*sweep).at(1).frame))["channels"].dump(), HasSubstr("Actin")) << "keys of trials tell";
+  EXPECT_THAT(ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [1], "policies": [{}],
+    "renderers": [{"renderer": "raycast", "channel": "1"}]})")
+                  .status()
+                  .message(),
+              HasSubstr("'channel' is of datasets of a service; a file may be one channel at one time"));
 }
 
 TEST(SweepFile, LeavesTheSchemeAndTheGroupsToTheService) {

@@ -1,10 +1,9 @@
-#include "laboratory/measure/wake_up_fit.h"
+#include "laboratory/measure/wake_up_probe.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "laboratory/measure/wake_up_probe.h"
 #include "tests/simulator/support.h"
 #include "tests/support/random.h"
 

@@ -48,4 +48,18 @@ std::vector<std::uint8_t> CellsThatShow(const RayPiece& piece, const RayPiece& f
   return shown;
 }
 
+void SpreadToNeighbours(const Index3& counts, std::vector<std::uint8_t>& visible) {
+  std::size_t stride = 1;
+  for (const Axis axis : kAxes) {
+    const std::vector<std::uint8_t> before = visible;
+    const std::size_t end = stride * std::size_t(counts[axis]);
+    for (std::size_t i = 0; i < visible.size(); ++i) {
+      const std::size_t along = i % end;
+      if (along >= stride) visible[i] = std::min(visible[i], before[i - stride]);
+      if (along + stride < end) visible[i] = std::min(visible[i], before[i + stride]);
+    }
+    stride = end;
+  }
+}
+
 }  // namespace slabstream

@@ -14,4 +14,7 @@ namespace slabstream {
 std::vector<std::uint8_t> CellsThatShow(const RayPiece& piece, const RayPiece& field, const AffineMap& map,
                                         const std::vector<std::uint8_t>& visible);
 
+// VisibleCells of a field whose samples depend on voxels of the cells around theirs, too: neighbours of cells that show something show it.
+void SpreadToNeighbours(const Index3& counts, std::vector<std::uint8_t>& visible);
+
 }  // namespace slabstream

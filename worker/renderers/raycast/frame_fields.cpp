@@ -1,7 +1,6 @@
 #include "worker/renderers/raycast/frame_fields.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/check.h"
 #include "common/parallel/parallel.h"

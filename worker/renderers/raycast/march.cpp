@@ -38,8 +38,8 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
   if (work.labels == nullptr) return sums.Add(rays, opacity, colors, entry, light);
   const LabelTables& tables = work.labels->tables;
   const float* const tints = tables.entries.data();
-  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.labels, PlaceAmong(*work.labels, *work.box, place, rays)));
-  const auto changed = hn::GatherIndex(df, tints + 3, label);
+  const auto [number, changed] = LabelAt(*work.labels, PlaceAmong(*work.labels, *work.box, place, rays));
+  const auto label = hn::ShiftLeft<2>(number);
   const auto shown = hn::Ge(changed, hn::Zero(df));
   const auto factor = hn::IfThenElse(shown, tables.surface ? hn::Zero(df) : changed, Set(1));
   const auto tint = hn::IfThenElseZero(shown, Set(tables.tint));
@@ -78,7 +78,7 @@ HWY_INLINE Light LightOfLabels(const MarchWork& work, const SamplePlace& place, 
   if (work.labels == nullptr) return LightOn(work, gradient, place);
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
-    gradient = Choose(matter, IndicatorGradientAt(*work.labels, sample.place, sample.label), gradient);
+    gradient = Choose(matter, NormalAt(*work.labels, sample.place, sample.label), gradient);
   }
   return LightOn(work, gradient, place);
 }

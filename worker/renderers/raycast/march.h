@@ -7,7 +7,8 @@
 //   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
 //   light       shadows and ambient occlusion at the sample (LightAt), if there are any
-//   labels      the label of the nearest voxel changes the volume's sample as docs/rendering.md says (RayLabels)
+//   labels      the label of the nearest voxel, or of those around if labels are smoothed, changes the volume's sample as
+//               docs/rendering.md says (RayLabels)
 //   fields      sampled like the volume, and blended with it (RayFields)
 //
 // Isosurfaces of the interpolated volume are composited among the samples, each crossing of a ray with its surface's opacity

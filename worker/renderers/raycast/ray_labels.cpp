@@ -10,6 +10,7 @@ namespace slabstream {
 LabelTables MakeLabelTables(const LabelLook& look, const std::vector<LabelStyle>& styles, double steps_per_voxel, double opacity_distance) {
   LabelTables tables;
   tables.surface = look.mode == LabelMode::kSurface;
+  tables.smooth = look.smooth;
   tables.tint = tables.surface ? 0 : float(look.tint);
   tables.steps_a_length = float(steps_per_voxel * opacity_distance);
   for (const auto& [color, opacity, shown] : styles) {

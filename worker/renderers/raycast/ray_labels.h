@@ -23,6 +23,7 @@ struct LabelTables {
   // -1, as of label 0: the volume's material is drawn as it is
   AlignedVector<float> entries;
   bool surface = false;
+  bool smooth = false;       // LabelLook::smooth
   float tint = 0;            // share of the label's colour; 0 with surfaces
   float steps_a_length = 1;  // samples in the length of material that opacities of the transfer function belong to
 };

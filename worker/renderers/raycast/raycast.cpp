@@ -8,7 +8,6 @@
 
 #include <cmath>
 #include <optional>
-#include <span>
 #include <tuple>
 #include <utility>
 
@@ -42,8 +41,10 @@ struct VisibleValues {
     MatterNumbers matter;
     std::weak_ptr<std::byte[]> voxels;  // their numbers
     AffineMap map;
+    bool smooth;
     friend bool operator==(const Labels& a, const Labels& b) {
-      return a.matter == b.matter && !a.voxels.owner_before(b.voxels) && !b.voxels.owner_before(a.voxels) && a.map == b.map;
+      return a.matter == b.matter && a.smooth == b.smooth && !a.voxels.owner_before(b.voxels) && !b.voxels.owner_before(a.voxels) &&
+             a.map == b.map;
     }
   };
   std::optional<Labels> labels = {};
@@ -58,8 +59,9 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
   std::vector<std::uint8_t> with_samples =
       VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnyMatterBetween(low, high); });
   if (visible.labels) {
-    const std::vector<std::uint8_t> cells =
+    std::vector<std::uint8_t> cells =
         VisibleCells(labels->numbers->cells, [&](float low, float high) { return labels->matter.AnyBetween(low, high); });
+    if (visible.labels->smooth) SpreadToNeighbours(labels->numbers->cells.counts, cells);
     const std::vector<std::uint8_t> in_cells = CellsThatShow(piece, *labels->numbers, labels->map, cells);
     for (std::size_t i = 0; i < in_cells.size(); ++i) {
       if (in_cells[i] != 0) with_samples[i] = 0;
@@ -106,7 +108,9 @@ class VisibilityCache : public BoxCache {
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const RayLabels* labels,
                                     const FrameFields& fields, OctantSet octants) {
     VisibleValues visible{.volume = VisibleSamples(look), .fields = fields.visible()};
-    if (labels != nullptr && labels->tables.surface) visible.labels = {labels->matter, labels->numbers->voxels.samples, labels->map};
+    if (labels != nullptr && labels->tables.surface) {
+      visible.labels = {labels->matter, labels->numbers->voxels.samples, labels->map, labels->tables.smooth};
+    }
     if (pieces_.empty() || visible_ != visible) {
       visible_ = std::move(visible);
       pieces_.clear();

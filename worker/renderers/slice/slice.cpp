@@ -4,19 +4,73 @@
 //   2. once a frame: move the cells' points to frame space (FrameSpace), and find the cells of each tile of the picture (CellBins)
 //   3. tiles are separate tasks (SliceTile)
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
+#include <vector>
 
+#include "common/mesh/mesh_cell.h"
+#include "common/parallel/parallel.h"
 #include "common/parallel/per_thread.h"
+#include "common/volume/summary.h"
 #include "worker/rays/ray_box.h"
 #include "worker/rays/render_tiles.h"
+#include "worker/renderers/box_data.h"
 #include "worker/renderers/renderer.h"
-#include "worker/renderers/slice/shown_cells.h"
 #include "worker/renderers/slice/slice_tile.h"
 #include "worker/renderers/stage_clock.h"
 
 namespace slabstream::slice {
 namespace {
+
+// The tetrahedra of a padded box of which anything may be visible. Kept until other values are visible.
+class ShownCells : public BoxCache {
+ public:
+  // Numbers of tetrahedra, ascending. Those with a value that is not finite are not among them. `mesh` is the padded box's. Parallel.
+  std::span<const std::uint32_t> Of(const Mesh& mesh, const VisibleSamples& visible);
+
+  std::size_t bytes() const override { return ranges_.capacity() * sizeof(ranges_[0]) + shown_.capacity() * sizeof(shown_[0]); }
+
+ private:
+  std::vector<ValueRange> ranges_;  // by tetrahedron: ValuesIn
+  std::optional<VisibleSamples> visible_;
+  std::vector<std::uint32_t> shown_;
+};
+
+std::span<const std::uint32_t> ShownCells::Of(const Mesh& mesh, const VisibleSamples& visible) {
+  if (visible_ == visible) return shown_;
+  const std::size_t count = mesh.tetrahedra.size();
+  constexpr std::size_t kBlock = 1 << 15;
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  const auto for_each_block = [&](auto&& work) {
+    ParallelFor(0, blocks, [&](std::size_t block) { work(block, block * kBlock, std::min((block + 1) * kBlock, count)); });
+  };
+
+  if (ranges_.size() != count) {
+    ranges_.resize(count);
+    for_each_block([&](std::size_t, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) ranges_[i] = ValuesIn(mesh, i);
+    });
+  }
+
+  // Each block's cells are counted, then written behind those of the blocks before it.
+  std::vector<std::size_t> first(blocks + 1, 0);
+  const auto shows = [&](std::size_t i) { return visible.AnyBetween(ranges_[i].min, ranges_[i].max); };
+  for_each_block([&](std::size_t block, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) first[block + 1] += shows(i) ? 1 : 0;
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  shown_.resize(first.back());
+  for_each_block([&](std::size_t block, std::size_t begin, std::size_t end) {
+    std::size_t at = first[block];
+    for (std::size_t i = begin; i < end; ++i) {
+      if (shows(i)) shown_[at++] = std::uint32_t(i);
+    }
+  });
+  visible_ = visible;
+  return shown_;
+}
 
 // The samples of the box, and pixels of the frame that they may lie in.
 RayReach SetBox(const Box& box, SliceWork& work) {

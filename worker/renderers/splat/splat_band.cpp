@@ -1,7 +1,6 @@
 #include "worker/renderers/splat/splat_band.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <span>
 

@@ -1,7 +1,5 @@
 #include "worker/renderers/splat/splat_pass.h"
 
-#include "worker/kernels/segment_set.h"
-
 namespace slabstream {
 
 SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,

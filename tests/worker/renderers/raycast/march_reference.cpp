@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/frame/smooth_label.h"
 #include "tests/worker/rays/pixel_ray.h"
 
 namespace slabstream::testing {
@@ -152,7 +153,7 @@ class ReferenceMarch {
       Part surface = {.opacity = double(rgba[3]), .color = {double(rgba[0]), double(rgba[1]), double(rgba[2])}};
       if (work_.labels != nullptr) {
         const LabelTables& tables = work_.labels->tables;
-        const float* const entry = &tables.entries[4 * std::size_t(LabelAt(AmongLabels(crossing.position)))];
+        const float* const entry = &tables.entries[4 * LabelAt(AmongLabels(crossing.position)).label];
         if (entry[3] >= 0) {
           surface.opacity *= tables.surface ? 0 : double(entry[3]);
           Tint(entry, surface);
@@ -275,14 +276,23 @@ class ReferenceMarch {
                                std::int64_t{voxels.row} * (y - voxels.origin.y + 1) + (x - voxels.origin.x + 1);
     return VisitLabelType(voxels.type, [&]<class L>(const L*) { return std::uint32_t(reinterpret_cast<const L*>(voxels.samples)[index]); });
   }
-  // Of the voxel nearest to a position on the grid of the labels; 0 outside of it.
-  std::uint32_t LabelAt(const Float3& p) const {
-    if (!Inside(p, work_.labels->low, work_.labels->high)) return 0;
+  LabelledVoxel VoxelOf(std::uint32_t label) const { return {label, double(work_.labels->tables.entries[4 * std::size_t(label) + 3])}; }
+  // At a position on the grid of the labels: of the nearest voxel, or smoothed. Outside of the grid there is none.
+  LabelledVoxel LabelAt(const Float3& p) const {
+    if (!Inside(p, work_.labels->low, work_.labels->high)) return VoxelOf(0);
+    if (work_.labels->tables.smooth) {
+      const auto first = [&](std::size_t i) { return std::int32_t(std::floor(p.at(i))) - 1; };
+      const auto fraction = [&](std::size_t i) { return double(p.at(i)) - std::floor(double(p.at(i))); };
+      std::array<LabelledVoxel, 64> around;
+      for (std::int32_t i = 0; i < 64; ++i)
+        around.at(std::size_t(i)) = VoxelOf(LabelOf(first(0) + i % 4, first(1) + i / 4 % 4, first(2) + i / 16));
+      return SmoothLabel(around, {fraction(0), fraction(1), fraction(2)});
+    }
     const auto nearest = [&](std::size_t i) {
       const float floor = std::floor(p.at(i));
       return std::int32_t(floor) + (p.at(i) - floor >= 0.5F ? 1 : 0);
     };
-    return LabelOf(nearest(0), nearest(1), nearest(2));
+    return VoxelOf(LabelOf(nearest(0), nearest(1), nearest(2)));
   }
 
   void Tint(const float* entry, Part& volume) const {
@@ -292,12 +302,12 @@ class ReferenceMarch {
   void AddLabel(const Float3& p, Part& volume, Float3& gradient) const {
     const LabelTables& tables = work_.labels->tables;
     const Float3 there = AmongLabels(p);
-    const std::uint32_t label = LabelAt(there);
-    const float* const entry = &tables.entries[4 * std::size_t(label)];
+    const LabelledVoxel label = LabelAt(there);
+    const float* const entry = &tables.entries[4 * label.label];
     if (entry[3] < 0) return;
     if (tables.surface) {
       volume = PartOf(entry);
-      gradient = IndicatorGradient(there, label);
+      gradient = MembershipGradient(there, label);
       return;
     }
     const double steps = double(tables.steps_a_length), of_length = 1 - std::pow(1 - volume.opacity, steps);
@@ -315,19 +325,33 @@ class ReferenceMarch {
     return v < 0 ? -slope : slope;
   }
 
+  // Whether a voxel is one of those of which the normal is that of the border. Beyond the padding the last one is repeated.
+  bool IsMember(const std::array<std::int32_t, 3>& voxel, const LabelledVoxel& label) const {
+    const RayBox& voxels = work_.labels->voxels;
+    const auto within = [&](int i) {
+      return std::clamp(voxel.at(std::size_t(i)), voxels.origin[i] - 1, voxels.origin[i] + voxels.padded[i] - 2);
+    };
+    const LabelledVoxel there = VoxelOf(LabelOf(within(0), within(1), within(2)));
+    return work_.labels->tables.smooth ? there.opacity >= label.opacity : there.label == label.label;
+  }
   // `p`: on the grid of the labels. The gradient is along the volume's axes.
-  Float3 IndicatorGradient(const Float3& p, std::uint32_t label) const {
-    const std::array<std::int32_t, 3> first = {std::int32_t(std::floor(p[0])) - 1, std::int32_t(std::floor(p[1])) - 1,
-                                               std::int32_t(std::floor(p[2])) - 1};
+  Float3 MembershipGradient(const Float3& p, const LabelledVoxel& label) const {
+    const int shifts = work_.labels->tables.smooth ? 1 : 0, reach = 2 + shifts;  // it is the mean of places that are so far away
+    const auto mean = [&](double distance, double (*of)(double)) {
+      double sum = 0;
+      for (int shift = -shifts; shift <= shifts; ++shift) sum += of(distance + shift);
+      return sum / (2 * shifts + 1);
+    };
+    const auto floor = [&](std::size_t i) { return std::int32_t(std::floor(p.at(i))); };
     std::array<double, 3> gradient{};
-    for (std::int32_t z = first[2]; z < first[2] + 4; ++z) {
-      for (std::int32_t y = first[1]; y < first[1] + 4; ++y) {
-        for (std::int32_t x = first[0]; x < first[0] + 4; ++x) {
-          if (LabelOf(x, y, z) != label) continue;
+    for (std::int32_t z = floor(2) - reach + 1; z <= floor(2) + reach; ++z) {
+      for (std::int32_t y = floor(1) - reach + 1; y <= floor(1) + reach; ++y) {
+        for (std::int32_t x = floor(0) - reach + 1; x <= floor(0) + reach; ++x) {
+          if (!IsMember({x, y, z}, label)) continue;
           const double dx = double(p[0]) - x, dy = double(p[1]) - y, dz = double(p[2]) - z;
-          gradient[0] += SplineSlope(dx) * Spline(dy) * Spline(dz);
-          gradient[1] += Spline(dx) * SplineSlope(dy) * Spline(dz);
-          gradient[2] += Spline(dx) * Spline(dy) * SplineSlope(dz);
+          gradient[0] += mean(dx, SplineSlope) * mean(dy, Spline) * mean(dz, Spline);
+          gradient[1] += mean(dx, Spline) * mean(dy, SplineSlope) * mean(dz, Spline);
+          gradient[2] += mean(dx, Spline) * mean(dy, Spline) * mean(dz, SplineSlope);
         }
       }
     }

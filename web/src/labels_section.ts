@@ -1,11 +1,11 @@
-// Section of the panel: labels and the overlay.
+// Section of the panel: labels.
 import type { LabelName } from "./api";
-import type { Context } from "./context";
-import { choice, colorField, optionalField, row, section, segmented, slider, textField, toggle } from "./controls";
+import { type Context, follow } from "./context";
+import { row, section, segmented, slider, textField, toggle } from "./controls";
 import { h } from "./dom";
 import { isListed, type Labels, labelText, listOf } from "./labels";
-import { can, hasRegions, presetChoices, titlesThatCan, turnTo } from "./offers";
-import { LOOK, ONE_COLOR } from "./state";
+import { can, titlesThatCan, turnTo } from "./offers";
+import { LOOK } from "./state";
 import { rounded } from "./vec";
 
 // A row for each label: whether it shows, its colour, its name, its opacity.
@@ -46,54 +46,31 @@ function labelList({ store }: Context, labels: Labels): { element: HTMLElement; 
   };
 }
 
-export function layersSection(context: Context, labels: Labels): HTMLElement {
+export function labelsSection(context: Context, labels: Labels): HTMLElement {
   const { store } = context, list = labelList(context, labels);
   const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" ? turnTo("labels", store.state.renderer) : {}) }, "labels"));
   const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
+  const smooth = toggle("Smooth surfaces", on => store.update({ labelSurface: on ? "smooth" : "blocky", ...(on ? turnTo("smooth-labels", store.state.renderer) : {}) }, "surfaces of labels"));
   const which = textField("Shown", "all, or 1,5-9,Frontal_*", "[^,]+(,[^,]+)*", value => store.update({ labelsShown: value }, "labels shown"));
   const legend = toggle("Legend", on => store.update({ legend: on }));
-  const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on ? turnTo("overlay", store.state.renderer) : {}) }, "overlay"));
-  const overlayPreset = choice("Overlay’s function", [...presetChoices().filter(([preset]) => !hasRegions(preset)), [ONE_COLOR, "One colour"]], value => store.update({ overlayPreset: value }, "overlay preset"));
-  const overlayColor = colorField("Colour of the overlay", value => store.update({ overlayColor: value }, "overlay colour"));
-  const colorRow = row("Colour", overlayColor.input);
-  const ends = [0, 1].map(end => optionalField(`Overlay ${end === 0 ? "from" : "to"}`, value => {
-    const given = [...typed];
-    given[end] = value;
-    typed = given;
-    const [low, high] = given;
-    store.update({ overlayRange: low !== null && high !== null && low !== undefined && high !== undefined && low < high ? [low, high] : null }, "overlay range");
-  }));
-  let typed: (number | null)[] = [null, null]; // the ends of a range; both count
-  const rangeRow = row("Values", h("span", { class: "pair" }, ...ends.map(end => end.input)));
-  const weight = slider("Weight", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ overlayWeight: value }, "weight"));
   const hint = h("p", { class: "hint" });
-  const element = section("Layers", false, row("Labels", mode.element), tint.element, which.element, legend.element, hint, list.element, overlay.element, overlayPreset.element, colorRow, rangeRow, weight.element);
+  const element = section("Labels", false, row("Shown as", mode.element), tint.element, smooth.element, which.element, legend.element, hint, list.element);
   const update = (): void => {
-    const { state } = store, volume = context.volume(), any = (volume?.labels ?? 0) > 0, on = any && state.labels !== "off";
-    element.hidden = !any && !volume?.overlay;
+    const { state } = store, on = state.labels !== "off";
+    element.hidden = !context.volume()?.labels;
     mode.set(state.labels);
     tint.set(state.labelTint);
+    smooth.set(state.labelSurface === "smooth");
     which.set(state.labelsShown);
     legend.set(state.legend);
-    overlay.set(state.overlay);
-    overlayPreset.set(state.overlayPreset);
-    overlayColor.set(state.overlayColor);
-    if (state.overlayRange) typed = [...state.overlayRange];
-    ends.forEach((end, i) => end.set(typed[i] ?? null));
-    weight.set(state.overlayWeight);
-    (mode.element.parentElement as HTMLElement).hidden = !any;
-    tint.element.hidden = !any || (state.labels !== "tint" && state.labels !== "highlight");
+    tint.element.hidden = state.labels !== "tint" && state.labels !== "highlight";
+    smooth.element.hidden = state.labels !== "surface";
     which.element.hidden = list.element.hidden = legend.element.hidden = !on;
     hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
     hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : "Point at a label in the picture to list it here.";
-    overlay.element.hidden = !volume?.overlay;
-    overlayPreset.element.hidden = rangeRow.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
-    colorRow.hidden = overlayPreset.element.hidden || state.overlayPreset !== ONE_COLOR;
     list.refresh();
   };
-  store.subscribe(update, [...LOOK, "legend"]);
-  context.onVolume(update);
   labels.onChange(update);
-  update();
+  follow(context, [...LOOK, "legend"], update);
   return element;
 }
