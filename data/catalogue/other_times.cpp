@@ -36,7 +36,7 @@ std::vector<VolumeSummary> SurveyOtherTimes(const std::string& source, const Sou
   if (!text.ok() || count == 1 || text->options.time || text->options.labels || info.hollow) return {};
   if (!info.in_parts() && info.finest().voxel_bytes() > kMostInOrder / count) return {};
   const bool far = !SchemeOf(text->path).empty();
-  const int most = std::min(far ? kMostOtherTimesFar : kMostOtherTimes, count - 1);
+  const int most = std::min(far || !info.in_parts() ? kFewOtherTimes : kMostOtherTimes, count - 1);
   std::vector<VolumeSummary> found;
   for (int i = 0; i <= most; ++i) {
     const int time = int(std::int64_t{i} * (count - 1) / most);
