@@ -124,7 +124,7 @@ Result<DatasetMachine::State::FieldSource> DatasetMachine::State::SourceOf(const
                                                  info.name, dataset, times, entry.fields->times.count));
     }
     if (!info.channel && times == 1) return FieldSource{own};  // at all times
-    entry.statistics[field] = found.levels != nullptr ? found.levels->overview : found.summary;
+    entry.statistics[field] = found.overview();
   }
   std::string name = PartName(dataset, field, time);
   parts_came |= datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field)), now);
@@ -173,10 +173,7 @@ Status DatasetMachine::State::SeekVoxels(Use& use) {
   use.stage = Use::Stage::kVoxels;
   use.volume = use.entries.front().name;
   // All that is known of a source before its levels are chosen.
-  const auto overview = [&](const std::string& name) -> CoarserVolume {
-    const DatasetTable::Entry& entry = *datasets.Find(name);
-    return {1, entry.levels != nullptr ? entry.levels->overview : entry.summary};
-  };
+  const auto overview = [&](const std::string& name) -> CoarserVolume { return {1, datasets.Find(name)->overview()}; };
   std::vector<Use::Entry> sources = std::exchange(use.entries, {});
   ShownFields fields = use.fields;
   for (std::size_t i = 0; i < fields.others.size(); ++i) {
@@ -318,8 +315,7 @@ void DatasetMachine::State::Lose(const std::string& name, const Status& why, Ref
 }
 
 bool DatasetMachine::State::IsWanted(const std::string& name) const {
-  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.WaitsFor(name) && !use.second.begun(); }) ||
-         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.WaitsFor(name); });
+  return IsAwaited([&](const std::string& entry) { return entry == name; });
 }
 
 bool DatasetMachine::State::IsKept(DatasetId dataset) const {
@@ -328,18 +324,10 @@ bool DatasetMachine::State::IsKept(DatasetId dataset) const {
 }
 
 bool DatasetMachine::State::IsAwaited(DatasetId dataset) const {
-  const auto is_of = [&](const std::string& name) {
+  return IsAwaited([&](const std::string& name) {
     const DatasetTable::Entry* const entry = datasets.Find(name);
     return entry != nullptr && entry->id == dataset;
-  };
-  const auto uses_it = [&](const auto& each) {
-    const Use& use = each.second;
-    return !use.begun() && std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
-  };
-  return std::ranges::any_of(uses, uses_it) || std::ranges::any_of(questions, [&](const auto& open) {
-           const auto entries = open.second.entries();
-           return !open.second.asked && std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
-         });
+  });
 }
 
 // ---------------------------------------------------------------- voxels
@@ -433,6 +421,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     open.fields = {};
     open.overlay = open.labels = {};
     open.others = {};
+    open.summary = nullptr;
   }
   const bool may_grow = datasets.Find(name)->MayGrow();
   datasets.Reset(name, now);
@@ -466,19 +455,8 @@ void DatasetMachine::State::UnloadRetired() {
 
 // Frames that have begun keep the voxels that they began with.
 void DatasetMachine::State::ClosePartsThatNobodyWants() {
-  const auto is_of = [](const std::string& entry, const std::string& part) { return entry == part || entry.starts_with(part + '\n'); };
-  const auto is_wanted = [&](const std::string& part) {
-    return std::ranges::any_of(uses,
-                               [&](const auto& each) {
-                                 const Use& use = each.second;
-                                 return !use.begun() &&
-                                        std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name, part); });
-                               }) ||
-           std::ranges::any_of(questions, [&](const auto& each) {
-             const OpenQuestion& open = each.second;
-             const auto entries = open.entries();
-             return !open.asked && std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is_of(entry.name, part); });
-           });
+  const auto is_wanted = [this](const std::string& part) {
+    return IsAwaited([&](const std::string& entry) { return entry == part || entry.starts_with(part + '\n'); });
   };
   while (datasets.ClosePart(is_wanted)) {
   }

@@ -157,14 +157,12 @@ void DatasetMachine::State::AskExecutor() {
     const auto other = [&](const Use::Entry& of) -> AnswerQuestion::Other {
       if (of.name.empty()) return {};
       const DatasetTable::Entry& found = *datasets.Find(of.name);
-      if (found.levels != nullptr) return {0, found.levels->overview};
-      return {found.id, found.summary};
+      return {found.levels != nullptr ? 0 : found.id, found.overview()};
     };
     ask.overlay = other(open.overlay);
     ask.labels = other(open.labels);
     for (std::size_t i = 0; i < open.others.size(); ++i) {
-      const DatasetTable::Entry& found = *datasets.Find(open.others[i].name);
-      ask.fields.others[i].levels = {{1, found.levels != nullptr ? found.levels->overview : found.summary}};
+      ask.fields.others[i].levels = {{1, datasets.Find(open.others[i].name)->overview()}};
       ask.fields.others[i].of_volume = {0};
     }
     const FrameRequest* const frame = FrameOf(open.question);

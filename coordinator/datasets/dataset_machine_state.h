@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <concepts>
 #include <map>
 #include <optional>
@@ -77,9 +78,7 @@ struct DatasetMachine::State {
       all.insert(all.end(), others.begin(), others.end());
       return all;
     }
-    bool WaitsFor(const std::string& name) const {
-      return entry == name || overlay.name == name || labels.name == name || std::ranges::count(others, name, &Use::Entry::name) > 0;
-    }
+    bool WaitsFor(const std::string& name) const { return std::ranges::count(entries(), name, &Use::Entry::name) > 0; }
   };
   // A dataset on its way from a client.
   struct OpenUpload {
@@ -164,7 +163,16 @@ struct DatasetMachine::State {
   void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
   bool IsWanted(const std::string& name) const;  // by a request whose frame has not begun, or a question that was not asked
   bool IsKept(DatasetId dataset) const;          // by a frame that has begun
-  bool IsAwaited(DatasetId dataset) const;       // by a request whose frame has not begun, or a question that was not asked
+  bool IsAwaited(DatasetId dataset) const;       // as the next one
+  // Whether a request whose frame has not begun, or a question that was not asked, waits for an entry that `is` so.
+  template <std::predicate<const std::string&> Is>
+  bool IsAwaited(Is&& is) const {
+    const auto any = [&](const std::vector<Use::Entry>& entries) {
+      return std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is(entry.name); });
+    };
+    return std::ranges::any_of(uses, [&](const auto& use) { return !use.second.begun() && any(use.second.entries); }) ||
+           std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && any(open.second.entries()); });
+  }
   bool InUse(DatasetId dataset) const { return IsKept(dataset) || IsAwaited(dataset); }
   void ClosePartsThatNobodyWants();
 

@@ -75,6 +75,8 @@ class DatasetTable {
     // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
     CheckId awaited = 0;
 
+    // What is known of its voxels before a level is chosen. kReady only.
+    const std::shared_ptr<const VolumeSummary>& overview() const { return levels != nullptr ? levels->overview : summary; }
     // People watch for its next time (data/open/file_times.h).
     bool MayGrow() const { return source.path.find('*') != std::string::npos || (fields != nullptr && fields->times.count > 1); }
   };

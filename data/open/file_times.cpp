@@ -61,8 +61,13 @@ Result<std::string> FirstFileOf(const std::string& pattern) {
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& pattern, const ReadOptions& options, const OpenFileFunction& open) {
-  const Result<FileStamp> growth = StampFiles({FolderOf(pattern)});
-  if (!growth.ok()) return growth.status();
+  // It looks at each file of the folder, so only where it is needed.
+  std::shared_ptr<const FileStamp> growth;
+  if (!options.time) {
+    Result<FileStamp> stamp = StampFiles({FolderOf(pattern)});
+    if (!stamp.ok()) return stamp.status();
+    growth = std::make_shared<const FileStamp>(*std::move(stamp));
+  }
   Result<std::vector<std::string>> files = FilesOf(pattern);
   if (!files.ok()) return files.status();
   ReadOptions of_file = options;
@@ -89,7 +94,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& pattern, 
   }
   info.times.count = count;
   info.time = time;
-  if (!options.time) info.growth = std::make_shared<const FileStamp>(*growth);
+  info.growth = std::move(growth);
   return std::shared_ptr<VolumeSource>(std::make_shared<FileAtTime>(*std::move(source), std::move(info)));
 }
 
