@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
 #include <cmath>
 #include <optional>
@@ -38,10 +39,16 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
   if (!path_text.empty()) path = read.Value(ParsePath(path_text, read.rest()));
   const std::string frames = read.Get("frames", ""), turns = read.Get("turns", "1"),
                     fps = read.Get("fps", fmt::format("{:g}", MovieShape().frames_per_second));
+  const auto time = std::ranges::find(read.rest(), "time", &PictureField::name);
+  if (time != read.rest().end() && time->text.find(':') != std::string::npos) {
+    request.times = read.Value(ParseTimeSteps("time", read.Get("time", "")));
+  }
   request.render = read.Value(ParseRenderFields(read.rest()));
   request.move.turns = read.Value(ParseInteger("turns", turns, 0, kMaxTurns));
   request.frames_per_second = read.Value(ParseNumber("fps", fps, {kMinFramesPerSecond, kMaxFramesPerSecond}));
-  const std::int64_t usual_frames = path && path->timed ? std::llround(path->seconds() * request.frames_per_second) + 1 : kMovieFrames;
+  const std::int64_t usual_frames = request.times         ? request.times->count()
+                                    : path && path->timed ? std::llround(path->seconds() * request.frames_per_second) + 1
+                                                          : kMovieFrames;
   request.frames = read.Value(ParseInteger("frames", frames.empty() ? std::to_string(usual_frames) : frames, 1, kMaxMovieFrames));
   if (path) request.move.cameras = std::move(path->cameras);
   const auto [width, height] = request.render.frame.size;

@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-inline constexpr char kFramesHelp[] = "Number of frames, spread evenly over the turns or the path: at most 1000";
+inline constexpr char kFramesHelp[] = "Number of frames, spread evenly over turns, path and times: at most 1000";
 inline constexpr int kMaxMovies = 2;             // under way
 inline constexpr int kMaxMovieFrames = 1000;     // the most frames of a movie
 inline constexpr int kMovieFrames = 120;         // if the request does not say

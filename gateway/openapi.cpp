@@ -99,9 +99,17 @@ Json Named(const Json& fields, std::initializer_list<std::string_view> names) {
   return named;
 }
 
-Json With(Json fields, std::initializer_list<Json> more) {
-  for (const Json& field : more) fields.push_back(field);
-  return fields;
+// A field replaces one of the same name.
+Json With(const Json& fields, std::initializer_list<Json> more) {
+  Json all = Json::array();
+  const auto is_kept = [&](const Json& field) {
+    return std::ranges::none_of(more, [&](const Json& other) { return TextOf(other, "name") == TextOf(field, "name"); });
+  };
+  for (const Json& field : fields) {
+    if (is_kept(field)) all.push_back(field);
+  }
+  for (const Json& field : more) all.push_back(field);
+  return all;
 }
 
 Json Describe(const Operation& operation) {
@@ -158,8 +166,10 @@ Json OpenApi() {
        "Planes through a volume, as `slabstream slice` makes them; other endings make other files: " + PictureEndings(), "image/png", false,
        SliceFields(), true},
       {"/api/v1/turntable.mp4", "A movie, as `slabstream turntable` makes it, sent while it is made", "video/mp4", false,
-       With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("{}", kMovieFrames)), field("turns", kTurnsHelp, "NUMBER", "1"),
-                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second)), path}),
+       With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("one for each time, or {}", kMovieFrames)),
+                     field("turns", kTurnsHelp, "NUMBER", "1"),
+                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second)), path,
+                     optional("time", kTimesHelp, kTimesValue)}),
        true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, of_field},

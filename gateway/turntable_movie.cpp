@@ -39,12 +39,23 @@ Status TurntableMovie::Make() {
 
 Status TurntableMovie::RenderAndEncode() {
   ServiceLink link(context_, service_);  // a client of its own, so that others get their share
-  const FrameRequest& first = request_.render.frame;
+  const auto frame_at = [&](int index) {
+    FrameRequest frame = request_.render.frame;
+    if (request_.times) frame.time = std::to_string(request_.times->At(index, request_.frames));
+    return frame;
+  };
+  std::vector<FrameRequest> volumes;
+  for (int i = 0; i < request_.frames; ++i) {
+    FrameRequest frame = frame_at(i);
+    if (volumes.empty() || volumes.back().time != frame.time) volumes.push_back(std::move(frame));  // times rise
+  }
   const AskView ask = [&](ViewQuery query) { return Ask(link, std::move(query)); };
-  const Result<std::vector<ViewParameters>> views = ViewsOfMovie(request_.move, request_.frames, {&first, 1}, ask);
+  const Result<ViewReply> last = ask({.frame = volumes.back()});  // a time that is not there is told before the first byte
+  if (!last.ok()) return last.status();
+  const Result<std::vector<ViewParameters>> views = ViewsOfMovie(request_.move, request_.frames, volumes, ask);
   if (!views.ok()) return views.status();
   const auto request = [&](int index) {
-    FrameRequest frame = first;
+    FrameRequest frame = frame_at(index);
     frame.view = (*views)[std::size_t(index)];
     frame.key = request_.render.format.annotations.needs_key();
     const auto done = [this, index](Result<ServiceLink::Rendered> rendered) {

@@ -14,6 +14,7 @@
 #include "client/client.h"
 #include "client/movie/camera_moves.h"
 #include "client/movie/movie_encoder.h"
+#include "client/movie/time_steps.h"
 #include "client/request/picture_fields.h"
 #include "common/http/http.h"
 #include "common/transport/context.h"
@@ -25,6 +26,7 @@ namespace slabstream {
 struct TurntableRequest {
   RenderRequest render;  // the request of the first frame
   int frames = 0;
+  std::optional<TimeSteps> times = {};  // over which the frames are spread; none: the time of `render`
   CameraMove move = {};
   double frames_per_second = 25;
 };

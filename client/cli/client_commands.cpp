@@ -72,10 +72,7 @@ void DeclareTurntable(const CommandLine& line) {
     if (!number) options.frame.request.time = texts.back();
     return number ? times.status() : Status::Ok();
   };
-  sub.AddOption(
-         "--time", set_times,
-         "Which times are shown: those from FIRST to LAST, or each STEP-th of them, counted from 0; or one, as for `slabstream render`")
-      .TypeName("T|FIRST:LAST[:STEP]");
+  sub.AddOption("--time", set_times, kTimesHelp).TypeName(kTimesValue);
   AddParsed(
       sub, "--fps", options.frames_per_second,
       [](const std::string& option, const std::string& text) {

@@ -8,6 +8,7 @@
 
 #include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
+#include "client/movie/time_steps.h"
 #include "client/request/camera_file.h"
 #include "client/request/slice_request.h"
 #include "client/service/service_choice.h"

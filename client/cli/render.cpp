@@ -242,9 +242,8 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   }
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {
-    const int time = times.first + times.step * int(std::int64_t{i} * times.count() / frames);
     FrameJob& job = jobs.emplace_back(FrameJob{options.frame.request, FileOf(options, i), options.frame.source});
-    if (options.times) job.request.time = std::to_string(time);
+    if (options.times) job.request.time = std::to_string(times.At(i, frames));
   }
   return jobs;
 }

@@ -4,7 +4,6 @@
 
 #include "client/movie/movie_format.h"
 #include "common/cli/parse.h"
-#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
@@ -37,16 +36,6 @@ Result<FramePattern> FramePattern::Parse(std::string_view option, std::string_vi
   }
   if (conversions == 0) return refuse("has no place for the frame's number");
   return pattern;
-}
-
-Result<TimeSteps> ParseTimeSteps(std::string_view option, std::string_view text) {
-  const std::size_t first = text.find(':'), second = first == std::string_view::npos ? first : text.find(':', first + 1);
-  const Result<TimeRange> range = ParseTimeRange(option, text.substr(0, second));
-  if (!range.ok()) return range.status();
-  if (second == std::string_view::npos) return TimeSteps{range->first, range->last};
-  const Result<int> step = ParseInteger(option, text.substr(second + 1), 1, int(kMaxVolumes));
-  if (!step.ok()) return step.status();
-  return TimeSteps{range->first, range->last, *step};
 }
 
 Result<TurntableOutput> ParseTurntableOutput(std::string_view option, std::string_view text) {

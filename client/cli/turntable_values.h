@@ -1,4 +1,4 @@
-// Parses what only `turntable` takes: its times, and where its pictures go. Pure. Errors as in common/cli/parse.h.
+// Parses where the pictures of `turntable` go. Pure. Errors as in common/cli/parse.h.
 #pragma once
 
 #include <string>
@@ -7,14 +7,6 @@
 #include "common/base/status.h"
 
 namespace slabstream {
-
-// Each `step`-th time from `first` on, at most `last`.
-struct TimeSteps {
-  int first = 0, last = 0, step = 1;  // 0 <= first <= last, step > 0
-  int count() const { return (last - first) / step + 1; }
-};
-// "T", "FIRST:LAST" or "FIRST:LAST:STEP".
-Result<TimeSteps> ParseTimeSteps(std::string_view option, std::string_view text);
 
 // A file name with exactly one integer conversion, such as "frame_%04d.png"; "%%" stands for a percent sign.
 class FramePattern {

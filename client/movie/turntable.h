@@ -10,6 +10,9 @@ inline constexpr int kMaxTurns = 1000;
 inline constexpr char kPathHelp[] = "Move through the cameras of a JSON list instead of turning: docs/movies.md";
 inline constexpr char kTurnsHelp[] = "Number of full turns; 0: the view is fixed";
 inline constexpr char kFramesPerSecondHelp[] = "Frames per second of a movie";
+inline constexpr char kTimesValue[] = "T|FIRST:LAST[:STEP]";
+inline constexpr char kTimesHelp[] =
+    "Which times are shown: those from FIRST to LAST, or each STEP-th of them, counted from 0; or one, as for `slabstream render`";
 
 // The azimuth of the frame with this index in [0, frames), in degrees. It stays within one turn, so that a start near
 // the limit of angles stays valid.

@@ -74,10 +74,11 @@ Result<FileStamp> StampFiles(std::vector<std::string> paths) {
   return FileStamp{std::move(paths), std::hash<std::string>{}(files.text), files.newest};
 }
 
-Result<bool> HaveChanged(const FileStamp& stamp) {
-  const Result<FileStamp> now = StampFiles(stamp.paths);
-  if (!now.ok()) return now.status();
-  return now->digest != stamp.digest;
+Result<bool> HaveChanged(const FileStamp& stamp, Time now) {
+  if (stamp.ask) return stamp.ask(now);
+  const Result<FileStamp> found = StampFiles(stamp.paths);
+  if (!found.ok()) return found.status();
+  return found->digest != stamp.digest;
 }
 
 }  // namespace slabstream

@@ -103,7 +103,9 @@ std::string DatasetMachine::State::OwnSourceOf(const std::string& dataset, int f
   const DatasetTable::Entry& entry = *datasets.Find(dataset);
   if (entry.fields == nullptr || field == entry.fields->field) return dataset;
   std::string name = PartName(dataset, field, entry.fields->time);
-  datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, entry.fields->time, nullptr), now);
+  DataSource at = AtFieldAndTime(entry.source, *entry.fields, field, entry.fields->time, nullptr);
+  if (entry.fields->fields[std::size_t(field)].channel) at.beside = entry.opened;
+  datasets.AddPart(name, std::move(at), now);
   return name;
 }
 
@@ -127,7 +129,9 @@ Result<DatasetMachine::State::FieldSource> DatasetMachine::State::SourceOf(const
     entry.statistics[field] = found.overview();
   }
   std::string name = PartName(dataset, field, time);
-  parts_came |= datasets.AddPart(name, AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field)), now);
+  DataSource at = AtFieldAndTime(entry.source, *entry.fields, field, time, entry.statistics.at(field));
+  at.beside = datasets.Find(own)->opened;
+  parts_came |= datasets.AddPart(name, std::move(at), now);
   return FieldSource{name};
 }
 
@@ -352,6 +356,7 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
     if (!datasets.Holds(event.dataset)) actions.emplace_back(UnloadDataset{event.dataset});  // the executor has its voxels
     return;
   }
+  datasets.Find(event.name)->opened = event.opened;
   const Index3& size = event.summary->description.geometry.size;
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "{} is {}: {} x {} x {} voxels, {}, {:.1f} ms", Named(event.name),
        event.summary->stored && event.bytes == 0 ? "open, and its voxels stay where they are" : "loaded", size.x, size.y, size.z,
@@ -375,6 +380,7 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
 void DatasetMachine::State::On(const DatasetOpened& event) {
   const int count = int(event.levels->levels.size());
   if (!datasets.Opened(event.name, event.load, event.levels, event.sources, event.stamp, event.fields, now)) return;
+  datasets.Find(event.name)->opened = event.opened;
   const Index3& size = event.levels->levels.front().geometry.size;
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "{} is open: {} x {} x {} voxels at the finest of {} levels", Named(event.name), size.x,
        size.y, size.z, count);

@@ -73,6 +73,7 @@ struct DatasetLoaded {
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // the state of its files when they were read; null: they never change
   std::shared_ptr<const DatasetFields> fields = {};  // null: of a part, or there is one, of which nothing is known
+  std::shared_ptr<VolumeSource> opened = {};         // LoadedSource::source; null: of a level
 };
 // The dataset has several levels. None of them was loaded yet.
 struct DatasetOpened {
@@ -82,6 +83,7 @@ struct DatasetOpened {
   std::vector<DataSource> sources;             // the source of each level
   std::shared_ptr<const FileStamp> stamp;      // as DatasetLoaded::stamp
   std::shared_ptr<const DatasetFields> fields = {};
+  std::shared_ptr<VolumeSource> opened = {};
 };
 struct DatasetReading {  // not the end yet
   std::string name;

@@ -218,6 +218,7 @@ DatasetId DatasetTable::Unload(const std::string& name, Time now) {
   const DatasetId id = entry.id;
   Entry unloaded = Forgotten(entry, now);
   unloaded.fields = entry.fields;  // parts may be asked for before it is loaded again
+  unloaded.opened = std::move(entry.opened);
   unloaded.statistics = std::move(entry.statistics);
   entry = std::move(unloaded);
   retired_.erase(id);

@@ -159,7 +159,8 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   samples.description = volume->description;
   const DatasetId id = IdOf(action.name, *volume, loaded.labels.get(), loaded.exact.get());
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file)},
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file),
+                            loaded.source},
               id, std::move(samples)};
 }
 
@@ -185,10 +186,13 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
   }
   if (sources.size() == 1) {
     Result<News> loaded = LoadLevel(action, *sources.front().at_level, tell);
-    if (loaded.ok()) std::get<DatasetLoaded>(loaded->event).fields = fields;
+    if (loaded.ok()) {
+      std::get<DatasetLoaded>(loaded->event).fields = fields;
+      std::get<DatasetLoaded>(loaded->event).opened = opened.source;
+    }
     return loaded;
   }
-  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp, fields}};
+  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp, fields, opened.source}};
 }
 
 // Holds the voxels of the level if there is room for them.

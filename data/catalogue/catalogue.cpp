@@ -217,11 +217,11 @@ std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, cons
 void AddOtherTimes(const DataSource& source, ReadableSource& read) {
   if (source.statistics != nullptr) return;
   if (auto* const loaded = std::get_if<LoadedSource>(&read)) {
-    loaded->other_times = SurveyOtherTimes(source.path, loaded->file);
+    loaded->other_times = SurveyOtherTimes(source.path, loaded->file, loaded->source.get());
     return;
   }
   auto& opened = std::get<OpenedSource>(read);
-  const std::vector<VolumeSummary> others = SurveyOtherTimes(source.path, opened.source->info());
+  const std::vector<VolumeSummary> others = SurveyOtherTimes(source.path, opened.source->info(), opened.source.get());
   if (!others.empty()) opened.survey.summary = std::make_shared<const VolumeSummary>(OverTimes(*opened.survey.summary, others));
 }
 
@@ -312,12 +312,13 @@ Result<ReadableSource> ReadStream(const DataSource& data, std::uint64_t most_byt
   return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress, data.statistics);
 }
 
-Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
+// `beside`: as of OpenSource.
+Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uint64_t most_bytes, ReadProgress& progress) {
   Result<SourceText> text = ParseSourceText(data.path);
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
   text->options.describe = true;
-  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(text->path, text->options, ProcessReadContext());
+  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(text->path, text->options, ProcessReadContext(), beside);
   if (!opened.ok()) return opened.status();
   std::shared_ptr<VolumeSource> source = *opened;
   std::string place = PlaceOf(data, *text);
@@ -505,7 +506,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     ReadProgress progress(tell);
-    const Result<WayToRead> way = FindWay(source, most_bytes, progress);
+    const Result<WayToRead> way = FindWay(source, attempt == 0 ? source.beside.get() : nullptr, most_bytes, progress);
     if (!way.ok()) return way.status();
     if (const Status alone = source.sent ? source.sent->CheckAlone(way->files) : Status::Ok(); !alone.ok()) return alone;
     const Result<FileStamp> before = StampFiles(way->files);
@@ -515,6 +516,8 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     const Result<std::uint64_t> version = VersionOf(opened.files);
     if (!opened.files.empty() && (!version.ok() || *version != opened.version)) continue;  // they have changed since it was opened
     Result<ReadableSource> read = way->read();
+    auto* const loaded = read.ok() ? std::get_if<LoadedSource>(&*read) : nullptr;
+    if (loaded != nullptr && opened.in_parts()) loaded->source = way->source;
     if (read.ok()) AddOtherTimes(source, *read);
     Result<std::shared_ptr<const FileStamp>> stamp = std::shared_ptr<const FileStamp>();
     if (read.ok()) stamp = StampOf(*read, *before);

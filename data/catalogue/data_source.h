@@ -69,6 +69,8 @@ struct DataSource {
   // Range and histogram of its field over the times of its dataset. Set: this is another time than the one that the dataset shows itself,
   // and is not surveyed. Null: they are those that a survey finds.
   std::shared_ptr<const VolumeSummary> statistics = {};
+  // What is open of the same place, at another time or channel (OpenSource); null: nothing.
+  std::shared_ptr<VolumeSource> beside = {};
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
   DataLoader load;                         // set: `path` is not used

@@ -133,6 +133,8 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   PyramidLevel level{.array = *array,
                      .mirrored = placed->turn.flipped,
                      .at = choice->at,
+                     .time_axis = choice->time_axis,
+                     .channel_axis = choice->channel_axis,
                      .spacing = placed->geometry.spacing,
                      .origin = placed->geometry.orientation.origin};
   for (std::size_t i = 0; i < 3; ++i) level.axes[i] = choice->axes[std::size_t(placed->turn.from[i])];

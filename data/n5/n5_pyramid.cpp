@@ -223,7 +223,8 @@ class Container {
     if (!choice.ok()) return choice.status();
     choice->Describe(pyramid.info);
     pyramid.info.times = TimesOf(node.field(), group.field(), choice->times);
-    pyramid.levels.push_back({.array = *array, .axes = choice->axes, .at = choice->at});
+    pyramid.levels.push_back(
+        {.array = *array, .axes = choice->axes, .at = choice->at, .time_axis = choice->time_axis, .channel_axis = choice->channel_axis});
     return Status::Ok();
   }
 

@@ -18,7 +18,9 @@
 #include "data/sources/label_source.h"
 #include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/formats.h"
+#include "data/volume_io/raw_volume.h"
 
 namespace slabstream {
 
@@ -116,9 +118,24 @@ Result<std::shared_ptr<VolumeSource>> OpenValues(const std::string& path, const 
   return OpenRemote(found->version, options.query, [&] { return OpenAs(*found->format, path, with_store, context); });
 }
 
+std::shared_ptr<VolumeSource> Beside(VolumeSource& open, const ReadOptions& options) {
+  const SourceInfo& info = open.info();
+  const Result<std::int64_t> time = ChosenVolume("", info.times.count, options);
+  const std::vector<FieldInfo> one(1);
+  const Result<int> channel = ChosenChannel("", info.channels.empty() ? one : info.channels, options);
+  return time.ok() && channel.ok() ? open.At(int(*time), *channel) : nullptr;
+}
+
+bool IsSame(const SourceInfo& info, const StoredAt& stored) {
+  return info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
+         info.levels[std::size_t(stored.level)].block == stored.block.end;
+}
+
 }  // namespace
 
-Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context,
+                                                 VolumeSource* beside) {
+  if (std::shared_ptr<VolumeSource> at = beside != nullptr ? Beside(*beside, options) : nullptr; at != nullptr) return at;
   Result<std::shared_ptr<VolumeSource>> source = OpenValues(path, options, context);
   if (source.ok() && options.hollow) return AsHollow(*std::move(source));
   if (source.ok() && options.labels) source = AsLabels(*std::move(source));
@@ -131,10 +148,15 @@ Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, con
   text->options.describe = true;
   Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, context);
   if (!source.ok()) return source;
-  const SourceInfo& info = (*source)->info();
-  const bool same = info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
-                    info.levels[std::size_t(stored.level)].block == stored.block.end;
-  return same ? source : Status::Unavailable(text->path + ": another one than the coordinator's");
+  return IsSame((*source)->info(), stored) ? source : Status::Unavailable(text->path + ": another one than the coordinator's");
+}
+
+std::shared_ptr<VolumeSource> SameSourceBeside(VolumeSource& beside, const std::string& text, const StoredAt& stored) {
+  const auto place = [](const std::string& source) { return WithoutReadOption(AtTime(source, std::nullopt), "channel"); };
+  Result<SourceText> wanted = ParseSourceText(stored.source);
+  if (!IsSame(beside.info(), stored) || !wanted.ok() || place(text) != place(stored.source)) return nullptr;
+  wanted->options.describe = true;
+  return Beside(beside, wanted->options);
 }
 
 const SourceContext& ProcessReadContext() {

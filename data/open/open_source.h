@@ -34,12 +34,16 @@ bool LooksLikeVolume(const std::string& path);
 // Reads headers and checks what can be checked without the samples: sizes, types, the lengths of files, orientation. Errors of CheckVolume
 // and FindRemoteFormat; InvalidArgument: more than three dimensions, several components, a side above kMaxVolumeSide; DataLoss: truncated;
 // ResourceExhausted: it does not fit the memory, and cannot be read in parts; Unavailable: its files change meanwhile (OpenUnchanged, which
-// also says what becomes of a source whose files change later).
-Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context);
+// also says what becomes of a source whose files change later). `beside`, if any: what is open there, by options that differ in time and
+// channel at most. Where it can, it gives those without reading anything (VolumeSource::At).
+Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context,
+                                                 VolumeSource* beside = nullptr);
 
 // The source of a dataset, opened once more: by another process, or for another purpose. Unavailable: it is another one than the
 // coordinator's. Errors of ParseSourceText and OpenSource. Waits.
 Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, const SourceContext& context);
+// The same without reading anything: what `beside` gives, which was opened as `text` says. Null: it gives none.
+std::shared_ptr<VolumeSource> SameSourceBeside(VolumeSource& beside, const std::string& text, const StoredAt& stored);
 
 // The context of this process, made at its first use. It takes SourceBytes of the memory that was said before, or else of what the
 // machine has for the process (common/volume/memory_budget.h).

@@ -35,6 +35,16 @@ struct Marker {
   std::future<Result<Bytes>> answer;
 };
 
+class RemoteSource : public DescribedSource {
+ public:
+  using DescribedSource::DescribedSource;
+
+ private:
+  std::shared_ptr<VolumeSource> Around(std::shared_ptr<VolumeSource> source, SourceInfo info) const override {
+    return std::make_shared<RemoteSource>(std::move(source), std::move(info));
+  }
+};
+
 bool MayBeJsonObject(std::span<const std::byte> bytes) {
   constexpr std::string_view kBlank = "\xEF\xBB\xBF \t\r\n";  // and a byte order mark
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -79,9 +89,11 @@ Result<std::shared_ptr<VolumeSource>> OpenRemote(std::uint64_t version, std::str
   if (!source.ok()) return source;
   SourceInfo info = (*source)->info();
   info.files.clear();
-  info.version = version;
+  // The markers may stay what they are when a store grows.
+  const int times = info.times.count;
+  info.version = times > 1 ? XXH3_64bits_withSeed(&times, sizeof times, version) : version;
   if (!query.empty()) info.notes.push_back(fmt::format("each request has the query of the address: {}", fmt::join(NamesIn(query), ", ")));
-  return std::shared_ptr<VolumeSource>(std::make_shared<DescribedSource>(*std::move(source), std::move(info)));
+  return std::shared_ptr<VolumeSource>(std::make_shared<RemoteSource>(*std::move(source), std::move(info)));
 }
 
 }  // namespace slabstream

@@ -23,7 +23,8 @@ struct RemoteFormat {
 // none that tells. Waits.
 Result<RemoteFormat> FindRemoteFormat(Store& store, std::span<const VolumeFormat> formats);
 
-// The source that `open` gives, without files, of this version, and with a note of the address' own query, if it has one. Errors of `open`.
+// The source that `open` gives, without files, of a version that this one and the number of its times tell, and with a note of the address'
+// own query, if it has one. Errors of `open`.
 Result<std::shared_ptr<VolumeSource>> OpenRemote(std::uint64_t version, std::string_view query, const OpenFunction& open);
 
 }  // namespace slabstream

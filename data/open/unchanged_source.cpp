@@ -32,8 +32,8 @@ struct Watched {
 
 class UnchangedSource : public DescribedSource {
  public:
-  UnchangedSource(std::shared_ptr<VolumeSource> source, SourceInfo info, Watched watched)
-      : DescribedSource(std::move(source), std::move(info)), watched_(std::make_shared<const Watched>(std::move(watched))) {}
+  UnchangedSource(std::shared_ptr<VolumeSource> source, SourceInfo info, std::shared_ptr<const Watched> watched)
+      : DescribedSource(std::move(source), std::move(info)), watched_(std::move(watched)) {}
 
   using VolumeSource::Read;
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
@@ -47,6 +47,10 @@ class UnchangedSource : public DescribedSource {
     Result<LevelInMemory> read = source_->ReadLevel(level, progress, wanted);
     if (Status end = watched_->EndOf(read.status()); !end.ok()) return end;
     return read;
+  }
+
+  std::shared_ptr<VolumeSource> Around(std::shared_ptr<VolumeSource> source, SourceInfo info) const override {
+    return std::make_shared<UnchangedSource>(std::move(source), std::move(info), watched_);
   }
 
   const std::shared_ptr<const Watched> watched_;
@@ -73,8 +77,8 @@ Result<std::shared_ptr<VolumeSource>> OpenUnchanged(const std::string& path, con
     if (!version.ok()) return version.status();
     SourceInfo info = (*source)->info();
     info.version = *version;
-    return std::shared_ptr<VolumeSource>(
-        std::make_shared<UnchangedSource>(*std::move(source), std::move(info), Watched{path, *std::move(stamp)}));
+    return std::shared_ptr<VolumeSource>(std::make_shared<UnchangedSource>(
+        *std::move(source), std::move(info), std::make_shared<const Watched>(Watched{path, *std::move(stamp)})));
   }
   return Printable(Status::Unavailable(path + ": changes while it is opened"));
 }

@@ -149,8 +149,10 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
   for (std::size_t i = 0; i < scales.size(); ++i) {
     const Result<Scale> scale = ParseScale(scales[i], *type, *channels);
     if (!scale.ok()) return scale.status();
-    PyramidLevel level{
-        .array = MakeArray(store, *scale, *type, *channels, context), .axes = {3, 2, 1}, .at = {std::uint64_t(*channel), 0, 0, 0}};
+    PyramidLevel level{.array = MakeArray(store, *scale, *type, *channels, context),
+                       .axes = {3, 2, 1},
+                       .at = {std::uint64_t(*channel), 0, 0, 0},
+                       .channel_axis = 0};
     for (int axis = 0; axis < 3; ++axis) {
       const auto at = std::size_t(axis);
       level.spacing[axis] = scale->resolution[at];

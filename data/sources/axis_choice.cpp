@@ -48,20 +48,21 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 Result<ChosenAxes> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
                               const ReadOptions& options, std::vector<FieldInfo> channels) {
   ChosenAxes choice{.at = std::vector<std::uint64_t>(kinds.size(), 0)};
-  std::uint64_t times = 1, channel_count = 1;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     switch (kinds[axis]) {
       case AxisKind::kX: choice.axes[0] = int(axis); break;
       case AxisKind::kY: choice.axes[1] = int(axis); break;
       case AxisKind::kZ: choice.axes[2] = int(axis); break;
-      case AxisKind::kTime: times = sizes[axis]; break;
-      case AxisKind::kChannel: channel_count = sizes[axis]; break;
+      case AxisKind::kTime: choice.time_axis = int(axis); break;
+      case AxisKind::kChannel: choice.channel_axis = int(axis); break;
       case AxisKind::kOther:
         if (sizes[axis] == 1) break;
         return Wrong(array,
                      fmt::format("axis {} has {} indices and is none of x, y, z, time and channel, so it must have 1", axis, sizes[axis]));
     }
   }
+  const auto count_along = [&](int axis) { return axis < 0 ? std::uint64_t{1} : sizes[std::size_t(axis)]; };
+  const std::uint64_t times = count_along(choice.time_axis), channel_count = count_along(choice.channel_axis);
   if (times > std::uint64_t{kMaxVolumes}) return Wrong(array, fmt::format("has {} times, at most {} are supported", times, kMaxVolumes));
   const Result<std::int64_t> time = ChosenVolume(array, std::int64_t(times), options);
   if (!time.ok()) return time.status();
@@ -75,10 +76,8 @@ Result<ChosenAxes> ChooseAxes(const std::string& array, const std::vector<AxisKi
   choice.channels = std::move(channels);
   choice.time = int(*time);
   choice.channel = *channel;
-  for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
-    if (kinds[axis] == AxisKind::kTime) choice.at[axis] = std::uint64_t(*time);
-    if (kinds[axis] == AxisKind::kChannel) choice.at[axis] = std::uint64_t(*channel);
-  }
+  if (choice.time_axis >= 0) choice.at[std::size_t(choice.time_axis)] = std::uint64_t(*time);
+  if (choice.channel_axis >= 0) choice.at[std::size_t(choice.channel_axis)] = std::uint64_t(*channel);
   return choice;
 }
 

@@ -18,6 +18,7 @@ namespace slabstream {
 struct ChosenAxes {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
+  int time_axis = -1, channel_axis = -1;   // the same of time and channel
   std::vector<FieldInfo> channels = {};    // at least one
   int times = 1, time = 0, channel = 0;
 

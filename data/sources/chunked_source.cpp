@@ -87,6 +87,21 @@ class Level : public std::enable_shared_from_this<Level> {
   }
   ~Level() { context_->cache().Forget(owner_); }
 
+  // The same level at another time and channel, of which it has so many. Null: these are no axes of its array.
+  std::shared_ptr<Level> At(const SourceInfo& of, int time, int channel) const {
+    PyramidLevel level = level_;
+    const auto set = [&](int axis, int from, int to, std::size_t count) {
+      if (axis >= 0 && level.array->shape().size[std::size_t(axis)] == count) {
+        level.at[std::size_t(axis)] = std::uint64_t(to);
+        return true;
+      }
+      return from == to;
+    };
+    const bool is_there = set(level.time_axis, of.time, time, std::size_t(of.times.count)) &&
+                          set(level.channel_axis, of.channel, channel, std::max<std::size_t>(of.channels.size(), 1));
+    return is_there ? std::make_shared<Level>(name_, std::move(level), size_, context_, findings_) : nullptr;
+  }
+
   const Index3& chunk() const { return chunk_; }
   VolumeSource::Counts counts() const { return {stored_bytes_, chunks_}; }
 
@@ -343,6 +358,21 @@ class ChunkedSource : public VolumeSource {
       : name_(std::move(name)), info_(std::move(info)), levels_(std::move(levels)) {}
 
   const SourceInfo& info() const override { return info_; }
+
+  std::shared_ptr<VolumeSource> At(int time, int channel) override {
+    const int channels = std::max(int(info_.channels.size()), 1);
+    if (std::min(time, channel) < 0 || time >= info_.times.count || channel >= channels) return nullptr;
+    SourceInfo info = info_;
+    info.time = time;
+    info.channel = channel;
+    info.growth = nullptr;
+    std::vector<std::shared_ptr<Level>> levels;
+    for (const std::shared_ptr<Level>& level : levels_) {
+      levels.push_back(level->At(info_, time, channel));
+      if (levels.back() == nullptr) return nullptr;
+    }
+    return std::make_shared<ChunkedSource>(name_, std::move(info), std::move(levels));
+  }
 
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     const VolumeDescription& description = info_.levels.at(std::size_t(level)).description;

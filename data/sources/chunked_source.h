@@ -24,10 +24,11 @@ struct PyramidLevel {
   std::shared_ptr<ChunkedArray> array;
   // Axes of the array that are x, y and z; -1: it has no such axis, so the volume is one voxel thick there.
   std::array<int, 3> axes = {2, 1, 0};
-  std::array<bool, 3> mirrored = {};  // the first voxel along x, y or z is the array's last element there
-  std::vector<std::uint64_t> at;      // index along each axis of the array; along x, y and z it does not matter
-  Vec3 spacing = {1, 1, 1};           // > 0, finite
-  Vec3 origin;                        // in the world, of the centre of the level's first voxel
+  std::array<bool, 3> mirrored = {};      // the first voxel along x, y or z is the array's last element there
+  std::vector<std::uint64_t> at;          // index along each axis of the array; along x, y and z it does not matter
+  int time_axis = -1, channel_axis = -1;  // along which `at` says the time and the channel; -1: there is no such axis
+  Vec3 spacing = {1, 1, 1};               // > 0, finite
+  Vec3 origin;                            // in the world, of the centre of the level's first voxel
 };
 
 struct Pyramid {

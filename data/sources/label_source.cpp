@@ -110,6 +110,10 @@ class LabelSource final : public DescribedSource {
   }
 
  private:
+  std::shared_ptr<VolumeSource> Around(std::shared_ptr<VolumeSource> source, SourceInfo /*info*/) const override {
+    return AsLabels(std::move(source));
+  }
+
   static SourceInfo Described(SourceInfo info, const LabelType& type) {
     for (SourceLevel& level : info.levels) {
       level.description.type = type.type;

@@ -27,6 +27,16 @@ Status VolumeSource::ReadNow(int level, const Box& box, const BoxRoom& out, std:
   return read.get();
 }
 
+std::shared_ptr<VolumeSource> DescribedSource::At(int time, int channel) {
+  std::shared_ptr<VolumeSource> at = source_->At(time, channel);
+  if (at == nullptr) return nullptr;
+  SourceInfo info = info_;
+  info.time = time;
+  info.channel = channel;
+  info.growth = nullptr;  // who names a time does not wait for more
+  return Around(std::move(at), std::move(info));
+}
+
 std::uint64_t VolumeSource::TakeStoredBytes() {
   const std::uint64_t now = counts().stored_bytes;
   std::uint64_t taken = taken_bytes_;

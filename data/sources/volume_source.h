@@ -71,7 +71,8 @@ struct SourceInfo {
   std::vector<std::string> notes = {};
   std::vector<std::string> files = {};  // whose time of change tells that it is another volume now (FileStamp)
   std::uint64_t version = 0;            // the version of these files when it was opened (VersionOf); only an opened source has one
-  // Of times that are files: the state of their folder, in which more may come, before they were counted. Null: there are no such.
+  // Where more times may come: the state of the folder of such files before they were counted, or of a store behind an address. Null:
+  // `files` tell.
   std::shared_ptr<const FileStamp> growth = {};
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
@@ -119,6 +120,10 @@ class VolumeSource {
 
   virtual const SourceInfo& info() const = 0;
 
+  // Another time and channel of what is open, as `info` counts them. Reads nothing, so what has been read of it counts for this one, too.
+  // Null: it must be opened for itself, since its format has metadata of each; or there is no such.
+  virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
+
   using ReadDone = std::function<void(Status)>;
   // Fills `out` with the samples of `box`, of the level's type or, if out.exact, as they are stored, and writes nothing between its rows.
   // `box` is not empty and lies inside the level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay
@@ -163,12 +168,16 @@ class DescribedSource : public VolumeSource {
 
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return source_->counts(); }
+  std::shared_ptr<VolumeSource> At(int time, int channel) final;
   using VolumeSource::Read;
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     source_->Read(level, box, out, std::move(stop), std::move(done));
   }
 
  protected:
+  // `source`: another time or channel of source_; `info`: of this one, which shows those. Null: such a source has no others.
+  virtual std::shared_ptr<VolumeSource> Around(std::shared_ptr<VolumeSource> /*source*/, SourceInfo /*info*/) const { return nullptr; }
+
   const std::shared_ptr<VolumeSource> source_;
   const SourceInfo info_;
 };

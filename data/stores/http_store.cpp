@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <functional>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -71,6 +72,18 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   Result<std::vector<std::string>> List(const std::string& folder) override {
     return Printable(Status::InvalidArgument(fmt::format("{}{}{}: a web server does not say what lies there; name the array (?array=)",
                                                          url_, folder.empty() ? "" : "/", folder)));
+  }
+
+  std::future<Result<bool>> HasChanged(const std::string& key) override {
+    HttpGet get{.url = UrlOf(key), .most = kMostMetadataBytes, .known = seen_.StrongVersionOf(key), .access = access_};
+    const auto answer = std::make_shared<std::promise<Result<bool>>>();
+    transfers_.Get(std::move(get), [self = shared_from_this(), key, answer](const Result<HttpObject>& object) {
+      if (!object.ok()) return answer->set_value(object.status());
+      const SeenObjects::News news{object->version, object->size, SeenObjects::Part{{}, object->bytes.size(), DigestOf(object->bytes)}};
+      answer->set_value(!object->unchanged && object->instead.empty() &&
+                        self->seen_.Judge(key, news, MonotonicNow()) != SeenObjects::Verdict::kSame);
+    });
+    return answer->get_future();
   }
 
   const std::string& name() const override { return url_; }

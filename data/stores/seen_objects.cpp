@@ -91,6 +91,13 @@ bool SeenObjects::IsFresh(const std::string& key, const std::string& version, Ti
   return found != seen_.end() && Holds(found->second.versions, version) && found->second.said && now - *found->second.said < kFresh;
 }
 
+std::string SeenObjects::StrongVersionOf(const std::string& key) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = seen_.find(key);
+  const bool is_strong = found != seen_.end() && !found->second.versions.empty() && found->second.versions.back().starts_with('"');
+  return is_strong ? found->second.versions.back() : "";
+}
+
 bool SeenObjects::IsMissing(const std::string& key, Time now) const {
   const std::lock_guard lock(mutex_);
   const auto found = seen_.find(key);

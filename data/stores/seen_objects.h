@@ -52,6 +52,8 @@ class SeenObjects {
   // Whether it said so less than kFresh before `now`.
   bool IsFresh(const std::string& key, const std::string& version, Time now) const;
   bool IsMissing(const std::string& key, Time now) const;
+  // The ETag that it has had last, unless that is a weak one; "": there is none.
+  std::string StrongVersionOf(const std::string& key) const;
 
  private:
   struct Seen {

@@ -44,6 +44,9 @@ class Store {
   // the store cannot list.
   virtual Result<std::vector<std::string>> List(const std::string& folder) = 0;
 
+  // Begins to find out whether an object that was read is another one now. Stores that cannot tell say no. Errors of Read.
+  virtual std::future<Result<bool>> HasChanged(const std::string& key);
+
   // For messages: "/data/scan.ome.zarr". With a key behind it it names an object.
   virtual const std::string& name() const = 0;
 };

@@ -260,6 +260,7 @@ Result<std::shared_ptr<VolumeSource>> OpenTiff(const std::string& path, const Re
     pyramid.levels.push_back(
         {.array = std::make_shared<TiffPagesArray>(name, pool, std::move(level.places), level.picture, level.chunks, context),
          .at = std::move(at),
+         .channel_axis = header.channels.empty() && header.components > 1 ? 3 : -1,
          .spacing = spacing,
          .origin = geometry.orientation.origin + first});
   }

@@ -22,7 +22,8 @@ using Objects = std::map<std::string, std::string, std::less<>>;  // by their ke
 
 class ConsolidatedStore : public Store {
  public:
-  ConsolidatedStore(std::shared_ptr<Store> store, Objects objects) : store_(std::move(store)), objects_(std::move(objects)) {
+  ConsolidatedStore(std::shared_ptr<Store> store, std::string root, Objects objects)
+      : store_(std::move(store)), root_(std::move(root)), objects_(std::move(objects)) {
     for (const auto& [key, text] : objects_) nodes_.insert(key.substr(0, NodeEnd(key)));
   }
 
@@ -50,6 +51,8 @@ class ConsolidatedStore : public Store {
     return std::vector<std::string>(names.begin(), names.end());
   }
 
+  std::future<Result<bool>> HasChanged(const std::string& key) override { return store_->HasChanged(objects_.contains(key) ? root_ : key); }
+
   const std::string& name() const override { return store_->name(); }
 
  private:
@@ -60,6 +63,7 @@ class ConsolidatedStore : public Store {
   }
 
   const std::shared_ptr<Store> store_;
+  const std::string root_;  // the object that holds those of all nodes
   const Objects objects_;
   std::set<std::string, std::less<>> nodes_;
 };
@@ -73,7 +77,8 @@ std::optional<Json> ReadIfThere(metadata::JsonReading& reading) {
 }  // namespace
 
 std::shared_ptr<Store> WithConsolidatedMetadata(std::shared_ptr<Store> store) {
-  metadata::JsonReading of_root(*store, kNode3), of_all(*store, ".zmetadata");
+  constexpr const char* kAll = ".zmetadata";
+  metadata::JsonReading of_root(*store, kNode3), of_all(*store, kAll);
   const std::optional<Json> root = ReadIfThere(of_root), all = ReadIfThere(of_all);
   Objects objects;
   if (root) {
@@ -87,7 +92,7 @@ std::shared_ptr<Store> WithConsolidatedMetadata(std::shared_ptr<Store> store) {
       for (const auto& [key, object] : nodes.value().items()) objects.emplace(key, object.dump());
     }
   }
-  return objects.empty() ? store : std::make_shared<ConsolidatedStore>(std::move(store), std::move(objects));
+  return objects.empty() ? store : std::make_shared<ConsolidatedStore>(std::move(store), root ? kNode3 : kAll, std::move(objects));
 }
 
 }  // namespace slabstream::zarr

@@ -194,10 +194,10 @@ Status UnpackValues(const ZarrNode& node, ZarrArray& array, Pyramid& pyramid) {
 PyramidLevel LevelOf(const ZarrArray& array, const ChosenAxes& choice) {
   PyramidLevel level{.array = array.array};
   for (const std::size_t axis : array.from) level.at.push_back(choice.at[axis]);
-  for (std::size_t i = 0; i < level.axes.size(); ++i) {
-    const auto place = std::ranges::find(array.from, std::size_t(choice.axes[i]));
-    level.axes[i] = choice.axes[i] < 0 ? -1 : int(place - array.from.begin());
-  }
+  const auto place = [&](int axis) { return axis < 0 ? -1 : int(std::ranges::find(array.from, std::size_t(axis)) - array.from.begin()); };
+  std::ranges::transform(choice.axes, level.axes.begin(), place);
+  level.time_axis = place(choice.time_axis);
+  level.channel_axis = place(choice.channel_axis);
   return level;
 }
 

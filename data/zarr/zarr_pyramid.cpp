@@ -18,6 +18,7 @@
 #include "common/base/printable.h"
 #include "common/text/url.h"
 #include "data/metadata/open_store_for.h"
+#include "data/stores/watched_object.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/stated_field.h"
@@ -139,6 +140,12 @@ Status PlaceInWorld(const Field& own, Pyramid& pyramid) {
   return Status::Ok();
 }
 
+// Behind an address the shape of the finest array tells that times have come.
+void Follow(const std::shared_ptr<Store>& store, const std::string& array_key, const ReadOptions& options, Pyramid& pyramid) {
+  if (options.time || pyramid.levels.front().time_axis < 0 || !IsUrl(store->name())) return;
+  pyramid.info.growth = WatchObject(store, array_key);
+}
+
 Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options, std::set<std::string>& keys) {
   const std::string name = NameOf(*context.store, node.path);
   const Result<OmeImage> image = ParseOmeImage(node.attributes_field());
@@ -150,6 +157,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   Pyramid pyramid;
   ChosenAxes choice;
   std::vector<std::vector<std::uint64_t>> sizes;
+  std::string finest_key;
   std::vector<NodeReading> arrays;
   for (const OmeLevel& level : image->levels) arrays.emplace_back(*context.store, Join(node.path, level.path));
   for (NodeReading& reading : arrays) {
@@ -166,7 +174,10 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
     }
     const Result<ChosenAxes> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, image->channels);
     if (!chosen.ok()) return chosen.status();
-    if (sizes.size() == 1) choice = *chosen;
+    if (sizes.size() == 1) {
+      choice = *chosen;
+      finest_key = array_node->keys.front();
+    }
     pyramid.levels.push_back(LevelOf(*array, *chosen));
   }
   PlaceLevels(*image, choice, sizes, pyramid);
@@ -182,6 +193,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
     const auto axis = std::size_t(time - kinds.begin());
     info.times = StatedTimes(choice.times, image->levels.front().place.scale[axis], image->axes[axis].time_unit);
   }
+  Follow(context.store, finest_key, options, pyramid);
   return pyramid;
 }
 
@@ -205,6 +217,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& opened, const ReadOpti
   Result<Pyramid> pyramid =
       found->node.array ? PyramidOfArray(arrays, found->node, options) : PyramidOfImage(arrays, found->node, options, found->keys);
   if (pyramid.ok()) {
+    if (found->node.array) Follow(store, found->node.keys.front(), options, *pyramid);
     pyramid->info.files = FilesOf(*store, found->keys);
     pyramid->info.folder = store->name();
   }

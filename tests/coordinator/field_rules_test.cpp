@@ -252,6 +252,36 @@ TEST_F(FieldRules, TheLastTimeIsThatOfTheFilesAsTheyAre) {
   EXPECT_THAT(LoadedNames(before + 1), ElementsAre(PartName("block", 0, 5)));
 }
 
+class NoVoxels : public VolumeSource {
+ public:
+  const SourceInfo& info() const override { return info_; }
+  void Read(int, const Box&, const BoxRoom&, std::stop_token, ReadDone done) override { done(Status::Ok()); }
+  Counts counts() const override { return {}; }
+
+ private:
+  const SourceInfo info_;
+};
+
+TEST_F(FieldRules, OtherTimesAndChannelsAreOpenedBesideWhatIsOpen) {
+  script.Client(kClient, Showing(1, {"0", "1", "overlay"}, "3"));
+  const auto answer = [&](std::size_t load, std::shared_ptr<VolumeSource> opened) {
+    const LoadDataset begun = script.loads.at(load);
+    NothingChanged(script.Step(DatasetLoaded{begun.name, begun.load, begun.load, BlockSummary(), 0, stamp_,
+                                             load == 0 ? ThreeChannels() : nullptr, std::move(opened)}));
+  };
+  const auto of_dataset = std::make_shared<NoVoxels>(), of_channel = std::make_shared<NoVoxels>();
+  EXPECT_EQ(script.loads.at(0).source.beside, nullptr);
+  answer(0, of_dataset);
+  ASSERT_THAT(LoadedNames(1), ElementsAre(PartName("block", 1, 0), PartName("block", 3, 0)));
+  EXPECT_EQ(script.loads[1].source.beside, of_dataset);
+  EXPECT_EQ(script.loads[2].source.beside, nullptr) << "the overlay lies elsewhere";
+  answer(1, of_channel);
+  answer(2, nullptr);
+  ASSERT_THAT(LoadedNames(3), ElementsAre(PartName("block", 0, 3), PartName("block", 1, 3)));
+  EXPECT_EQ(script.loads[3].source.beside, of_dataset);
+  EXPECT_EQ(script.loads[4].source.beside, of_channel);
+}
+
 TEST_F(FieldRules, WhoAsksForTheStatusHearsOfNewTimes) {
   script.Client(kClient, Showing(1, {"0"}, "0"));
   script.AnswerAll(LoadedAll());

@@ -1,7 +1,9 @@
 // Volumes with levels, and volumes that no process holds, as a user meets them.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -9,6 +11,7 @@
 
 #include "common/json/json.h"
 #include "tests/data/stores/scripted_server.h"
+#include "tests/data/zarr/zarr_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/whole_file.h"
@@ -66,6 +69,38 @@ TEST_F(InPartsTest, VolumesBehindAWebServerAreShownLikeFiles) {
   EXPECT_LE(LargestDifference(Render(url, look), Render(levels, look)), kSame);
   std::filesystem::create_directory(Path("nothing"));
   ExpectRefused({"info", server.url() + "/nothing"}, "/nothing: is no volume that can be read from an address");
+}
+
+// Coordinator and workers open the dataset, and each of its times by that.
+TEST_F(InPartsTest, OtherTimesBehindAWebServerCostNoMetadata) {
+  constexpr std::uint64_t kTimes = 12, kSide = 112;  // more than the coordinator would hold of each time
+  const Json scale = {{"type", "scale"}, {"scale", {1, 1, 1, 1}}};
+  Json image = {{"version", "0.4"},
+                {"axes", Json::array()},
+                {"datasets", Json::array({{{"path", "0"}, {"coordinateTransformations", Json::array({scale})}}})}};
+  for (const char* const axis : {"t", "z", "y", "x"}) image["axes"].push_back({{"name", axis}, {"type", *axis == 't' ? "time" : "space"}});
+  WriteZarrGroup(Path("times.zarr"), 2, {{"multiscales", Json::array({image})}});
+  WriteZarrArray(Path("times.zarr/0"),
+                 {.shape = {kTimes, kSide, kSide, kSide}, .chunk = {1, 56, 56, 56}, .type = SampleType::kUint8, .separator = '/'},
+                 [](std::span<const std::uint64_t> at) { return double(at[3] > 8 * at[0] ? 100 + at[1] % 16 : 0); });
+  const ScriptedServer server(ServesFolder(Path("")));
+  const auto movie = [&](const std::string& source, const std::string& name) {
+    MustRun({"turntable", source, "--local=2", "--time", fmt::format("0:{}", kTimes - 1), "--turns", "0", "--in-flight", "1", "--size",
+             "64", "--no-fit", "-o", name + "_%d.exr"});
+  };
+  const auto metadata = [&] {
+    return std::ranges::count_if(server.requests(), [](const ServerRequest& each) { return each.target.find("/.z") != std::string::npos; });
+  };
+  MustRun({"info", server.url() + "/times.zarr"});
+  const auto to_open = metadata();
+  movie(server.url() + "/times.zarr", "far");
+  EXPECT_LE(metadata() - to_open, 6 * to_open) << "of the command, the coordinator, and workers, at most twice each";
+  movie("times.zarr", "near");
+  for (std::uint64_t time = 0; time < kTimes; ++time) {
+    const std::string end = fmt::format("_{}.exr", time);
+    EXPECT_LE(LargestDifference(ReadPicture(Path("far" + end)), ReadPicture(Path("near" + end))), kSame) << time;
+  }
+  EXPECT_GT(LargestDifference(ReadPicture(Path("far_0.exr")), ReadPicture(Path("far_11.exr"))), 0.1);
 }
 
 TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {

@@ -814,7 +814,9 @@ class TurntableTest(unittest.TestCase):
         self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
         self.programs.environment["PATH"] = f"{self.programs.folder}/bin:{os.environ['PATH']}"
         (self.programs.folder / "bin").mkdir()
-        self.service, self.endpoint = self.programs.up("--data", "a=a.nrrd")
+        for time in range(3):
+            self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.05 * (time + 1), "-o", f"t_{time}.nrrd")
+        self.service, self.endpoint = self.programs.up("--data", "a=a.nrrd", "--data", "times=t_*.nrrd")
 
     def gateway(self, script):
         if script:
@@ -883,13 +885,25 @@ class TurntableTest(unittest.TestCase):
         head = gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2", method="HEAD")
         self.assertEqual((head[0], head[2]), (200, b""))
 
+    def test_its_frames_are_spread_over_times(self):
+        gateway = self.gateway("exec cat")
+        fields = {"dataset": "times", "size": "24x16", "renderer": "mip", "background": "#204060", "no-fit": "true"}
+        pictures = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**fields, "time": time}))[2]))
+                    for time in range(3)]
+        self.assertEqual(len(set(pictures)), 3)
+        for options, shown in [({"time": "0:2"}, [0, 1, 2]), ({"time": "0:2:2"}, [0, 2]), ({"time": "1:2", "frames": 5}, [1, 1, 1, 2, 2]),
+                               ({"time": "2", "frames": 2}, [2, 2])]:
+            movie = gateway.request("/api/v1/turntable.mp4?" + urllib.parse.urlencode({**fields, "turns": 0, **options}))[2]
+            self.assertEqual(movie, b"".join(pictures[time] for time in shown), options)
+
     def test_wrong_ones_are_refused_before_they_begin(self):
         gateway = self.gateway("exec cat")
         for fields, status, why in [
             ({}, 400, "dataset is missing"), ({"dataset": "none"}, 404, "none"), ({"dataset": "a", "frames": 0}, 400, "[1, 1000]"),
             ({"dataset": "a", "frames": 1001}, 400, "[1, 1000]"), ({"dataset": "a", "turns": -1}, 400, "turns"), ({"dataset": "a", "fps": "nan"}, 400, "fps"),
             ({"dataset": "a", "size": "33x32"}, 400, "must be even"), ({"dataset": "a", "size": "4096x2048"}, 400, "at most 4194304"),
-            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"),
+            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"), ({"dataset": "a", "time": "2:1"}, 400, "time"),
+            ({"dataset": "times", "time": "1:3"}, 400, "times 0 to 2"), ({"dataset": "times", "time": "0:5000"}, 400, "[1, 1000]"),
             ({"dataset": "a", "path": "[{}, {}]", "azimuth": 3}, 400, "path excludes azimuth"), ({"dataset": "a", "path": "[{}]"}, 400, "2 to 1000 cameras"),
             ({"dataset": "a", "path": '[{}, {"zoom": 0}]'}, 400, "camera 2 of the path: zoom"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
             got, body = gateway.json("/api/v1/turntable.mp4?" + urllib.parse.urlencode(fields))

@@ -10,6 +10,8 @@
 #include <thread>
 
 #include "data/open/open_source.h"
+#include "tests/data/stores/scripted_server.h"
+#include "tests/data/zarr/zarr_files.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -68,6 +70,32 @@ TEST_F(StoredVoxelsTest, WhatCannotBeReadAnyMoreIsLeftToTheCoordinatorUntilItIsS
   EXPECT_FALSE(Begin(now));
   fs::rename(elsewhere_, path_);
   EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now + StoredVoxels::kLookAgain)));
+}
+
+TEST_F(StoredVoxelsTest, OtherTimesBehindAnAddressAreReadAtOnce) {
+  const ZarrSpec spec{.shape = {20, 4, 6, 8}, .chunk = {1, 4, 6, 8}, .type = SampleType::kUint8};
+  WriteZarrArray(directory_ / "a.zarr", spec, [](std::span<const std::uint64_t> at) { return double(10 + at[0]); });
+  const ScriptedServer server(ServesFolder(directory_.path()));
+  const std::string url = server.url() + "/a.zarr";
+  const auto source = OpenSource(url, {.describe = true}, std::make_shared<ReadContext>(ReadContext::Limits{})).value();
+  const auto show = [&](int time) {
+    stored_ = {AtTime(url, time), 0, source->info().version, {{0, 0, 0}, source->info().levels.front().block}};
+  };
+  Time now = Time{} + std::chrono::hours(1);
+  show(0);
+  EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now)));
+  const std::size_t requests = server.requests().size();
+  for (const int time : {7, 19, 3}) {
+    show(time);
+    now += std::chrono::seconds(1);
+    std::promise<WorkerEvent> read;
+    std::future<WorkerEvent> event = read.get_future();
+    reads_ = std::move(read);
+    EXPECT_TRUE(Begin(now)) << "the coordinator is not asked";
+    ASSERT_TRUE(std::holds_alternative<ChunkStored>(event.get()));
+    EXPECT_EQ(*box_->RoomFor(kPadded.box)->first, std::byte(10 + time));
+  }
+  EXPECT_EQ(server.requests().size(), requests + 3) << "a chunk each";
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/base/log.h"
+#include "common/text/url.h"
 #include "common/threads/background_tasks.h"
 #include "common/threads/guarded.h"
 #include "data/open/open_source.h"
@@ -36,6 +37,7 @@ struct StoredVoxels::Shared {
   std::mutex mutex;  // guards what follows
   std::function<void(WorkerEvent)> deliver;
   std::map<PlaceName, Place> places;
+  Time asked;  // the last time that one was asked for
   std::set<Piece> reading;
   BackgroundTasks opening{kOpensAtOnce};
 
@@ -43,7 +45,8 @@ struct StoredVoxels::Shared {
   std::shared_ptr<VolumeSource> SourceAt(const StoredAt& stored, Time now, const std::shared_ptr<Shared>& self) {
     const auto [found, is_new] = places.try_emplace({stored.source, stored.version});
     Place& place = found->second;
-    place.used = now;
+    place.used = asked = now;
+    if (is_new) place.source = Beside(stored);
     if (place.source == nullptr && !place.looking && (is_new || now >= place.looked + kLookAgain)) {
       place.looking = true;
       place.looked = now;
@@ -56,16 +59,31 @@ struct StoredVoxels::Shared {
     return source;
   }
 
+  // Another time or channel of what is open: to open it behind an address takes several requests, one after the other. Called with the
+  // mutex.
+  std::shared_ptr<VolumeSource> Beside(const StoredAt& stored) const {
+    if (SchemeOf(stored.source).empty()) return nullptr;
+    for (const auto& [name, place] : places) {
+      if (place.source == nullptr) continue;
+      if (std::shared_ptr<VolumeSource> source = SameSourceBeside(*place.source, name.first, stored)) return source;
+    }
+    return nullptr;
+  }
+
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
     opening.Post([self, stored] {
-      Result<std::shared_ptr<VolumeSource>> source =
-          Guarded("a source of voxels", [&] { return OpenSameSource(stored, ProcessReadContext()); });
+      Result<std::shared_ptr<VolumeSource>> source = Guarded("a source of voxels", [&] {
+        std::unique_lock lock(self->mutex);
+        std::shared_ptr<VolumeSource> beside = self->Beside(stored);  // opened while this waited for its turn
+        lock.unlock();
+        return beside != nullptr ? Result(std::move(beside)) : OpenSameSource(stored, ProcessReadContext());
+      });
       LogInfo(source.ok() ? "reads " + stored.source + " itself" : "asks the coordinator for voxels: " + source.status().message());
       const std::lock_guard lock(self->mutex);
-      const auto place = self->places.find({stored.source, stored.version});
-      if (place == self->places.end()) return;  // dropped meanwhile
-      place->second.looking = false;
-      if (source.ok()) place->second.source = *std::move(source);
+      Place& place = self->places[{stored.source, stored.version}];  // others may have come for it meanwhile, which it may stand beside
+      place.looking = false;
+      place.used = self->asked;
+      if (source.ok()) place.source = *std::move(source);
     });
   }
 

@@ -1,10 +1,9 @@
 #include "client/request/values.h"
 
-#include "client/cli/turntable_values.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/movie/time_steps.h"
 #include "client/request/value_window.h"
 #include "common/cli/parse.h"
 #include "common/view/world_limits.h"
@@ -34,6 +33,10 @@ TEST(ParseTimeSteps, TakesOneTimeARangeAndAStep) {
   for (const char* text : {"", ":", "1:", "2:1", "0:9:0", "0:9:-1", "0:9:x", "0:9:2:3", "-1:2", "1.5"}) {
     EXPECT_THAT(ParseTimeSteps("--time", text).status().message(), HasSubstr("--time")) << text;
   }
+  const TimeSteps even = *ParseTimeSteps("--time", "2:6:2");
+  std::vector<int> shown;
+  for (int frame = 0; frame < 7; ++frame) shown.push_back(even.At(frame, 7));
+  EXPECT_EQ(shown, (std::vector{2, 2, 2, 4, 4, 6, 6}));
 }
 
 TEST(ParseIsosurfaces, TakesValuesWithColorsAndOpacities) {

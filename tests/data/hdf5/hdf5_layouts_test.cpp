@@ -100,6 +100,8 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesHaveLevelsWithoutTheirPadding) {
   const SourceInfo& info = (*source)->info();
   EXPECT_EQ(info.format, "Imaris");
   EXPECT_EQ(info.times.count, 2);
+  EXPECT_EQ((*source)->At(0, 1), nullptr) << "each time has datasets of its own";
+  EXPECT_EQ((*source)->At(1, 0), nullptr);
   EXPECT_THAT(info.channels, ElementsAre(FieldInfo{.name = "DAPI"}, FieldInfo{.name = "GFP", .window = ValueRange{100, 4000}}));
   ASSERT_EQ(info.levels.size(), 2U);
   const VolumeGeometry& fine = info.levels[0].description.geometry;

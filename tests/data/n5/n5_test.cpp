@@ -217,6 +217,7 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   EXPECT_EQ(info.format, "BigDataViewer N5");
   EXPECT_THAT(info.channels, testing::ElementsAre(FieldInfo{}, FieldInfo{.name = "green", .window = ValueRange{1, 3}}));
   EXPECT_EQ(info.times.count, 2);
+  EXPECT_EQ((*source)->At(0, 1), nullptr) << "each has attributes of its own";
   ASSERT_EQ(info.levels.size(), 2U);
   const VolumeGeometry& geometry = info.levels[1].description.geometry;
   EXPECT_EQ(info.levels[0].description.geometry.size, (Index3{9, 8, 5}));
@@ -334,7 +335,9 @@ TEST_F(N5Test, HyperstacksOfFiji) {
   EXPECT_EQ((*Open({.time = TimeRange{5, 5}}))->info().times, (TimeAxis{6, 2.5, ""}));
   EXPECT_EQ((*Open({.describe = true}))->info().time, 0);
   write({5, 4, 2, 3, 6}, 2, 3, 6);
-  EXPECT_EQ((*Open({.time = TimeRange{5, 5}, .channel = 1}))->info().time, 5);
+  const auto last = Open({.time = TimeRange{5, 5}, .channel = 1});
+  EXPECT_EQ((*last)->info().time, 5);
+  EXPECT_EQ(SamplesOf<std::byte>(*(*Open({.describe = true}))->At(5, 1)).value(), SamplesOf<std::byte>(**last).value());
   write({5, 4, 1, 3, 1}, 1, 3, 1);
   EXPECT_EQ((*Open())->info().levels[0].description.geometry.size, (Index3{5, 4, 3}));
   write({5, 4, 6}, 2, 3, 1);  // neither 6 slices nor 2 channels

@@ -173,6 +173,7 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   const SourceInfo& info = (*source)->info();
   EXPECT_EQ(info.channel, 1);
   EXPECT_EQ(info.format, "Neuroglancer precomputed");
+  EXPECT_EQ(SamplesOf<std::uint16_t>(*(*Open({}))->At(0, 1)).value(), SamplesOf<std::uint16_t>(**source).value());
   EXPECT_FALSE(info.labels);
   ASSERT_EQ(info.levels.size(), 2U);
   const VolumeGeometry& fine = info.levels[0].description.geometry;

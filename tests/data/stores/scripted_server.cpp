@@ -98,6 +98,7 @@ ScriptedServer::Script ServesFolder(const std::string& folder) {
     const std::string all = ReadFile(path);
     const std::string tag = fmt::format("ETag: \"{:x}\"\r\n", std::hash<std::string>()(all));
     if (request.method == "HEAD") return fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n{}\r\n", all.size(), tag);
+    if (tag == "ETag: " + request.header("if-none-match") + "\r\n") return AnswerText("304 Not Modified", "", tag);
     const std::string range = request.header("range");
     if (range.empty()) return AnswerText("200 OK", all, tag);
     std::size_t begin = 0, last = 0;

@@ -52,7 +52,7 @@ class ScriptedServer {
 
 // "HTTP/1.1 STATUS", the length of `body`, and `headers`, a line each.
 std::string AnswerText(const std::string& status, const std::string& body, const std::string& headers = "");
-// Answers with what lies in a folder, as web servers do: whole files, parts of them, sizes.
+// Answers with what lies in a folder, as web servers do: whole files, parts of them, sizes, or that a file is still the one that is known.
 ScriptedServer::Script ServesFolder(const std::string& folder);
 
 }  // namespace slabstream

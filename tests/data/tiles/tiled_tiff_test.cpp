@@ -281,7 +281,10 @@ TEST(TiledTiff, TakesAComponentOfAPixel) {
     WritePyramid(directory / "v.tif", {.levels = 2, .tile = tile, .components = 3});
     for (const int channel : {0, 1, 2}) ExpectLikeWhole(directory / "v.tif", {.channel = channel}, random, 4);
   }
-  EXPECT_EQ(Opened(directory / "v.tif", {.channel = 1})->info().channels.size(), 3U);
+  const std::shared_ptr<VolumeSource> second = Opened(directory / "v.tif", {.channel = 1});
+  EXPECT_EQ(second->info().channels.size(), 3U);
+  EXPECT_EQ(SamplesOf<std::uint16_t>(*second->At(0, 2)).value(),
+            SamplesOf<std::uint16_t>(*Opened(directory / "v.tif", {.channel = 2})).value());
   EXPECT_THAT(Open(directory / "v.tif").status().message(), HasSubstr("has 3 components a voxel"));
   EXPECT_EQ(Opened(directory / "v.tif", {.channel = kLuminance}), nullptr) << "is decoded as a whole";
 }

@@ -6,9 +6,11 @@
 #include <array>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "data/open/open_source.h"
 #include "data/volume_io/formats.h"
+#include "tests/data/stores/scripted_server.h"
 #include "tests/data/stores/zip_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/data/zarr/read_zarr.h"
@@ -137,6 +139,58 @@ TEST(ZarrSourceTest, ImagesShowTheTimeAndChannelThatAreAskedForInAnyOrderOfAxes)
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?channel=luminance").status().message(), HasSubstr("has 1 channel, so channel must be 0"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?spacing=1,1,1").status().message(), HasSubstr("states its spacing"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("lattice is no option of Zarr"));
+}
+
+// By what was read when it was opened.
+TEST(ZarrSourceTest, OtherTimesAndChannelsAreReadWithoutAnotherRequestButThoseOfTheirChunks) {
+  const TemporaryDirectory folder;
+  const ScriptedServer server(ServesFolder(folder.path()));
+  for (const int version : {2, 3}) {
+    for (const std::string axes : {"tczyx", "ctzyx", "zcytx"}) {
+      SCOPED_TRACE(axes);
+      const std::string name = axes + std::to_string(version) + ".ome.zarr";
+      WriteImage(folder / name, axes, version);
+      const auto first = OpenText(server.url() + "/" + name + "?time=0,channel=1");
+      ASSERT_TRUE(first.ok()) << first.status().message();
+      const std::size_t opening = server.requests().size();
+      for (const auto& [time, channel] : {std::pair(1, 1), {1, 2}, {0, 0}}) {
+        const std::shared_ptr<VolumeSource> other = (*first)->At(time, channel);
+        ASSERT_NE(other, nullptr);
+        EXPECT_EQ(other->info().time, time);
+        EXPECT_EQ(other->info().channel, channel);
+        EXPECT_EQ(other->info().version, (*first)->info().version);
+        EXPECT_EQ(ValuesOf(*other), Volume(std::uint64_t(time), std::uint64_t(channel)));
+      }
+      const std::vector<ServerRequest> all = server.requests();
+      EXPECT_TRUE(std::all_of(all.begin() + std::ptrdiff_t(opening), all.end(), [&](const ServerRequest& request) {
+        return request.target.starts_with("/" + name + "/0/") && request.target.find(".z", name.size()) == std::string::npos &&
+               request.target.find("zarr.json") == std::string::npos;
+      }));
+      EXPECT_EQ((*first)->At(2, 0), nullptr);
+      EXPECT_EQ((*first)->At(0, 3), nullptr);
+      EXPECT_EQ((*first)->At(-1, 0), nullptr);
+    }
+  }
+}
+
+TEST(ZarrSourceTest, OtherTimesOfAFolderAreThoseOfTheFolder) {
+  const TemporaryDirectory folder;
+  const std::string path = folder / "a.ome.zarr";
+  WriteImage(path, "tczyx", 2);
+  for (const std::string options : {"?time=0", "?time=0,ids=yes"}) {
+    const auto first = OpenText(path + options);
+    ASSERT_TRUE(first.ok()) << first.status().message();
+    const std::shared_ptr<VolumeSource> other = (*first)->At(1, 2), opened = *OpenText(path + options + ",channel=2");
+    ASSERT_NE(other, nullptr);
+    EXPECT_EQ(ValuesOf(*other), Volume(1, 2));
+    EXPECT_EQ(other->info().labels, (*first)->info().labels);
+    EXPECT_EQ(ValuesOf(*other->At(0, 2)), ValuesOf(*opened));
+  }
+  const std::shared_ptr<VolumeSource> before = *OpenText(path + "?time=0");
+  std::ofstream(path + "/.zattrs", std::ios::app) << "\n";
+  std::vector<std::byte> samples(std::size_t(before->info().finest().voxel_bytes()));
+  const Status read = before->At(1, 0)->ReadNow(0, before->info().finest().geometry.bounds(), samples);
+  EXPECT_EQ(read.code(), StatusCode::kUnavailable) << "they have changed since it was opened";
 }
 
 TEST(ZarrSourceTest, ImagesSayHowChannelsAreShownAndWhenTimesAre) {

@@ -1,0 +1,125 @@
+// Stores to which times come.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+
+#include "data/catalogue/catalogue.h"
+#include "data/stores/watched_object.h"
+#include "tests/data/stores/scripted_server.h"
+#include "tests/data/zarr/zarr_files.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint64_t kSide = 4;
+
+class GrowingStoreTest : public testing::Test {
+ protected:
+  void Write(int version, std::uint64_t times, bool consolidated = false) const {
+    const Json scale = {{"type", "scale"}, {"scale", {1, 1, 1, 1}}};
+    Json image = {{"axes", Json::array()},
+                  {"datasets", Json::array({{{"path", "0"}, {"coordinateTransformations", Json::array({scale})}}})}};
+    for (const char* const axis : {"t", "z", "y", "x"})
+      image["axes"].push_back({{"name", axis}, {"type", *axis == 't' ? "time" : "space"}});
+    Json attributes = {{"multiscales", Json::array({image})}, {"version", version == 2 ? "0.4" : "0.5"}};
+    if (version == 3) attributes = {{"ome", attributes}};
+    WriteZarrGroup(folder_ / "a.zarr", version, attributes);
+    const ZarrSpec spec{.version = version, .shape = {times, kSide, kSide, kSide}, .chunk = {1, kSide, kSide, kSide}, .separator = '/'};
+    WriteZarrArray(folder_ / "a.zarr/0", spec, [](std::span<const std::uint64_t> at) { return double(10 + at[0]); });
+    if (!consolidated) return;
+    WriteJson(folder_ / "a.zarr/.zmetadata",
+              {{"zarr_consolidated_format", 1},
+               {"metadata", {{".zattrs", attributes}, {".zgroup", {{"zarr_format", 2}}}, {"0/.zarray", MetadataOf(spec)}}}});
+  }
+  static LoadedSource Read(const std::string& source) {
+    const Result<ReadableSource> read = ReadSource(DataSource(source, ""), 1U << 30);
+    EXPECT_TRUE(read.ok()) << read.status().message();
+    return std::get<LoadedSource>(*read);
+  }
+  const TemporaryDirectory folder_;
+};
+
+TEST_F(GrowingStoreTest, TimesThatComeToAFolderAreSeen) {
+  for (const int version : {2, 3}) {
+    Write(version, 2);
+    const LoadedSource two = Read(folder_ / "a.zarr");
+    EXPECT_EQ(two.file.times.count, 2);
+    EXPECT_EQ(HaveChanged(*two.stamp).value(), false);
+    Write(version, 3);
+    EXPECT_EQ(HaveChanged(*two.stamp).value(), true);
+    EXPECT_EQ(Read(folder_ / "a.zarr").file.times.count, 3);
+    std::filesystem::remove_all(folder_ / "a.zarr");
+  }
+}
+
+TEST_F(GrowingStoreTest, BehindAnAddressItIsLookedAtFromTimeToTime) {
+  const ScriptedServer server(ServesFolder(folder_.path()));
+  for (const auto& [version, consolidated] : {std::pair(2, false), {2, true}, {3, false}}) {
+    Write(version, 2, consolidated);
+    const LoadedSource two = Read(server.url() + "/a.zarr");
+    EXPECT_EQ(two.file.times.count, 2);
+    const Time opened = MonotonicNow();
+    std::size_t requests = server.requests().size();
+    EXPECT_EQ(HaveChanged(*two.stamp, opened).value(), false);
+    EXPECT_EQ(server.requests().size(), requests) << "it was read just now";
+    EXPECT_EQ(HaveChanged(*two.stamp, opened + kLookAgain).value(), false);
+    ASSERT_EQ(server.requests().size(), ++requests);
+    EXPECT_EQ(server.requests().back().target, consolidated   ? "/a.zarr/.zmetadata"
+                                               : version == 2 ? "/a.zarr/0/.zarray"
+                                                              : "/a.zarr/0/zarr.json");
+    EXPECT_NE(server.requests().back().header("if-none-match"), "");
+    Write(version, 3, consolidated);
+    EXPECT_EQ(HaveChanged(*two.stamp, opened + kLookAgain).value(), false);
+    EXPECT_EQ(server.requests().size(), requests) << "it was looked at just now";
+    EXPECT_EQ(HaveChanged(*two.stamp, opened + 2 * kLookAgain).value(), true);
+    const LoadedSource three = Read(server.url() + "/a.zarr");
+    EXPECT_EQ(three.file.times.count, 3);
+    EXPECT_NE(three.file.version, two.file.version) << "a chunk that was not there may be there now";
+    std::filesystem::remove_all(folder_ / "a.zarr");
+  }
+}
+
+TEST_F(GrowingStoreTest, AServerThatFailsSaysNothingOfAChange) {
+  bool fails = false;
+  const ScriptedServer::Script serves = ServesFolder(folder_.path());
+  const ScriptedServer server([&](const ServerRequest& request) { return fails ? AnswerText("400 Bad Request", "") : serves(request); });
+  Write(2, 2);
+  const LoadedSource two = Read(server.url() + "/a.zarr");
+  fails = true;
+  EXPECT_EQ(HaveChanged(*two.stamp, MonotonicNow() + kLookAgain).value(), false);
+  fails = false;
+  std::filesystem::remove_all(folder_ / "a.zarr");
+  EXPECT_EQ(HaveChanged(*two.stamp, MonotonicNow() + 3 * kLookAgain).value(), true) << "it is gone";
+}
+
+TEST_F(GrowingStoreTest, ATimeThatIsNamedIsNotFollowed) {
+  const ScriptedServer server(ServesFolder(folder_.path()));
+  Write(3, 2);
+  const LoadedSource second = Read(server.url() + "/a.zarr?time=1");
+  const std::size_t requests = server.requests().size();
+  EXPECT_EQ(HaveChanged(*second.stamp, MonotonicNow() + kLookAgain).value(), false);
+  EXPECT_EQ(server.requests().size(), requests);
+}
+
+// Other times are surveyed and read by what is open.
+TEST_F(GrowingStoreTest, OtherTimesAreReadByWhatIsOpen) {
+  const ScriptedServer server(ServesFolder(folder_.path()));
+  Write(2, 5);
+  const LoadedSource first = Read(server.url() + "/a.zarr");
+  EXPECT_EQ(first.other_times.size(), 2U);
+  ASSERT_NE(first.source, nullptr);
+  const std::size_t requests = server.requests().size();
+  DataSource fourth(server.url() + "/a.zarr?time=3", "");
+  fourth.beside = first.source;
+  fourth.statistics = std::make_shared<const VolumeSummary>(Summarize(*first.volume));
+  const Result<ReadableSource> read = ReadSource(fourth, 1U << 30);
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(std::get<LoadedSource>(*read).volume->block.samples<std::uint16_t>()[0], 13);
+  EXPECT_EQ(server.requests().size(), requests + 1) << "its chunk";
+}
+
+}  // namespace
+}  // namespace slabstream
