@@ -1,7 +1,6 @@
 #include "client/direct_pictures.h"
 
 #include <algorithm>
-#include <iterator>
 
 #include "common/base/log.h"
 #include "common/transport/authenticator.h"

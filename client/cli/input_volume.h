@@ -1,7 +1,6 @@
 // Volume files that the user names on the command line: every error in them is bad input.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "common/base/status.h"

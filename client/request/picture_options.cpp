@@ -193,7 +193,7 @@ void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown) {
   const auto set_labels = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
     if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
     SetLabelFiles(texts.back(), files);
-    if (shown != nullptr && !shown->labels) shown->labels.emplace();
+    if (shown != nullptr) (void)ShownLabels(*shown);
     return Status::Ok();
   };
   app.AddOption("--labels", set_labels,
@@ -203,7 +203,7 @@ void AddLayerFiles(const Command& app, LayerFiles& files, FrameRequest* shown) {
   const auto set_overlay = [&files, shown](const std::string& option, const std::vector<std::string>& texts) {
     if (texts.back().empty()) return Status::InvalidArgument(option + " needs a file");
     files.overlay = texts.back();
-    if (shown != nullptr) (void)ChoiceOf(std::string(kOverlayField), *shown);
+    if (shown != nullptr) (void)ChoiceOf(kOverlayField, *shown);
     return Status::Ok();
   };
   app.AddOption("--overlay", set_overlay, "A second volume of values, on any grid, such as a statistical map; with --local")
@@ -260,7 +260,7 @@ void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles*
       .Needs(window);
   const auto& parameters = RequireRenderer(slice.frame.renderer).value()->parameters();
   const auto wanted = [&](const RequestOption& option) {
-    if (option.path.starts_with("labels.")) return option.name != "label-opacity";
+    if (option.name == "label-opacity") return false;
     if (option.path == "channels" || option.path.starts_with("fields.") || option.path == "blend" || option.path == "time") return true;
     return option.name == "size" || option.name == "transfer" || option.name == "scalar-range" || option.name == "opacity-distance" ||
            std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();

@@ -111,13 +111,16 @@ void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
   value.Fields({{"labels", [&](const JsonValue& v) { SetLabelFiles(v.Text(), files); }}, {"overlay", JsonValue::Into(files.overlay)}});
 }
 
-// Slabstream 0.1 has the look of the overlay apart.
-Json WithOverlayAsField(Json request) {
-  const bool is_apart = request.is_object() && request.contains("overlay") && request["overlay"].is_object();
-  if (!is_apart || !(request["fields"].is_null() || request["fields"].is_array())) return request;
-  request["overlay"]["field"] = kOverlayField;
-  request["fields"].push_back(request["overlay"]);
-  request.erase("overlay");
+// Slabstream 0.1 has the looks of overlay and labels apart.
+Json WithLayersAsFields(Json request) {
+  for (const std::string_view layer : {kOverlayField, kLabelsField}) {
+    const bool is_apart = request.is_object() && request.contains(layer) && request[layer].is_object();
+    if (!is_apart || !(request["fields"].is_null() || request["fields"].is_array())) continue;
+    Json look = layer == kLabelsField ? Json{{"labels", request[layer]}} : request[layer];
+    look["field"] = layer;
+    request["fields"].push_back(std::move(look));
+    request.erase(layer);
+  }
   return request;
 }
 
@@ -196,7 +199,7 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
   value.Fields({{"program", JsonValue::Into(record.program)},
                 {"source", JsonValue::Into(record.source)},
                 {"layers", [&](const JsonValue& v) { ReadLayerFiles(v, record.layers); }},
-                {"request", [&](const JsonValue&) { request = WithOverlayAsField((*json)["request"]).dump(); }},
+                {"request", [&](const JsonValue&) { request = WithLayersAsFields((*json)["request"]).dump(); }},
                 {"picture", [&](const JsonValue& v) { ReadFormat(v, record.format); }},
                 {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }},
                 {"levels", [](const JsonValue& v) { v.Each([](const JsonValue& level) { (void)level.Integer(0, kMaxLevels - 1); }); }}});

@@ -23,7 +23,11 @@ namespace slabstream {
 namespace {
 
 constexpr std::string_view kParameters = "parameters";
-constexpr std::string_view kOfFields = "fields.";  // options of single channels, as in "0=green,Actin=#f0f"
+constexpr std::string_view kOfFields = "fields.";
+constexpr std::string_view kOfLabels = "fields.labels.";  // of the one field that has such a look, so they need not name it
+
+// Options of single channels, which they name, as in "0=green,Actin=#f0f".
+bool IsOfChannels(std::string_view path) { return path.starts_with(kOfFields) && !path.starts_with(kOfLabels); }
 
 constexpr char kColorMapFile[] = "color-map.json";
 std::string ChannelMapFile(std::size_t look) { return fmt::format("channel-map-{}.json", look + 1); }
@@ -103,7 +107,7 @@ RequestOption Describe(const FieldAbout& field, const T&, std::string path, cons
   option.repeatable =
       std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> || std::is_same_v<T, std::vector<std::string>>;
   option.value = named("NAME");
-  if (option.path.starts_with(kOfFields)) {  // each channel has its own
+  if (IsOfChannels(option.path)) {  // each channel has its own
     option.range.reset();
     option.standard.clear();
     option.repeatable = true;
@@ -166,7 +170,7 @@ void Collect(const std::string& place, const std::string& outer_group, const Str
 // ---- one field
 
 // Calls use(member, most items) for the member of `whole` at `path`. Optional parts: made, if `whole` is not const; else one that is not
-// there is skipped.
+// there is skipped. Of looks of fields the one of labels counts, if there is one.
 template <class Struct, class Use>
 void At(std::string_view path, Struct& whole, const Use& use) {
   Walk(whole, [&](const FieldAbout& field, auto& member, std::size_t most) {
@@ -183,6 +187,10 @@ void At(std::string_view path, Struct& whole, const Use& use) {
           if (!member) member.emplace();
         }
         if (member) At(rest.substr(1), *member, use);
+      }
+    } else if constexpr (std::is_same_v<T, std::vector<FieldChoice>>) {
+      for (auto& choice : member) {
+        if (choice.labels) At(rest.substr(1), choice, use);
       }
     }
   });
@@ -375,7 +383,7 @@ std::vector<std::string> TextsOfFields(const RequestOption& option, const FrameR
 }
 
 std::vector<std::string> AllTextsOf(const RequestOption& option, const FrameRequest& request) {
-  if (option.path.starts_with(kOfFields)) return TextsOfFields(option, request);
+  if (IsOfChannels(option.path)) return TextsOfFields(option, request);
   std::vector<std::string> texts;
   At(option.path, request, [&](const FieldAbout& field, const auto& member, std::size_t) { texts = Texts(field, member); });
   return texts;
@@ -406,19 +414,15 @@ const RequestOption* FindRequestOption(std::string_view name) {
   return found == RequestOptions().end() ? nullptr : &*found;
 }
 
-FieldChoice& ChoiceOf(const std::string& field, FrameRequest& request) {
-  const auto found = std::ranges::find(request.fields, field, &FieldChoice::field);
-  return found != request.fields.end() ? *found : request.fields.emplace_back(FieldChoice{.field = field});
-}
-
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
                  FrameRequest& request) {
   if (IsParameter(option)) {
     request.parameters[option.name] = texts.back();
     return Status::Ok();
   }
-  if (option.path.starts_with(kOfFields)) return SetOfFields(option, shown, texts, maps, request);
+  if (IsOfChannels(option.path)) return SetOfFields(option, shown, texts, maps, request);
   Status status;
+  if (option.path.starts_with(kOfLabels)) (void)ShownLabels(request);
   At(option.path, request, [&](const FieldAbout&, auto& member, std::size_t most) {
     OptionReader reader{.option = option, .shown = shown, .maps = maps, .most = most};
     reader.ReadAll(texts, member);
@@ -435,11 +439,11 @@ std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest
   static const FrameRequest kStandard = [] {
     FrameRequest standard;
     standard.view = kUnstatedView;
-    standard.labels.emplace();
+    ShownLabels(standard) = {};
     return standard;
   }();
   std::vector<std::string> texts = AllTextsOf(option, request);
-  if (option.path != "labels.mode" && texts == AllTextsOf(option, kStandard)) return {};
+  if (option.name != "label-mode" && texts == AllTextsOf(option, kStandard)) return {};
   return texts;
 }
 

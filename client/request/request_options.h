@@ -45,9 +45,6 @@ const RequestOption* FindRequestOption(std::string_view name);
 // Colour maps may be files that texts name, or only texts themselves.
 enum class ColorMaps : bool { kTexts, kFilesToo };
 
-// The look of a channel or another field in the request; it is made if there is none.
-FieldChoice& ChoiceOf(const std::string& field, FrameRequest& request);
-
 // Sets the field. `texts`: one, or of a repeatable option one for each time. A flag: "true" or "false". An option of single channels sets
 // it in the looks of those that it names. InvalidArgument in one line that begins with `shown` ("--clip-box").
 Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,

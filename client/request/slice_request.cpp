@@ -50,7 +50,7 @@ Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   if (Status status = Validate(slice.size()); !status.ok()) return status;
   const bool overlay = std::ranges::count(slice.frame.fields, kOverlayField, &FieldChoice::field) > 0 ||
                        std::ranges::count(slice.frame.channels, kOverlayField) > 0;
-  const bool layers = slice.frame.labels || overlay;
+  const bool layers = LabelsOf(slice.frame) != nullptr || overlay;
   if (layers && slice.thickness > 0) {
     return Status::InvalidArgument(fmt::format("--thickness {} is no plane, and layers are shown in planes only", slice.thickness));
   }

@@ -7,7 +7,6 @@
 // Handles are copied freely; they mean the same command or option, for as long as its program lives. Not thread-safe.
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "common/classification/transfer_function.h"
+#include "common/frame/label_look.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -17,7 +18,7 @@ namespace slabstream {
 // kept and their colours add. kAuto: kMax in projections; else kAdd for channels, and kOver for fields with a grid of their own.
 enum class Blend : std::uint8_t { kAuto = 1, kAdd = 2, kOver = 3, kMax = 4 };
 
-// What a request says of one field. A field that it does not name has its standard look.
+// What a request says of one field. A field of values that it does not name has its standard look; labels are not shown.
 struct FieldChoice {
   std::string field;               // its name, or its number; 1 ... kMaxNameBytes
   std::optional<bool> shown = {};  // none: as the dataset says
@@ -27,6 +28,7 @@ struct FieldChoice {
   std::optional<ScalarRange> scalar_range = {};  // as TransferChoice::scalar_range
   double gamma = 1;                              // [0.01, 100]: the exponent of the opacity along the range; only with "auto"
   double weight = 1;                             // [0, 1]: a factor of its density
+  std::optional<LabelChoice> labels = {};        // of kLabelsField, of which nothing else is said; none: it is a field of values
   friend bool operator==(const FieldChoice&, const FieldChoice&) = default;
 };
 

@@ -1,6 +1,7 @@
 // FrameRequest: one picture, as a client asks for it. Policy: how the service should make it; it never changes the picture.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -15,11 +16,11 @@
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/frame/field_look.h"
-#include "common/frame/label_look.h"
 #include "common/text/parse_number.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "common/view/shading.h"
+#include "common/volume/field_info.h"
 
 namespace slabstream {
 
@@ -85,7 +86,6 @@ struct FrameRequest {
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn
   TransferChoice transfer;
-  std::optional<LabelChoice> labels = {};  // none: those of the dataset, if it has any, are not shown
   // Which channels of the dataset show, by name or number; empty: those that the dataset says. At most kMaxShownFields.
   std::vector<std::string> channels = {};
   std::vector<FieldChoice> fields = {};  // looks of fields, none named twice; at most kMaxFields
@@ -106,5 +106,22 @@ struct FrameRequest {
   bool key = false;  // pictures come with what their colours mean (PictureKey)
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
+
+// The look of a field of this name or number; it is made if there is none.
+inline FieldChoice& ChoiceOf(std::string_view field, FrameRequest& request) {
+  const auto found = std::ranges::find(request.fields, field, &FieldChoice::field);
+  return found != request.fields.end() ? *found : request.fields.emplace_back(FieldChoice{.field = std::string(field)});
+}
+
+// How labels are shown; null: they are not, unless the dataset has nothing else.
+inline const LabelChoice* LabelsOf(const FrameRequest& request) {
+  const auto found = std::ranges::find_if(request.fields, [](const FieldChoice& choice) { return choice.labels.has_value(); });
+  return found != request.fields.end() ? &*found->labels : nullptr;
+}
+// The same; labels that are not shown are, from now on.
+inline LabelChoice& ShownLabels(FrameRequest& request) {
+  std::optional<LabelChoice>& labels = ChoiceOf(kLabelsField, request).labels;
+  return labels ? *labels : labels.emplace();
+}
 
 }  // namespace slabstream

@@ -1,6 +1,5 @@
 #include "common/frame/smooth_label.h"
 
-#include <algorithm>
 #include <functional>
 #include <map>
 

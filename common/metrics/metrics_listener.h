@@ -2,7 +2,6 @@
 // limits of size and time, so that no peer can hold up or fill the process; it serves a few connections at a time.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>

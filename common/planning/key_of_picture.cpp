@@ -50,7 +50,7 @@ PictureKey KeyOf(const ResolvedRequest& request) {
       AddBar(shown, shown.others[i].number, field.look.transfer, key);
       continue;
     }
-    const std::vector<LabelRange>& wanted = request.frame.labels->shown;
+    const std::vector<LabelRange>& wanted = LabelsOf(request.frame)->shown;
     for (const Label& label : field.summary->labels->labels) {
       if (!wanted.empty() && std::ranges::none_of(wanted, [&](const LabelRange& range) { return Covers(range, label); })) continue;
       const std::string name = label.name.empty() ? fmt::format("{}", label.value) : Printable(label.name);

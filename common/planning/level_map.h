@@ -2,7 +2,6 @@
 // request and the volume's levels alone, whoever draws it with however much memory.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -141,10 +141,11 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
                                                  request.dataset, NameOf(geometry.orientation.world),
                                                  NameOf(volume.description.geometry.orientation.world)));
     }
+    ClassifiedField& shown = resolved.emplace_back(ClassifiedField{level.dataset, level.summary});
     if (other.labels) {
-      Result<LabelLook> labels = ResolveLabels(*request.labels, *level.summary->labels, request.clipping.slab.has_value());
+      Result<LabelLook> labels = ResolveLabels(*LabelsOf(request), *level.summary->labels, request.clipping.slab.has_value());
       if (!labels.ok()) return labels.status();
-      resolved.push_back({level.dataset, level.summary, {}, *std::move(labels)});
+      shown.labels = *std::move(labels);
       continue;
     }
     Result<FieldLook> look = LookOf(request, *fields.dataset, other.number, *level.summary, HasFullRange(request, renderer));
@@ -152,7 +153,7 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
     look->range = level.summary->range;
     look->transfer.opacity_distance = opacity_distance;
     Brighten(request.brightness, look->transfer);
-    resolved.push_back({level.dataset, level.summary, *std::move(look)});
+    shown.look = *std::move(look);
   }
   return resolved;
 }
@@ -164,13 +165,12 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   const VolumeGeometry& geometry = summary->description.geometry;
   if (fields.dataset != nullptr && HasLabelsAlone(*fields.dataset)) {
     const RendererKind* const named = FindRenderer(request.renderer);
-    if (!request.labels && named != nullptr && !named->Can(Ability::kLabels)) {
+    if (LabelsOf(request) == nullptr && named != nullptr && !named->Can(Ability::kLabels)) {
       return Status::InvalidArgument(fmt::format(
           "dataset \"{}\" has labels and no values, and renderer '{}' shows no labels; --label-mode surface chooses one that does",
           request.dataset, request.renderer));
     }
-    if (!request.labels) request.labels.emplace();
-    request.labels->mode = LabelMode::kSurface;
+    ShownLabels(request).mode = LabelMode::kSurface;
   }
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
   const Result<std::vector<const RendererKind*>> able =

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,7 +33,7 @@ std::string NameOf(const DatasetFields& dataset, int number) {
   return name.empty() ? fmt::format("{}", number) : fmt::format("{} ({})", number, Printable(name));
 }
 
-// By name, or by number. Not the labels: LabelChoice shows them.
+// A field of values, by name or by number.
 Result<int> FieldNamed(const std::string& text, const FrameRequest& request, const DatasetFields& dataset) {
   const auto values = std::span(dataset.fields).first(std::size_t(dataset.values()));
   const auto named = std::ranges::find(values, text, &FieldInfo::name);
@@ -66,8 +67,13 @@ std::optional<double> Seconds(double number, std::string_view unit) {
   return found == kUnits.end() ? std::nullopt : std::optional(number * found->seconds);
 }
 
+// The looks of fields of values.
+auto ChoicesOfValues(const FrameRequest& request) {
+  return request.fields | std::views::filter([](const FieldChoice& choice) { return !choice.labels; });
+}
+
 const FieldChoice* ChoiceOf(const FrameRequest& request, const DatasetFields& dataset, int number) {
-  for (const FieldChoice& choice : request.fields) {
+  for (const FieldChoice& choice : ChoicesOfValues(request)) {
     const Result<int> field = FieldNamed(choice.field, request, dataset);
     if (field.ok() && *field == number) return &choice;
   }
@@ -114,7 +120,7 @@ Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFiel
     shows[std::size_t(*number)] = true;
   }
   std::vector<const FieldChoice*> named(std::size_t(count), nullptr);
-  for (const FieldChoice& choice : request.fields) {
+  for (const FieldChoice& choice : ChoicesOfValues(request)) {
     const Result<int> number = FieldNamed(choice.field, request, dataset);
     if (!number.ok()) return number.status();
     if (const FieldChoice* const other = std::exchange(named[std::size_t(*number)], &choice)) {
@@ -178,7 +184,7 @@ Result<ShownAtTime> WhatShows(const FrameRequest& request, std::shared_ptr<const
   }
   const bool alone = HasLabelsAlone(*found.fields.dataset);
   if (alone) found.fields.volume_shows = false;
-  if (request.labels || alone) {
+  if (LabelsOf(request) != nullptr || alone) {
     const std::optional<int> labels = found.fields.dataset->labels();
     if (!labels) {
       return Status::InvalidArgument(
@@ -204,7 +210,7 @@ Result<bool> ShowsAsChannel(const FrameRequest& request, const ShownFields& show
   }
   const bool own = ChoiceOf(request, *shown.dataset, shown.volume) != nullptr;
   const FieldInfo& volume = fields[std::size_t(shown.volume)];
-  const bool names_channel = std::ranges::any_of(request.fields, [&](const FieldChoice& choice) {
+  const bool names_channel = std::ranges::any_of(ChoicesOfValues(request), [&](const FieldChoice& choice) {
     const Result<int> number = FieldNamed(choice.field, request, *shown.dataset);
     return number.ok() && fields[std::size_t(*number)].channel;
   });

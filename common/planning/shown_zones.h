@@ -5,9 +5,7 @@
 // not looked at more closely.
 #pragma once
 
-#include <cstddef>
 #include <memory>
-#include <vector>
 
 #include "common/frame/frame_setup.h"
 #include "common/planning/level_map.h"

@@ -136,15 +136,14 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double
 }
 
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
-  const double with_fields = BytesWithFields(setup);
-  if (limit == 0) return std::int64_t(double(kBoxBytesTarget) / with_fields);
+  if (limit == 0) return kBoxBytesTarget;
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
   const std::uint64_t taken = IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
-  const double boxes = (2 + DerivedShare(setup)) * with_fields;  // of that which is being read nothing is derived yet
+  const double boxes = (2 + DerivedShare(setup)) * BytesWithFields(setup);  // of that which is being read nothing is derived yet
   const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
-  return std::min(std::int64_t(double(kBoxBytesTarget) / with_fields), std::int64_t(box - box % (std::bit_floor(box) / 8)));
+  return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {

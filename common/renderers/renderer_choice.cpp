@@ -46,8 +46,9 @@ std::vector<Need> NeedsOf(const FrameRequest& request, const FieldsKnown& fields
   need(request.shading.model == ShadingModel::kDepthGradient, Ability::kDepthShading, "shading 'depth-gradient'");
   need(request.shading.shadows != 0, Ability::kShadows, "shadows");
   need(request.shading.ambient_occlusion != 0, Ability::kShadows, "ambient-occlusion");
-  need(request.labels.has_value(), Ability::kLabels, "labels");
-  need(request.labels && request.labels->surface == LabelSurface::kSmooth, Ability::kSmoothLabels, "label-surface 'smooth'");
+  const LabelChoice* const labels = LabelsOf(request);
+  need(labels != nullptr, Ability::kLabels, "labels");
+  need(labels != nullptr && labels->surface == LabelSurface::kSmooth, Ability::kSmoothLabels, "label-surface 'smooth'");
   need(fields.weighted, Ability::kFields, "channel-opacity");
   need(fields.count > 1, Ability::kFields, fmt::format("a picture of {} fields", fields.count));
   for (const auto& [name, text] : request.parameters) {

@@ -1,7 +1,6 @@
 #include "common/service/service_file.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <limits>
 

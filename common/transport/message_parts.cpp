@@ -1,6 +1,5 @@
 #include "common/transport/message_parts.h"
 
-#include <cerrno>
 #include <span>
 #include <utility>
 

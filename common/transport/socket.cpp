@@ -1,7 +1,6 @@
 #include "common/transport/socket.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <utility>
 #include <zmq.hpp>

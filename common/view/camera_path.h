@@ -9,7 +9,6 @@
 
 #include <array>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -23,6 +22,7 @@ using Rotation = std::array<double, 4>;
 struct PathCamera {
   double seconds = 0;
   ViewParameters view;
+  friend bool operator==(const PathCamera&, const PathCamera&) = default;
 };
 
 inline constexpr std::size_t kMinPathCameras = 2, kMaxPathCameras = 1000;

@@ -70,7 +70,22 @@ void Rules(const PickQuery& m, Checker& check) {
   check.Between("y", m.y, 0, m.frame.size.height);
 }
 
+void Rules(const DatasetFields& m, Checker& check) {
+  check.That(!m.fields.empty(), "fields", "none");
+  check.That(std::size_t(m.field) < m.fields.size(), "field", "not the number of one");
+  check.That(m.time >= 0 && m.time < m.times.count, "time", "not the number of one");
+}
+
 void Rules(const Ball& m, Checker& check) { check.Positive("radius", m.radius); }
+
+void Rules(const PathCamera& m, Checker& check) { check.Adopt(Validate(m.view)); }
+
+void Rules(const ViewQuery& m, Checker& check) {
+  for (std::size_t i = 0; i < m.at.size(); ++i) {
+    const auto scope = check.In("at", i);
+    check.Finite("", m.at[i]);
+  }
+}
 
 void Rules(const SentFile& m, Checker& check) {
   check.Adopt(CheckDatasetName(m.name));

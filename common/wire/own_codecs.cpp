@@ -1,6 +1,4 @@
 // Codecs of structs that are not simply the fields of their messages (about.proto: own_codec).
-#include <fmt/format.h>
-
 #include <array>
 #include <string>
 #include <utility>
@@ -77,30 +75,6 @@ void Read(const v1::FieldInfo& in, FieldInfo& out, Checker& check) {
   Rgb color;
   ReadPart("color", true, in.color(), color, check);
   out.color = {color.r, color.g, color.b};
-}
-
-void Write(const DatasetFields& in, v1::DatasetFields& out) {
-  for (const FieldInfo& field : in.fields) Write(field, *out.add_fields());
-  out.set_times(std::uint32_t(in.times.count));
-  if (in.times.step) out.set_time_step(*in.times.step);
-  out.set_time_unit(in.times.unit);
-  out.set_field(std::uint32_t(in.field));
-  out.set_time(std::uint32_t(in.time));
-}
-void Read(const v1::DatasetFields& in, DatasetFields& out, Checker& check) {
-  const bool fits = in.fields_size() >= 1 && in.fields_size() <= int(kMaxFields);
-  check.That(fits, "fields", fmt::format("{} items, must be 1 to {}", in.fields_size(), kMaxFields));
-  if (!check.ok()) return;
-  out.fields.resize(std::size_t(in.fields_size()));
-  for (std::size_t i = 0; i < out.fields.size(); ++i) {
-    const auto scope = check.In("fields", i);
-    Read(in.fields(int(i)), out.fields[i], check);
-  }
-  out.times.count = int(check.Range("times", in.times(), 1, 1U << 30));
-  if (in.has_time_step()) out.times.step = check.Between("time_step", in.time_step(), 1e-300, 1e300);
-  out.times.unit = check.Text("time_unit", in.time_unit(), 0, kMaxNameBytes);
-  out.field = int(check.Range("field", in.field(), 0, std::uint32_t(in.fields_size()) - 1));
-  out.time = int(check.Range("time", in.time(), 0, std::uint32_t(out.times.count) - 1));
 }
 
 void Write(const ClipSlab& in, v1::ClipSlab& out) {

@@ -179,6 +179,10 @@ Status CheckRules(const LabelChoice& labels) {
 }
 
 Status CheckRules(const FieldChoice& choice, const std::string& name) {
+  if (choice.labels) {
+    if (choice == FieldChoice{.field = std::string(kLabelsField), .labels = choice.labels}) return CheckRules(*choice.labels);
+    return Status::InvalidArgument(fmt::format("{} shows labels, which the field '{}' alone has, and no other look", name, kLabelsField));
+  }
   const auto* function = std::get_if<TransferFunction>(&choice.choice);
   if (function != nullptr && !function->curves_alone()) {
     return Status::InvalidArgument(name +
@@ -228,7 +232,6 @@ Status Validate(const FrameRequest& request) {
   if (Status s = CheckRules(request.clipping); !s.ok()) return s;
   if (Status s = CheckRules(request.transfer); !s.ok()) return s;
   if (Status s = CheckRules(request.shading); !s.ok()) return s;
-  if (Status s = request.labels ? CheckRules(*request.labels) : Status::Ok(); !s.ok()) return s;
   return CheckRules(request.fields);
 }
 

@@ -65,8 +65,8 @@ Status DatasetMachine::State::FindField(OpenQuestion& open) {
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
   const bool of_view = std::holds_alternative<ViewQuery>(open.question);
   const auto* const statistics = std::get_if<StatisticsQuery>(&open.question);
-  const bool of_labels = of_points || (statistics != nullptr && statistics->labels) || picture.labels || HasLabelsAlone(fields) ||
-                         std::holds_alternative<SummaryQuery>(open.question);
+  const bool of_labels = of_points || (statistics != nullptr && statistics->labels) || LabelsOf(picture) != nullptr ||
+                         HasLabelsAlone(fields) || std::holds_alternative<SummaryQuery>(open.question);
   if (!of_view) found.others.clear();  // the question is about the first one
   Status failed;
   // False: something else must be ready first, or `failed`.
@@ -166,7 +166,7 @@ void DatasetMachine::State::AskExecutor() {
       ask.fields.others[i].of_volume = {0};
     }
     const FrameRequest* const frame = FrameOf(open.question);
-    if (frame != nullptr && (frame->labels || HasLabelsAlone(*open.fields.dataset)) && !about_view) {
+    if (frame != nullptr && (LabelsOf(*frame) != nullptr || HasLabelsAlone(*open.fields.dataset)) && !about_view) {
       const FieldVolume labels = {
           .number = *open.fields.dataset->labels(), .labels = true, .levels = {{ask.labels.dataset, ask.labels.summary}}, .of_volume = {0}};
       ask.fields.others.push_back(labels);

@@ -11,10 +11,13 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/levels.h"
 #include "common/text/url.h"
+#include "common/view/camera_path.h"
+#include "common/view/default_view.h"
 #include "common/volume/affine_map.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
@@ -171,7 +174,14 @@ Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& f
   const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed, fields);
   if (!chosen.ok()) return chosen.status();
   if (Status status = CheckView(chosen->view, finest); !status.ok()) return status;
-  return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
+  ViewReply reply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed};
+  if (query.path.empty()) return QuestionReply(std::move(reply));
+  std::vector<PathCamera> cameras = query.path;
+  for (PathCamera& camera : cameras) camera.view = WithDefaults(camera.view, finest.orientation.world);
+  const Result<CameraPath> path = CameraPath::Make(cameras);
+  if (!path.ok()) return path.status();
+  for (const double seconds : query.at) reply.path.push_back(path->At(seconds));
+  return QuestionReply(std::move(reply));
 }
 Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
   return AnswerView(query, dataset.summary->description.geometry, dataset.summary, dataset.asked.fields);

@@ -2,7 +2,6 @@
 // CountFrame and now.Set; any thread calls Text.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <mutex>

@@ -3,7 +3,6 @@
 // XML file beside it. Source: https://imagej.net/plugins/bdv/#about-the-bigdataviewer-data-format
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/printable.h"

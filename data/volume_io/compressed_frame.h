@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <iomanip>
 #include <istream>
 #include <optional>
 #include <ostream>

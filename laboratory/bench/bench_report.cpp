@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "client/cli/cores.h"
 #include "client/report/frame_summary.h"
 #include "common/base/check.h"

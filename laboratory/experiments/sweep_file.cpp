@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <optional>
@@ -101,7 +100,7 @@ SweepRenderer ReadRenderer(const JsonValue& value, SweepPlace place) {
     return read;
   }
   auto fields = OptionFields(read.look, {"parameters.", "shading.", "termination"});
-  for (auto& [name, take] : OptionFields(read.look, {"channels", "fields.", "labels.", "blend", "time"})) {
+  for (auto& [name, take] : OptionFields(read.look, {"channels", "fields.", "blend", "time"})) {
     if (place == SweepPlace::kHere) {
       take = [name = name](const JsonValue& v) {
         v.Complain(fmt::format("'{}' is of datasets of a service; a file may be one channel at one time: \"FILE?channel=1,time=2\"", name));

@@ -72,7 +72,12 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     *outer, name = option.path.split(".")
     if outer == ["parameters"]:
         return _parameter(draft, option, value)
-    holder = _overlay(draft) if outer == ["overlay"] else functools.reduce(getattr, outer, draft.frame)
+    if outer == ["overlay"]:
+        holder = _look(draft, "overlay")
+    elif outer == ["labels"]:
+        holder = _look(draft, "labels").labels
+    else:
+        holder = functools.reduce(getattr, outer, draft.frame)
     field = holder.DESCRIPTOR.fields_by_name[name]
     if name == "preset":
         _transfer(draft, option, value, holder)
@@ -86,10 +91,10 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
         getattr(holder, name).CopyFrom(_MESSAGES[field.message_type.name](option.name, value))
 
 
-def _overlay(draft: Draft) -> Any:
-    """Its look, among those of fields."""
+def _look(draft: Draft, field: str) -> Any:
+    """FieldChoice, which is made if there is none."""
     looks = draft.frame.fields
-    return next((look for look in looks if look.field == "overlay"), None) or looks.add(field="overlay")
+    return next((look for look in looks if look.field == field), None) or looks.add(field=field)
 
 
 _PRESET_OF_MAPS = "viridis"  # it spans values and has opacities as all colour maps do
@@ -214,10 +219,9 @@ def _layer(draft: Draft, option: Option, value: Any) -> None:
     """labels=True, overlay=True: shown as usual. Files belong to the dataset."""
     if value is not True:
         raise InvalidArgument(f"{option.name} {value!r} must be True: at a service, layers belong to the dataset (add_data, render of a file)")
-    if option.name == "overlay":
-        _overlay(draft)
-    else:
-        draft.frame.labels.SetInParent()
+    look = _look(draft, option.name)
+    if option.name == "labels":
+        look.labels.SetInParent()
 
 
 _MOST_TITLE_CHARACTERS = 120
@@ -381,7 +385,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     planes = Draft(plane=COMMANDS["slice"]["plane"].default or "")
     planes.frame.transfer.preset = COMMANDS["slice"]["transfer"].default or ""
     _put_all(planes, "slice", given)
-    layers = planes.frame.HasField("labels") or "overlay" in (*planes.frame.channels, *(look.field for look in planes.frame.fields))
+    layers = "overlay" in planes.frame.channels or any(look.field == "overlay" or look.HasField("labels") for look in planes.frame.fields)
     if layers and planes.thickness > 0:
         raise InvalidArgument(f"thickness {planes.thickness:g} is no plane, and layers are shown in planes only")
     names = _SEVERAL_PLANES.get(planes.plane, (planes.plane,))

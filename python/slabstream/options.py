@@ -60,13 +60,16 @@ _CHANNELS = {"name": "channels", "type": "CHANNELS", "help": (
     "one that is not shown (default: those that the file shows)")}
 
 
-#: Paths of short forms (drafts.py).
+#: Paths of short forms: the field, and what is said of it (drafts.py).
 _OF_OVERLAY = {"overlay-transfer": "overlay.preset", "overlay-range": "overlay.scalar_range", "overlay-weight": "overlay.weight"}
+_OF_LABELS = "fields.labels."
 
 
 def _in_python(entry: dict[str, Any]) -> dict[str, Any] | None:
     """The option as it is here; None: it is part of another one."""
     entry = {"path": _OF_OVERLAY.get(entry["name"], ""), **entry}
+    if entry["path"].startswith(_OF_LABELS):
+        entry["path"] = entry["path"].removeprefix("fields.")
     path = entry["path"]
     return None if path.startswith("fields.") else {"group": entry["group"], **_CHANNELS} if path == "channels" else entry
 

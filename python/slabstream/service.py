@@ -15,7 +15,7 @@ from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
-from .moves import Path, ball_around, cameras_of, times_of, turned_views
+from .moves import ball_around, cameras_of, times_of, turned_views
 from .options import COMMANDS, takes_options_of
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .status import Dataset, Status, dataset_of, status_of
@@ -29,6 +29,7 @@ _ORDER_SECONDS = 30.0
 _QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
+_MOST_VIEWS = 1024  # of one question
 
 
 def _of(field: int | str | None, time: int | str | None) -> dict[str, str]:
@@ -108,7 +109,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
                     raise InvalidArgument(f"path excludes {name}")
             seconds, cameras = cameras_of(path)
             drafts = [camera_draft_of(dataset, {**options, "time": None}, i, camera) for i, camera in enumerate(cameras)]
-            views = Path(seconds, [self._whole_view(each, times) for each in drafts]).views(frames)
+            views = self._views_along(seconds, [self._whole_view(each, times) for each in drafts], draft, frames)
         self._settle([draft])
         return self._pipelined(_with_views(draft, views, times), in_flight, deadline)
 
@@ -126,6 +127,18 @@ class Service(contextlib.AbstractContextManager["Service"]):
             query.framed.CopyFrom(framed)
             reply = self._connection.ask("view_query", query, _QUESTION_SECONDS)
         return reply.view
+
+    def _views_along(self, seconds: Sequence[float], cameras: Sequence[Any], draft: Draft, frames: int) -> Iterator[Any]:
+        """Those of frames that are spread evenly over the path of these cameras, which are complete. `draft`: of the dataset."""
+        path = [schema.PathCamera(seconds=at, view=view) for at, view in zip(seconds, cameras)]
+        length = seconds[-1] - seconds[0]
+        wanted = [seconds[0] + length * (i / (frames - 1) if frames > 1 else 0) for i in range(frames)]
+        query = schema.ViewQuery(frame=draft.frame, path=path)
+        replies = []
+        for begin in range(0, frames, _MOST_VIEWS):
+            query.at[:] = wanted[begin:begin + _MOST_VIEWS]
+            replies.append(self._connection.ask("view_query", query, _QUESTION_SECONDS))
+        return (view for reply in replies for view in reply.path)
 
     @property
     def address(self) -> Address:

@@ -324,8 +324,8 @@ class Drift(unittest.TestCase):
             for option in command.values():
                 *outer, field = option.path.split(".")
                 if option.path and outer != ["parameters"]:
-                    of_overlay = outer == ["overlay"]  # a short form
-                    holder = schema.FieldChoice() if of_overlay else functools.reduce(getattr, outer, schema.FrameRequest())
+                    short = {"overlay": schema.FieldChoice(), "labels": schema.LabelChoice()}  # forms of a field's look
+                    holder = short.get(".".join(outer)) or functools.reduce(getattr, outer, schema.FrameRequest())
                     self.assertIn(field, holder.DESCRIPTOR.fields_by_name, option.path)
 
     def test_signatures_and_help_show_them(self) -> None:

@@ -55,6 +55,29 @@ TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
 }
 
+TEST(AnswerTo, ViewsOfAPathAreThoseOfItsCameras) {
+  const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
+  ViewQuery query{
+      .frame = {.dataset = "ball"}, .path = {{0, {.azimuth_degrees = 10}}, {2, {.azimuth_degrees = 50, .zoom = 4}}}, .at = {2, 1}};
+  AnswerQuestion asked{.question = query, .dataset = 5, .summary = std::make_shared<const VolumeSummary>(Summarize(*sphere))};
+  const auto answer = [&] {
+    asked.question = query;
+    return AnswerTo(asked, {.volume = sphere});
+  };
+  const std::vector<ViewParameters> views = std::get<ViewReply>(answer().value()).path;
+  ASSERT_EQ(views.size(), 2U);
+  EXPECT_EQ(views[0].azimuth_degrees, 50);
+  EXPECT_EQ(views[0].zoom, 4);
+  EXPECT_NEAR(*views[1].azimuth_degrees, 30, 1e-9);
+  EXPECT_NEAR(views[1].zoom, 2, 1e-9);
+  query.path = {{0, ViewParameters{.azimuth_degrees = std::nullopt, .elevation_degrees = std::nullopt}}, {1, {}}};
+  EXPECT_TRUE(answer().ok()) << "the volume's default view fills in what a camera does not say";
+  query.path[1].seconds = 0;
+  EXPECT_THAT(answer().status().message(), HasSubstr("camera 2 of the path has the time 0"));
+  query.path.clear();
+  EXPECT_TRUE(std::get<ViewReply>(answer().value()).path.empty());
+}
+
 TEST(PeerTable, TokensAreNeverReused) {
   PeerTable peers;
   const Time start{};

@@ -93,7 +93,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
 
   FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 3);
   request.dataset = "layered";
-  request.labels = LabelChoice{.mode = LabelMode::kTint, .tint = 1};
+  ShownLabels(request) = {.mode = LabelMode::kTint, .tint = 1};
   request.shading.model = ShadingModel::kNone;
   // What the picture is, by definition: from the same files, in one box.
   const auto expected = [&] {
@@ -137,14 +137,14 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   request.dataset = "ball";
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("dataset \"ball\" has no labels"));
   request.dataset = "layered";
-  request.labels->shown = {{3, 9}};
+  ShownLabels(request).shown = {{3, 9}};
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("no label from 3 to 9; it has 2 from 1 to 2"));
-  request.labels->shown = {{.name = "none*"}};
+  ShownLabels(request).shown = {{.name = "none*"}};
   EXPECT_THAT(client_->Render(request).status().message(),
               testing::HasSubstr("labels.shown: no label is named 'none*'; there are left, right"));
   // By name as by number.
   const auto shown = [&](LabelRange range, LabelMode mode) {
-    request.labels = LabelChoice{.mode = mode, .tint = 1, .shown = {std::move(range)}};
+    ShownLabels(request) = {.mode = mode, .tint = 1, .shown = {std::move(range)}};
     return client_->Render(request).value().image;
   };
   for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface, LabelMode::kHighlight}) {
@@ -154,7 +154,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
     EXPECT_GT(LargestDifference(shown({.name = "l*"}, mode), by_number, request.size), 0.1);
   }
   request.renderer = "splat";
-  request.labels->shown.clear();
+  ShownLabels(request).shown.clear();
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: raycast, zbuffer"));
   EXPECT_FALSE(Order(DataAction::kAdd, {"wrong=" + file_.string() + ",labels=" + (directory_ / "none.nrrd").string()}).ok());
 }

@@ -13,7 +13,8 @@ FieldMap MakeFieldMap(const LevelBox& at, const FrameSetup& setup, const FieldSe
   // All levels end where the finest one does. A coarser one may reach half a voxel less far or farther.
   constexpr double kMargin = 1.0 / 64;
   const GridMap from_finest = MapBetween(finest, drawn);
-  const SampledRegion samples = Mapped(WholeBox(at.box), map);
+  const SampledRegion box = WholeBox(at.box);
+  const auto [least, most] = map.Bounds(box.low, box.high);
   FieldMap result = {.offset = ToFloat3(map.offset), .everywhere = true};
   for (const Axis axis : kAxes) {
     const auto i = std::size_t(Number(axis));
@@ -22,15 +23,10 @@ FieldMap MakeFieldMap(const LevelBox& at, const FrameSetup& setup, const FieldSe
     result.steps.at(i) = ToFloat3(map.steps.at(i));
     result.low.at(i) = float(low);
     result.high.at(i) = float(high);
-    result.everywhere = result.everywhere && samples.low[axis] > low + kMargin && samples.high[axis] < high - kMargin;
+    result.everywhere = result.everywhere && least[axis] > low + kMargin && most[axis] < high - kMargin;
   }
   result.everywhere = result.everywhere || (AffineMapBetween(volume, drawn).is_identity() && drawn.size == volume.size);
   return result;
-}
-
-SampledRegion Mapped(const SampledRegion& region, const AffineMap& map) {
-  const auto [low, high] = map.Bounds(region.low, region.high);
-  return {low, high};
 }
 
 }  // namespace slabstream

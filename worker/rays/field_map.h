@@ -18,8 +18,4 @@ struct FieldMap {
 
 FieldMap MakeFieldMap(const LevelBox& at, const FrameSetup& setup, const FieldSetup& field);
 
-// Where positions in a region lie at least and at most.
-struct SampledRegion;
-SampledRegion Mapped(const SampledRegion& region, const AffineMap& map);
-
 }  // namespace slabstream

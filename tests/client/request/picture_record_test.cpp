@@ -48,9 +48,10 @@ PictureRecord RecordOf(const FrameOptions& options) {
 // `asked`, a record or options, asks for the picture that was typed; not for the dataset, which the connection decides.
 template <class Asked>
 void ExpectSamePicture(const Asked& asked, const FrameOptions& typed) {
-  FrameRequest request = asked.request;
+  FrameRequest request = asked.request, expected = typed.request;
   request.dataset = typed.request.dataset;
-  EXPECT_EQ(request, typed.request);
+  for (FrameRequest* each : {&request, &expected}) std::ranges::sort(each->fields, {}, &FieldChoice::field);  // their order says nothing
+  EXPECT_EQ(request, expected);
   EXPECT_EQ(asked.format.background, typed.format.background);
   EXPECT_EQ(asked.format.png_bits, typed.format.png_bits);
   EXPECT_EQ(asked.format.quality, typed.format.quality);
@@ -157,18 +158,19 @@ TEST(PictureRecordTest, ATransferFunctionOfAFileIsKeptWhole) {
   EXPECT_EQ(Joined(RenderArguments(record, "b.png")), "render brain --transfer color-map.json -o b.png");
 }
 
-TEST(PictureRecordTest, OfSlabstream01AnOverlayIsAField) {
-  const PictureRecord record =
-      RecordOf(Parse({"-o", "a.png", "brain", "--renderer", "raycast", "--overlay-range", "3:8", "--channel-gamma", "0=2"}));
+TEST(PictureRecordTest, OfSlabstream01LayersAreFields) {
+  const PictureRecord record = RecordOf(Parse(
+      {"-o", "a.png", "brain", "--renderer", "raycast", "--overlay-range", "3:8", "--channel-gamma", "0=2", "--labels-shown", "5-9"}));
   Json old = record.json;
   old["request"]["fields"] = Json::array();
   for (Json look : record.json["request"]["fields"]) {
-    const bool overlay = look["field"] == "overlay";
+    const bool overlay = look["field"] == "overlay", labels = look["field"] == "labels";
     if (overlay) look.erase("field");
     if (overlay) old["request"]["overlay"] = look;
-    if (!overlay) old["request"]["fields"].push_back(look);
+    if (labels) old["request"]["labels"] = look["labels"];
+    if (!overlay && !labels) old["request"]["fields"].push_back(look);
   }
-  ASSERT_TRUE(old["request"].contains("overlay"));
+  ASSERT_TRUE(old["request"].contains("overlay") && old["request"].contains("labels"));
   const Result<PictureRecord> read = ParseRecord(old.dump());
   ASSERT_TRUE(read.ok()) << read.status().message();
   EXPECT_THAT(read->request.fields, testing::UnorderedElementsAreArray(record.request.fields));

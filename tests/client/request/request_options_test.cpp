@@ -101,6 +101,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
 };
 
 bool IsParameter(const RequestOption& option) { return option.path.starts_with("parameters."); }
+bool IsOfLabels(const RequestOption& option) { return option.path.starts_with("fields.labels."); }
 bool IsCompared(const RequestOption& option) { return option.name != "dataset" && option.name != "previews" && !IsParameter(option); }
 
 FrameRequest Asked(const RequestOption& option, bool with_option = true) {
@@ -190,8 +191,7 @@ TEST(RequestOptionsTest, AbilitiesOfTheSchemaDecideWhichRenderersCanDoIt) {
                                                        {"label-surface", "smooth-labels"}};  // the value that kOthers has needs it
   for (const RequestOption& option : RequestOptions()) {
     if (!IsCompared(option) || option.path == "renderer") continue;
-    const bool labels = option.path.starts_with("labels.");
-    const std::string ability = by_value.contains(option.name) ? by_value.at(option.name) : labels ? "labels" : option.ability;
+    const std::string ability = by_value.contains(option.name) ? by_value.at(option.name) : IsOfLabels(option) ? "labels" : option.ability;
     FrameRequest request = Standard();
     ASSERT_TRUE(SetOption(option, option.name, std::vector{kOthers.at(option.name).first}, ColorMaps::kTexts, request).ok());
     for (const RendererKind* kind : Renderers()) {
@@ -258,20 +258,25 @@ TEST(RequestOptionsTest, WhatIsLeftOutHasItsStandardValue) {
   v1::FrameRequest bare;
   bare.set_dataset("head");
   EXPECT_EQ(Received(bare), Standard());
-  bare.mutable_labels();
+  v1::FieldChoice& labels = *bare.add_fields();
+  labels.set_field("labels");
+  labels.mutable_labels();
   bare.set_renderer("raycast");
-  EXPECT_EQ(Received(bare).labels, LabelChoice());
+  FrameRequest shown = Received(bare);
+  EXPECT_EQ(ShownLabels(shown), LabelChoice());
   for (const RequestOption& option : RequestOptions()) {
     if (!IsCompared(option)) continue;
     SCOPED_TRACE(option.name);
-    if (option.path.starts_with("fields.")) continue;  // of each channel
+    const bool of_fields = option.path.starts_with("fields.");
+    if (of_fields && !IsOfLabels(option)) continue;  // of each channel
     v1::FrameRequest message;
     Write(Asked(option), message);
-    const auto [holder, field] = FieldAt(message, option.path);
+    const auto [holder, field] =
+        of_fields ? FieldAt(*message.mutable_fields(0), option.path.substr(option.path.find('.') + 1)) : FieldAt(message, option.path);
     ASSERT_NE(field, nullptr);
     holder->GetReflection()->ClearField(holder, field);
     FrameRequest expected = Asked(option, false);
-    if (option.path.starts_with("labels.") && !expected.labels) expected.labels.emplace();
+    if (IsOfLabels(option)) (void)ShownLabels(expected);
     EXPECT_EQ(Received(message), expected);
   }
 }
@@ -281,7 +286,7 @@ TEST(RequestOptionsTest, StandardTextsOfTheSchemaAreThoseOfTheStruct) {
     if (!IsCompared(option) || option.standard.empty()) continue;
     SCOPED_TRACE(option.name);
     FrameRequest request = Asked(option, false), unchanged = request;
-    if (option.path.starts_with("labels.") && !unchanged.labels) unchanged.labels.emplace();
+    if (IsOfLabels(option)) (void)ShownLabels(unchanged);
     EXPECT_TRUE(SetOption(option, option.name, std::vector{option.standard}, ColorMaps::kTexts, request).ok());
     EXPECT_EQ(request, unchanged);
   }

@@ -45,8 +45,8 @@ std::vector<Wish> Wishes() {
       {"shading", [](auto& r) { r.shading.model = ShadingModel::kDepthGradient; }},
       {"shadows", [](auto& r) { r.shading.shadows = 0.5; }},
       {"ambient-occlusion", [](auto& r) { r.shading.ambient_occlusion = 0.5; }},
-      {"labels", [](auto& r) { r.labels.emplace(); }},
-      {"smooth labels", [](auto& r) { r.labels = LabelChoice{.mode = LabelMode::kSurface, .surface = LabelSurface::kSmooth}; }},
+      {"labels", [](auto& r) { ShownLabels(r) = {}; }},
+      {"smooth labels", [](auto& r) { ShownLabels(r) = {.mode = LabelMode::kSurface, .surface = LabelSurface::kSmooth}; }},
   };
   for (const RendererKind* kind : Renderers()) {
     for (const RendererParameter& parameter : kind->parameters()) {
@@ -96,7 +96,7 @@ TEST(RenderersFor, TheOneThatIsPreferredComesFirst) {
   };
   EXPECT_EQ(chosen([](auto&) {}), DefaultRenderer(false).name());
   EXPECT_EQ(chosen([](auto&) {}, true), DefaultRenderer(true).name());
-  EXPECT_EQ(chosen([](auto& r) { r.labels.emplace(); }), "raycast");
+  EXPECT_EQ(chosen([](auto& r) { ShownLabels(r) = {}; }), "raycast");
   EXPECT_EQ(chosen([](auto& r) { r.transfer.isosurfaces = {{.value = 1}}; }), "raycast");
   EXPECT_EQ(chosen([](auto& r) { r.transfer.isosurfaces = {{.value = 1}}; }, true), "raycast") << "on the grid's lattice";
   EXPECT_EQ(chosen([](auto& r) { r.shading.model = ShadingModel::kDepthGradient; }), "zbuffer");
@@ -108,7 +108,7 @@ TEST(RenderersFor, TheOneThatIsPreferredComesFirst) {
 TEST(RenderersFor, SaysWhatCannotBeHadTogether) {
   FrameRequest request = SomeRequest();
   request.view.projection = Projection::kPerspective;
-  request.labels.emplace();
+  ShownLabels(request) = {};
   request.parameters["energy"] = "60";
   EXPECT_EQ(RenderersFor(request).status().message(),
             "no renderer does all that is asked: labels needs one of: raycast, zbuffer; energy needs one of: xray");

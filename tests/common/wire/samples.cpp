@@ -389,12 +389,12 @@ std::vector<SubmitFrame> SamplesOf() {
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
   FrameRequest layers = Request();
   layers.renderer = "raycast";
-  layers.labels = LabelChoice{.mode = LabelMode::kSurface,
-                              .tint = 1,
-                              .opacities = {{1, 0}, {kMax64, 0.25}},
-                              .shown = {{1, kMax64}, {7, 7}, {.name = kUmlaut}},
-                              .surface = LabelSurface::kSmooth};
   layers.fields = {{.field = "overlay", .choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5}};
+  ShownLabels(layers) = {.mode = LabelMode::kSurface,
+                         .tint = 1,
+                         .opacities = {{1, 0}, {kMax64, 0.25}},
+                         .shown = {{1, kMax64}, {7, 7}, {.name = kUmlaut}},
+                         .surface = LabelSurface::kSmooth};
   FrameRequest channels = Request();
   channels.channels = {"0", kUmlaut};
   channels.fields = {
@@ -405,7 +405,7 @@ std::vector<SubmitFrame> SamplesOf() {
   FrameRequest unstated = Request();
   unstated.view = kUnstatedView;
   FrameRequest highlights = layers;
-  highlights.labels->mode = LabelMode::kHighlight;
+  ShownLabels(highlights).mode = LabelMode::kHighlight;
   return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}},
           {1, 2, sliced},    {1, 2, surfaces},
           {1, 2, layers},    {1, 2, highlights},
@@ -616,12 +616,13 @@ std::vector<PickReply> SamplesOf() {
 
 template <>
 std::vector<ViewQuery> SamplesOf() {
-  return {{.frame = Request()}, {kMax64, Request(), Ball{{-1e9, 0.5, 1e300}, 1e-300}}};
+  return {{.frame = Request()},
+          {kMax64, Request(), Ball{{-1e9, 0.5, 1e300}, 1e-300}, {{-1e6, Request().view}, {7, kUnstatedView}}, {-0.5, 7}}};
 }
 
 template <>
 std::vector<ViewReply> SamplesOf() {
-  return {{}, {kMax64, Request().view, Ball{{1, 2, 3}, 4}}, {.view = kUnstatedView}};
+  return {{}, {kMax64, Request().view, Ball{{1, 2, 3}, 4}, {Request().view}}, {.view = kUnstatedView}};
 }
 
 template <>

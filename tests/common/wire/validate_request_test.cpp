@@ -50,15 +50,15 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
        },
        "renderer is 'shear', but projection 'perspective' needs one of: splat, raycast, zbuffer, mip"},
       {[](auto& r) {
-         r.labels.emplace();
+         ShownLabels(r) = {};
          r.parameters.emplace("footprint", "2");
        },
        "no renderer does all that is asked: labels needs one of: raycast, zbuffer; footprint needs one of: splat"},
       {[&](auto& r) {
          r.renderer = "raycast";
-         r.labels = LabelChoice{.shown = {{2, 5}, {.name = long_name}}};
+         ShownLabels(r) = {.shown = {{2, 5}, {.name = long_name}}};
        },
-       "labels.shown[1].name has 257 bytes, but must have 0 to 256"},
+       "fields[0].labels.shown[1].name has 257 bytes, but must have 0 to 256"},
       {[](auto& r) {
          r.channels = {"a", ""};
        },

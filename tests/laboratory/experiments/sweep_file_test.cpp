@@ -74,7 +74,6 @@ TEST(SweepFile, FieldsOfAServicesDatasetsAreSaidAsOnTheCommandLine) {
   EXPECT_THAT(look.fields, testing::UnorderedElementsAreArray(typed.frame.fields));
   EXPECT_EQ(look.blend, typed.frame.blend);
   EXPECT_EQ(look.time, typed.frame.time);
-  EXPECT_EQ(look.labels, typed.frame.labels);
   EXPECT_THAT(RequestJson(RequestOf(FramesOf(*sweep).at(1).frame))["channels"].dump(), HasSubstr("Actin")) << "keys of trials tell";
   EXPECT_THAT(ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [1], "policies": [{}],
     "renderers": [{"renderer": "raycast", "channel": "1"}]})")

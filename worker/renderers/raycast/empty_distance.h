@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/parallel/parallel.h"
 #include "worker/rays/macrocell_ranges.h"
 #include "worker/rays/view_rays.h"
 
@@ -20,13 +21,16 @@ using OctantStarts = std::array<std::int32_t, kOctants>;
 // Those of all rays of a frame, and perhaps some more.
 OctantSet OctantsOf(const ViewRays& rays);
 
-// By cell, [z][y][x]: 0 if any_between(least, greatest value) is true of it, else 255.
+// By cell, [z][y][x]: 0 if any_between(least, greatest value) is true of it, else 255. Parallel.
 template <class AnyBetween>
 std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, AnyBetween&& any_between) {
   std::vector<std::uint8_t> shown(cells.ranges.size(), 255);
-  for (std::size_t i = 0; i < shown.size(); ++i) {
-    if (any_between(cells.ranges[i].min, cells.ranges[i].max)) shown[i] = 0;
-  }
+  const std::size_t slice = std::size_t(cells.counts.x) * std::size_t(cells.counts.y);
+  ParallelFor(0, cells.counts.z, [&](std::int32_t z) {
+    for (std::size_t i = std::size_t(z) * slice; i < (std::size_t(z) + 1) * slice; ++i) {
+      if (any_between(cells.ranges[i].min, cells.ranges[i].max)) shown[i] = 0;
+    }
+  });
   return shown;
 }
 

@@ -99,14 +99,18 @@ HWY_INLINE Mask WithinField(const RayField& field, const SamplePlace& place, Mas
   return sampled;
 }
 
-// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it has the same voxels. kLit: by bricks.
+// The place of samples of the volume among the voxels of a field on its grid.
+HWY_INLINE SamplePlace Shifted(const RayField& field, SamplePlace place) {
+  for (std::size_t i = 0; i < 3; ++i) place.voxel[i] = hn::Add(place.voxel[i], SetInt(field.shift[int(i)]));
+  return place;
+}
+
+// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it is on the volume's grid. kLit: by bricks.
 template <class T, bool kLit>
 HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
                            Mixture& mixture) {
   const FloatTag df;
-  SamplePlace own;
-  if (!field.among_same_voxels) own = PlaceSample(among, field.voxels, at.k);
-  const SamplePlace& place = field.among_same_voxels ? at.of_volume : own;
+  const SamplePlace place = field.on_same_grid ? Shifted(field, at.of_volume) : PlaceSample(among, field.voxels, at.k);
   sampled = WithinField(field, place, sampled);
   if (hn::AllFalse(df, sampled)) return;
   LaneNumbers entry;
@@ -182,7 +186,7 @@ struct FieldSamples {
     for (BrickPlace& of : found.of) of.number = hn::Zero(IntTag());
     return found;
   }
-  static HWY_INLINE bool Ahead(const RayField& field) { return field.among_same_voxels && HasBricks(field); }
+  static HWY_INLINE bool Ahead(const RayField& field) { return field.on_same_grid && HasBricks(field); }
 
   static HWY_INLINE void Find(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, Found& found,
                               Found& before) {
@@ -193,9 +197,9 @@ struct FieldSamples {
       if (hn::AllFalse(FloatTag(), sampled) || !Ahead(field)) continue;
       const Mask within = WithinField(field, place, sampled);
       if (field.voxels.type == ScalarType::kUint8) {
-        FindInBricks<std::uint8_t>(field.voxels, place, within, bricks[i], found.of[i], before.of[i]);
+        FindInBricks<std::uint8_t>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
       } else {
-        FindInBricks<std::uint16_t>(field.voxels, place, within, bricks[i], found.of[i], before.of[i]);
+        FindInBricks<std::uint16_t>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
       }
     }
   }

@@ -57,20 +57,17 @@ Result<FrameFields> FrameFields::Make(const BoxData& data, const LevelBox& at, c
   return shown;
 }
 
-bool FrameFields::Field::among_same_voxels(const RayPiece& other) const {
-  return from_level.is_identity() && piece->voxels.box.begin == other.voxels.box.begin;
-}
-
 std::vector<RayField> FrameFields::Of(const RayPiece& piece, const RayLook& volume) const {
   std::vector<RayField> fields = {{.voxels = BoxOfVoxels(piece.voxels, piece.cells.counts),
                                    .look = &volume,
                                    .map = {.everywhere = true},
                                    .normals = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-                                   .among_same_voxels = true}};
+                                   .on_same_grid = true}};
   for (const Field& of : fields_) {
     RayField& field = fields.emplace_back(of.at);
     field.look = &of.look;
-    field.among_same_voxels = of.among_same_voxels(piece);
+    field.on_same_grid = of.from_level.is_identity();
+    field.shift = piece.voxels.box.begin - of.piece->voxels.box.begin;
   }
   return fields;
 }

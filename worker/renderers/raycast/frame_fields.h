@@ -47,7 +47,6 @@ class FrameFields {
     AffineMap from_level;  // to the field's voxels from those of the box's level
     RayLook look;
     RayField at;  // of any piece
-    bool among_same_voxels(const RayPiece& other) const;
   };
   std::vector<Field> fields_;  // those that reach there and have a weight
 };

@@ -440,7 +440,7 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
     if (work.fields != nullptr) {
       const std::span<const RayField> fields = work.fields->fields;
       for (std::size_t i = 0; i < fields.size(); ++i) {
-        if (!fields[i].among_same_voxels) among_fields[i] = AmongVoxels(packet.of_frame, fields[i].map);
+        if (!fields[i].on_same_grid) among_fields[i] = AmongVoxels(packet.of_frame, fields[i].map);
       }
     }
   }

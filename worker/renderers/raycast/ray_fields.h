@@ -19,9 +19,10 @@ struct RayField {
   FieldMap map;
   // A normal n of a plane among the volume's voxels is n.x * normals[0] + n.y * normals[1] + n.z * normals[2] among the field's.
   std::array<Float3, 3> normals{};
-  bool among_same_voxels = false;  // samples have the same place among the field's voxels as among the volume's
-  bool over = false;               // it covers the fields before it; else it adds to them
-  float steps_a_length = 1;        // samples in the length of material by whose opacity it covers
+  bool on_same_grid = false;  // a sample's floor among the field's voxels is that among the volume's plus `shift`
+  Index3 shift{};
+  bool over = false;         // it covers the fields before it; else it adds to them
+  float steps_a_length = 1;  // samples in the length of material by whose opacity it covers
 };
 
 struct RayFields {

@@ -24,7 +24,7 @@ std::size_t PlaceIn(const KeyBand& band, std::int32_t x, std::int32_t y) {
 
 }  // namespace
 
-CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels)
+CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const BoxLabels* labels)
     : region_(setup.clip),
       rays_(setup.clip, setup.camera, box),
       voxels_(data.voxels()),

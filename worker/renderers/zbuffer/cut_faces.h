@@ -18,8 +18,8 @@
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/box_data.h"
+#include "worker/renderers/zbuffer/box_labels.h"
 #include "worker/renderers/zbuffer/clip_rays.h"
-#include "worker/renderers/zbuffer/shown_labels.h"
 
 namespace slabstream {
 
@@ -37,7 +37,7 @@ class CutFaces {
  public:
   // `box`: no other voxels are drawn. `opaque`: the bins of opaque voxels, by the padded box's table. `labels`: null if they are not shown.
   // All must outlive this. The setup's clip region is not empty.
-  CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
+  CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const BoxLabels* labels);
 
   // Pixels outside see nothing of the box that lies in the clip region.
   const PixelBounds& bounds() const { return rays_.bounds(); }
@@ -78,7 +78,7 @@ class CutFaces {
   float ambient_ = 0;
   const ClassificationTable& table_;
   const BinSelection& opaque_;
-  const ShownLabels* const labels_;
+  const BoxLabels* const labels_;
   const FrameLight* const frame_light_;
   const Index3 bricks_;
 };

@@ -55,7 +55,7 @@ template <class T>
 class BrickSurface {
  public:
   // `labels` may be null.
-  BrickSurface(const VoxelBlock& voxels, const BinLookup<T>& lookup, const ShownLabels* labels, const Vec3& spacing)
+  BrickSurface(const VoxelBlock& voxels, const BinLookup<T>& lookup, const BoxLabels* labels, const Vec3& spacing)
       : voxels_(voxels), lookup_(lookup), labels_(labels), spacing_(spacing) {
     if (labels != nullptr) label_normals_ = std::make_unique<BrickNormals>();
   }
@@ -188,7 +188,7 @@ class BrickSurface {
 
   const VoxelBlock& voxels_;
   const BinLookup<T>& lookup_;
-  const ShownLabels* const labels_;
+  const BoxLabels* const labels_;
   const Vec3 spacing_;
   Index3 origin_;
   Box around_;  // the brick's part and the voxels that its normals depend on

@@ -13,7 +13,7 @@
 #include "worker/kernels/surface_face.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/brick_ranges.h"
-#include "worker/renderers/zbuffer/shown_labels.h"
+#include "worker/renderers/zbuffer/box_labels.h"
 
 namespace slabstream {
 
@@ -45,9 +45,9 @@ struct KnownSurface {
 // Which voxels are opaque.
 struct OpaqueVoxels {
   const ClassificationTable& table;
-  const BinSelection& bins;             // opaque ones
-  const BrickRanges& ranges;            // ranges of the voxels
-  const ShownLabels* labels = nullptr;  // null: not shown
+  const BinSelection& bins;           // opaque ones
+  const BrickRanges& ranges;          // ranges of the voxels
+  const BoxLabels* labels = nullptr;  // null: not shown
 };
 
 // Looks up neighbours in all of `voxels`, including the halo (of at least 2 voxels); outside the volume nothing is opaque. A brick's faces

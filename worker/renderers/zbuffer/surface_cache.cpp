@@ -12,7 +12,7 @@ Result<const Surface*> SurfaceCache::Of(BoxData& data, const FrameSetup& setup, 
     opaque_bins_ = std::move(bins);
   }
   bool others_are_opaque = false;
-  const Result<const ShownLabels*> labels = labels_.Of(data, setup, others_are_opaque);
+  const Result<const BoxLabels*> labels = labels_.Of(data, setup, others_are_opaque);
   if (!labels.ok()) return labels.status();
   if (others_are_opaque) surfaces_.Clear();
   if (const Surface* kept = surfaces_.Find(box)) return kept;

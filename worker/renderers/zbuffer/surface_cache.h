@@ -17,7 +17,7 @@ class SurfaceCache : public BoxCache {
   Result<const Surface*> Of(BoxData& data, const FrameSetup& setup, const Box& box);
   // The bins of the voxels that were opaque at the last call; valid until the next one.
   const BinSelection& opaque_bins() const { return opaque_bins_; }
-  const ShownLabels* labels() const { return labels_.shown(); }  // likewise; null: they are not shown
+  const BoxLabels* labels() const { return labels_.shown(); }  // likewise; null: they are not shown
 
   std::size_t bytes() const override;
 

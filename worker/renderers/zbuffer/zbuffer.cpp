@@ -197,7 +197,7 @@ class ZBufferRenderer : public Renderer {
     colors.reserve(4 * table.color.size());
     for (const Rgb& color : table.color) colors.insert(colors.end(), {color.r, color.g, color.b, 1});
     shading.colors = colors.data();
-    if (const ShownLabels* const labels = cache.labels()) {
+    if (const BoxLabels* const labels = cache.labels()) {
       shading.labels = surface.labels.data();
       shading.label_colors = labels->colors.data();
     }

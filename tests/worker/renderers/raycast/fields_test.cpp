@@ -325,6 +325,34 @@ TEST(Fields, DoNotDependOnBoxes) {
   }
 }
 
+// A worker that has more of a field than is drawn takes that, so that the voxels of one may begin elsewhere than those of another.
+TEST(Fields, MayHaveMoreVoxelsThanAreDrawn) {
+  constexpr unsigned kSeed = 332;
+  std::mt19937 random(kSeed);
+  for (int i = 0; i < 16; ++i) {
+    const Scene scene = RandomScene(kSeed, i);
+    const Box whole = scene.volume.description.geometry.bounds();
+    const SceneBoxes more(scene, whole);
+    const std::unique_ptr<Renderer> renderer = MakeRenderer(*scene.setup.renderer);
+    const Partition partition = CutAtRandom(whole, 5, random);
+    for (const Box& box : partition.boxes()) {
+      const SceneBoxes drawn(scene, box);
+      const auto rendered = [&](const SceneBoxes& volume, const SceneBoxes& fields) {
+        std::vector<BoxData*> voxels;
+        for (std::size_t field = 0; field < scene.fields.size(); ++field) {
+          voxels.push_back(drawn.fields[field] == nullptr ? nullptr : fields.fields[field].get());
+        }
+        volume.volume->SetFields(std::move(voxels));
+        RankReport report;
+        return renderer->Render(*volume.volume, box, scene.setup, {}, RenderControl(), report).value();
+      };
+      const LocalImage expected = rendered(drawn, drawn);
+      EXPECT_EQ(LargestDifference(rendered(more, drawn), expected), 0) << "of the volume, case " << i << ", seed " << kSeed;
+      EXPECT_EQ(LargestDifference(rendered(drawn, more), expected), 0) << "of the fields, case " << i << ", seed " << kSeed;
+    }
+  }
+}
+
 TEST(Fields, CastShadowsThatDoNotDependOnBoxes) {
   constexpr unsigned kSeed = 331;
   std::mt19937 random(kSeed);

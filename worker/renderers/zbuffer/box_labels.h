@@ -1,8 +1,7 @@
-// ShownLabels: which label the voxels of a padded box of the volume have, and what it means to the Z-buffer (LabelUse). A voxel has the
+// BoxLabels: which label the voxels of a padded box of the volume have, and what it means to the Z-buffer (LabelUse). A voxel has the
 // label of the nearest voxel of the field of labels.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -14,7 +13,7 @@
 
 namespace slabstream {
 
-struct ShownLabels {
+struct BoxLabels {
   VoxelBlock numbers;          // uint32, of the padded box
   BrickRanges ranges;          // of the numbers
   std::vector<LabelUse> uses;  // by number
@@ -31,13 +30,13 @@ class LabelsOfBox {
  public:
   // Those of the padded box of `data`, which `box` lies in, at level 0. Null: none are shown, or they do not reach there. `changed`: other
   // voxels are opaque than at the call before. ResourceExhausted: of LabelVolume. Parallel.
-  Result<const ShownLabels*> Of(const BoxData& data, const FrameSetup& setup, bool& changed);
-  const ShownLabels* shown() const { return shown_ ? &*shown_ : nullptr; }  // of the last call
+  Result<const BoxLabels*> Of(const BoxData& data, const FrameSetup& setup, bool& changed);
+  const BoxLabels* shown() const { return shown_ ? &*shown_ : nullptr; }  // of the last call
 
   std::size_t bytes() const;
 
  private:
-  std::optional<ShownLabels> shown_;
+  std::optional<BoxLabels> shown_;
   std::weak_ptr<std::byte[]> found_from_;  // the numbers of the field of labels, of shown_
 };
 

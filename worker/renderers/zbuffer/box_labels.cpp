@@ -1,4 +1,4 @@
-#include "worker/renderers/zbuffer/shown_labels.h"
+#include "worker/renderers/zbuffer/box_labels.h"
 
 #include <algorithm>
 #include <utility>
@@ -40,13 +40,13 @@ std::vector<float> ColorsOf(const LabelLook& look, const std::vector<LabelStyle>
 
 }  // namespace
 
-bool ShownLabels::AnyOpaqueBetween(float low, float high) const {
+bool BoxLabels::AnyOpaqueBetween(float low, float high) const {
   if (!(low <= high)) return false;
   const auto at = [&](float number) { return uses.begin() + std::ptrdiff_t(std::min(std::size_t(number), uses.size() - 1)); };
   return std::find(at(low), at(high) + 1, LabelUse::kOpaque) != at(high) + 1;
 }
 
-Result<const ShownLabels*> LabelsOfBox::Of(const BoxData& data, const FrameSetup& setup, bool& changed) {
+Result<const BoxLabels*> LabelsOfBox::Of(const BoxData& data, const FrameSetup& setup, bool& changed) {
   const FieldSetup* const field = slabstream::LabelsOf(setup);
   BoxData* const box = field == nullptr ? nullptr : data.fields().back();
   if (box == nullptr) {
@@ -63,7 +63,7 @@ Result<const ShownLabels*> LabelsOfBox::Of(const BoxData& data, const FrameSetup
   if (changed) {
     VoxelBlock numbers = NearestOn(data.bricks().box(), labels, MapTo(setup, *field, 0));
     BrickRanges ranges{VoxelBricks(numbers)};
-    shown_.emplace(ShownLabels{std::move(numbers), std::move(ranges), {}, {}});
+    shown_.emplace(BoxLabels{std::move(numbers), std::move(ranges), {}, {}});
     found_from_ = from;
   }
   const std::vector<LabelStyle>& styles = volume.StylesOf(*field->labels);
