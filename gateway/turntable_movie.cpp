@@ -50,8 +50,10 @@ Status TurntableMovie::RenderAndEncode() {
     if (volumes.empty() || volumes.back().time != frame.time) volumes.push_back(std::move(frame));  // times rise
   }
   const AskView ask = [&](ViewQuery query) { return Ask(link, std::move(query)); };
-  const Result<ViewReply> last = ask({.frame = volumes.back()});  // a time that is not there is told before the first byte
-  if (!last.ok()) return last.status();
+  if (request_.times) {  // one that is not there is told before the first byte
+    const Result<ViewReply> last = ask({.frame = volumes.back()});
+    if (!last.ok()) return last.status();
+  }
   const Result<std::vector<ViewParameters>> views = ViewsOfMovie(request_.move, request_.frames, volumes, ask);
   if (!views.ok()) return views.status();
   const auto request = [&](int index) {

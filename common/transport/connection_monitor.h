@@ -36,7 +36,7 @@ class ConnectionLimit : public ConnectionMonitor {
   std::unordered_map<int, std::uint64_t> accepted_;  // cookies by descriptors; some may be closed
 };
 
-// Sets options of a socket's connections for which ZeroMQ has none, and hears what becomes of them.
+// Sets options of a socket's connections that ZeroMQ cannot set, and hears what becomes of the connections.
 //
 // A connection that stays on this host gets reno as its congestion control, which every process may choose. If the system's choice paces
 // packets, as BBR does, an image costs twice the processor time on the loopback, which has no queue to keep short. All other connections

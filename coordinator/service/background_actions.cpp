@@ -187,8 +187,9 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
   if (sources.size() == 1) {
     Result<News> loaded = LoadLevel(action, *sources.front().at_level, tell);
     if (loaded.ok()) {
-      std::get<DatasetLoaded>(loaded->event).fields = fields;
-      std::get<DatasetLoaded>(loaded->event).opened = opened.source;
+      auto& event = std::get<DatasetLoaded>(loaded->event);
+      event.fields = fields;
+      event.opened = opened.source;
     }
     return loaded;
   }
