@@ -24,9 +24,10 @@
 
 namespace slabstream {
 
-// Each in the folder of its name.
+// Each in the folder of its name; VTK's in data/mosaic.
 VolumeFormat N5();
 VolumeFormat Precomputed();
+VolumeFormat VtkParallelImage();
 VolumeFormat Zarr();
 
 namespace {
@@ -56,7 +57,7 @@ Result<std::shared_ptr<VolumeSource>> OpenAs(const VolumeFormat& format, const s
 
 const std::vector<VolumeFormat>& VolumeFormats() {
   static const std::vector<VolumeFormat> kFormats = [] {
-    std::vector<VolumeFormat> formats = {Hdf5(), N5(), Precomputed(), Zarr()};
+    std::vector<VolumeFormat> formats = {Hdf5(), N5(), Precomputed(), VtkParallelImage(), Zarr()};
     formats.insert(formats.end(), FileFormats().begin(), FileFormats().end());
     std::ranges::find(formats, "TIFF", &VolumeFormat::name)->open = OpenTiff;
     return formats;

@@ -1,9 +1,7 @@
 #include "data/positional/file_source.h"
 
 #include <algorithm>
-#include <atomic>
 #include <exception>
-#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -13,6 +11,7 @@
 #include "data/positional/located_volume.h"
 #include "data/positional/slice_stream.h"
 #include "data/positional/stored_samples.h"
+#include "data/sources/box_reading.h"
 #include "data/stores/read_threads.h"
 
 namespace slabstream {
@@ -22,39 +21,40 @@ Status NoMemory(const std::exception& error) {
   return Status::ResourceExhausted(std::string("a part of a volume cannot be read: ") + error.what());
 }
 
-// A box on its way: ends when all parts have.
-struct Job {
+// A part of a box for which there is room.
+struct Part {
+  std::shared_ptr<BoxReading> reading;
   std::shared_ptr<StoredSamples> samples;
-  TurnedBox box;
-  std::stop_token stop;
-  VolumeSource::ReadDone done;
-  std::atomic<std::size_t> left;
-  std::mutex mutex = {};  // guards what follows
-  Status end = {};        // the first failure
+  TurnedBox turned;
+  Box part;
+  SourceContext context;
+  std::uint64_t bytes = 0;
 
-  void Run(const Box& part) {
-    if (stop.stop_requested()) {
-      Fail(Status::Cancelled("reading was cancelled"));
-    } else if (!failed()) {
-      try {
-        if (const Status status = samples->Read(part, box); !status.ok()) Fail(Printable(status));
-      } catch (const std::exception& error) {
-        Fail(NoMemory(error));
-      }
+  // Throws nothing.
+  void Begin() const {
+    try {
+      PostRead([self = *this] {
+        self.Read();
+        self.End();
+      });
+    } catch (const std::exception& error) {
+      reading->Fail(NoMemory(error));
+      End();
     }
-  }
-  void EndPart() {
-    if (--left == 0) done(end);
-  }
-  void Fail(Status status) {
-    const std::lock_guard lock(mutex);
-    if (end.ok()) end = std::move(status);
   }
 
  private:
-  bool failed() {
-    const std::lock_guard lock(mutex);
-    return !end.ok();
+  void Read() const {
+    if (!reading->goes_on()) return reading->GiveUp();
+    try {
+      if (const Status status = samples->Read(part, turned); !status.ok()) reading->Fail(Printable(status));
+    } catch (const std::exception& error) {
+      reading->Fail(NoMemory(error));
+    }
+  }
+  void End() const {
+    context->Release(bytes);
+    reading->EndPart();
   }
 };
 
@@ -70,37 +70,21 @@ class PositionalSource : public VolumeSource {
     const VolumeDescription& description = info_.levels.front().description;
     CHECK(level == 0 && !box.empty() && description.geometry.bounds().Contains(box)) << "a box outside the volume";
     const TurnedBox turned{turn_, description.geometry.size, box, out};
-    const std::vector<Box> parts = samples_->Parts(turned.Stored());
-    const std::shared_ptr<Job> job(new Job{samples_, turned, std::move(stop), std::move(done), parts.size()});
-    for (const Box& part : parts) {
-      const auto bytes = std::uint64_t(samples_->MemoryFor(part, turned));
+    const auto reading = std::make_shared<BoxReading>(turned.Stored(), out, std::move(stop), std::move(done));
+    for (const Box& box_of_part : samples_->Parts(reading->box())) {
+      const auto bytes = std::uint64_t(samples_->MemoryFor(box_of_part, turned));
+      reading->BeginPart();
       try {
-        context_->Admit(bytes, [job, part, bytes, context = context_] { Post(context, job, part, bytes); });
+        context_->Admit(bytes, [part = Part{reading, samples_, turned, box_of_part, context_, bytes}] { part.Begin(); });
       } catch (const std::exception& error) {
-        job->Fail(NoMemory(error));
-        job->EndPart();
+        reading->Fail(NoMemory(error));
+        reading->EndPart();
       }
     }
+    reading->EndPart();
   }
 
  private:
-  // Throws nothing.
-  static void Post(const SourceContext& context, const std::shared_ptr<Job>& job, const Box& part, std::uint64_t bytes) {
-    const auto end = [job, bytes, context] {
-      context->Release(bytes);
-      job->EndPart();
-    };
-    try {
-      PostRead([job, part, end] {
-        job->Run(part);
-        end();
-      });
-    } catch (const std::exception& error) {
-      job->Fail(NoMemory(error));
-      end();
-    }
-  }
-
   const SourceInfo info_;
   const AxisTurn turn_;
   const std::shared_ptr<StoredSamples> samples_;

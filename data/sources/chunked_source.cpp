@@ -16,44 +16,11 @@
 #include "common/base/printable.h"
 #include "common/text/url.h"
 #include "common/volume/memory_budget.h"
+#include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
 namespace {
-
-// A read under way. It ends when all its chunks have been copied or given up.
-class Reading {
- public:
-  Reading(const Box& box, const BoxRoom& out, std::stop_token stop, VolumeSource::ReadDone done)
-      : box_(box), out_(out), stop_(std::move(stop)), done_(std::move(done)) {}
-
-  const Box& box() const { return box_; }
-  const BoxRoom& out() const { return out_; }
-  // Whether its chunks are still wanted.
-  bool goes_on() const { return !failed_ && !stop_.stop_requested(); }
-
-  void Fail(Status status) {
-    const std::lock_guard lock(mutex_);
-    if (failure_.ok()) failure_ = std::move(status);
-    failed_ = true;
-  }
-  void GiveUp() { Fail(Status::Cancelled("reading was stopped")); }
-
-  void BeginPart() { ++parts_; }
-  void EndPart() {
-    if (--parts_ == 0) done_(std::move(failure_));  // of the thread that is last
-  }
-
- private:
-  const Box box_;
-  const BoxRoom out_;
-  const std::stop_token stop_;
-  const VolumeSource::ReadDone done_;
-  std::atomic<std::int64_t> parts_ = 1;  // that have not ended; one is the search for chunks
-  std::atomic<bool> failed_ = false;
-  std::mutex mutex_;
-  Status failure_;  // the first one
-};
 
 // What is known of the chunks of all levels.
 struct Findings {
@@ -105,7 +72,7 @@ class Level : public std::enable_shared_from_this<Level> {
   const Index3& chunk() const { return chunk_; }
   VolumeSource::Counts counts() const { return {stored_bytes_, chunks_}; }
 
-  void Read(const std::shared_ptr<Reading>& reading) {
+  void Read(const std::shared_ptr<BoxReading>& reading) {
     const Box box = Mirrored(reading->box());
     const Index3 first = {box.begin.x / chunk_.x, box.begin.y / chunk_.y, box.begin.z / chunk_.z};
     const Index3 last = {(box.end.x - 1) / chunk_.x, (box.end.y - 1) / chunk_.y, (box.end.z - 1) / chunk_.z};
@@ -129,7 +96,7 @@ class Level : public std::enable_shared_from_this<Level> {
   }
 
  private:
-  using Readings = std::vector<std::shared_ptr<Reading>>;
+  using Readings = std::vector<std::shared_ptr<BoxReading>>;
 
   // Of elements of the array.
   Box BoxOf(const Index3& chunk) const { return {chunk * chunk_, Min((chunk + Uniform(1)) * chunk_, size_)}; }
@@ -143,7 +110,7 @@ class Level : public std::enable_shared_from_this<Level> {
     return box;
   }
 
-  void Want(const Index3& chunk, const std::shared_ptr<Reading>& reading) {
+  void Want(const Index3& chunk, const std::shared_ptr<BoxReading>& reading) {
     const std::uint64_t number = NumberIn(counts_, chunk);
     {
       const std::lock_guard lock(mutex_);
@@ -276,7 +243,7 @@ class Level : public std::enable_shared_from_this<Level> {
 
   // `elements`: empty if there is no such chunk.
   void End(const Index3& chunk, const Readings& readings, const Status& status, const Bytes& elements = {}) {
-    for (const std::shared_ptr<Reading>& reading : readings) {
+    for (const std::shared_ptr<BoxReading>& reading : readings) {
       if (status.ok()) {
         Copy(chunk, elements, *reading);
       } else {
@@ -303,7 +270,7 @@ class Level : public std::enable_shared_from_this<Level> {
     return sides;
   }
 
-  void Copy(const Index3& chunk, const Bytes& elements, Reading& reading) const {
+  void Copy(const Index3& chunk, const Bytes& elements, BoxReading& reading) const {
     if (!reading.goes_on()) return reading.GiveUp();
     if (elements.empty() && fills_with_zeros_ && reading.out().zeroed && !reading.out().exact) return;
     const ArrayShape& shape = level_.array->shape();
@@ -377,7 +344,7 @@ class ChunkedSource : public VolumeSource {
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     const VolumeDescription& description = info_.levels.at(std::size_t(level)).description;
     CHECK(!box.empty() && description.geometry.bounds().Contains(box));
-    const auto reading = std::make_shared<Reading>(box, out, std::move(stop), std::move(done));
+    const auto reading = std::make_shared<BoxReading>(box, out, std::move(stop), std::move(done));
     try {
       levels_[std::size_t(level)]->Read(reading);
     } catch (const std::exception& error) {

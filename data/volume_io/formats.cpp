@@ -76,7 +76,7 @@ std::string_view WhyUnread(const std::string& path) {
     std::string_view why;
   };
   static const std::vector<Unread> files = {
-      {{".pvti", ".pvtr", ".pvtu", ".pvts", ".pvtp", ".pvtk", ".pvd", ".vtm", ".vtmb"},
+      {{".pvtu", ".pvts", ".pvtp", ".pvtk", ".vtm", ".vtmb"},
        "a list of VTK files, which is not read; ParaView writes what it holds into one .vti, .vtr or .vtu, or open a file of the list"},
       {{".vts"},
        "a curvilinear grid of VTK (StructuredGrid), which is not read; ParaView's filter Resample To Image makes an image of it, and "

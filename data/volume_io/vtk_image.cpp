@@ -15,12 +15,16 @@
 #include "data/volume_io/formats.h"
 #include "data/volume_io/output.h"
 #include "data/volume_io/structured_grid.h"
+#include "data/volume_io/text_header.h"
+#include "data/volume_io/vtk_image.h"
 #include "data/volume_io/vtk_xml.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::string_view kImage = "ImageData", kRectilinear = "RectilinearGrid";
+// Of the formats.
+constexpr std::string_view kImageName = "VTK image", kRectilinearName = "VTK rectilinear grid";
 
 // Points of a grid, from `begin` to `end` along each axis, both included.
 struct Extent {
@@ -28,6 +32,7 @@ struct Extent {
 
   bool empty() const { return end[0] < begin[0] || end[1] < begin[1] || end[2] < begin[2]; }
   std::int64_t Points(std::size_t axis) const { return end[axis] - begin[axis] + 1; }
+  friend bool operator==(const Extent&, const Extent&) = default;
 };
 
 Result<Extent> ExtentOf(const VtkXmlFile& file, const XmlTag& tag, const std::string& key) {
@@ -88,9 +93,40 @@ Result<PointGrid> ImageGrid(const VtkXmlFile& file, const Extent& bounds) {
   return grid;
 }
 
-// The coordinates of the points along each axis, in the order of x, y and z, stand in each piece.
+using Coordinates = std::array<std::vector<double>, 3>;
+
+// Sets those of the points of a piece, which has them along x, y and z in this order.
+Status AddCoordinates(const VtkXmlFile& file, const Piece& piece, const Extent& bounds, Coordinates& coordinates) {
+  std::size_t axis = 0;
+  for (const VtkArray& array : file.arrays()) {
+    if (array.piece != piece.number || array.section != "Coordinates" || axis == 3) continue;
+    const Result<VtkArrayType> type = file.TypeOf(array, 1);
+    if (!type.ok()) return type.status();
+    const auto numbers = file.ReadNumbers<double>(array, type->type, piece.extent.Points(axis));
+    if (!numbers.ok()) return numbers.status();
+    std::ranges::copy(*numbers, coordinates[axis].begin() + (piece.extent.begin[axis] - bounds.begin[axis]));
+    ++axis;
+  }
+  return axis == 3 ? Status::Ok() : file.Wrong(fmt::format("has coordinates along {} axes, must have 3", axis));
+}
+
+// The same of a piece of a parallel file.
+Status AddCoordinatesOfFile(const VtkXmlFile& file, const Piece& piece, const Extent& bounds, Coordinates& coordinates) {
+  const Result<std::string> source = file.SourceOf(piece.number);
+  if (!source.ok()) return source.status();
+  const Result<VtkXmlFile> its_file = VtkXmlFile::Open(*source, kRectilinear, {.describe = true});
+  if (!its_file.ok()) return its_file.status();
+  const Result<std::vector<Piece>> pieces = PiecesOf(*its_file);
+  if (!pieces.ok()) return pieces.status();
+  if (BoundsOf(*pieces) != piece.extent) return its_file->Wrong("has another Extent than the file that names it says");
+  for (const Piece& each : *pieces) {
+    if (Status status = AddCoordinates(*its_file, each, bounds, coordinates); !status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
 Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& path, const std::vector<Piece>& pieces, const Extent& bounds) {
-  std::array<std::vector<double>, 3> coordinates;
+  Coordinates coordinates;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     constexpr std::int64_t kMost = kMaxVolumeSide + 1;  // around kMaxVolumeSide cells
     if (const std::int64_t points = bounds.Points(axis); points > kMost) {
@@ -99,17 +135,8 @@ Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& pat
     coordinates[axis].resize(std::size_t(bounds.Points(axis)), std::numeric_limits<double>::quiet_NaN());
   }
   for (const Piece& piece : pieces) {
-    std::size_t axis = 0;
-    for (const VtkArray& array : file.arrays()) {
-      if (array.piece != piece.number || array.section != "Coordinates" || axis == 3) continue;
-      const Result<VtkArrayType> type = file.TypeOf(array, 1);
-      if (!type.ok()) return type.status();
-      const auto numbers = file.ReadNumbers<double>(array, type->type, piece.extent.Points(axis));
-      if (!numbers.ok()) return numbers.status();
-      std::ranges::copy(*numbers, coordinates[axis].begin() + (piece.extent.begin[axis] - bounds.begin[axis]));
-      ++axis;
-    }
-    if (axis < 3) return file.Wrong(fmt::format("has coordinates along {} axes, must have 3", axis));
+    const Status status = (file.parallel() ? AddCoordinatesOfFile : AddCoordinates)(file, piece, bounds, coordinates);
+    if (!status.ok()) return status;
   }
   return EvenGrid(path, coordinates);
 }
@@ -119,7 +146,8 @@ struct ImageFile {
   VtkXmlFile file;
   std::vector<Piece> pieces;
   Extent bounds;
-  std::vector<const VtkArray*> arrays;
+  std::string array;                    // its name
+  std::vector<const VtkArray*> arrays;  // of a parallel file: none
   ValuesAt at = ValuesAt::kPoints;
   RawHeader header;
 
@@ -145,10 +173,12 @@ Status FindArrays(ImageFile& image, const std::string& path, const ReadOptions& 
   const VtkArray& first = file.arrays()[offered.numbers[*chosen]];
   const Result<VtkArrayType> type = file.TypeOf(first, kMaxComponents);
   if (!type.ok()) return type.status();
+  image.array = first.name();
   image.at = offered.arrays[*chosen].at;
   image.header.notes = NotesOf(offered.arrays, *chosen);
   image.header.type = type->type;
   image.header.components = type->components;
+  if (file.parallel()) return Status::Ok();  // its pieces' files have the arrays
   for (const Piece& piece : image.pieces) {
     const Result<const VtkArray*> array = file.FindLike(piece.number, first);
     if (!array.ok()) return array.status();
@@ -165,7 +195,7 @@ Result<std::shared_ptr<ImageFile>> OpenImage(const std::string& path, std::strin
   const auto image = std::make_shared<ImageFile>(ImageFile{*std::move(file), *std::move(pieces)});  // which arrays are part of
   image->bounds = BoundsOf(image->pieces);
   const Result<PointGrid> grid =
-      kind == kImage ? ImageGrid(image->file, image->bounds) : RectilinearGrid(image->file, path, image->pieces, image->bounds);
+      kind.ends_with(kImage) ? ImageGrid(image->file, image->bounds) : RectilinearGrid(image->file, path, image->pieces, image->bounds);
   if (!grid.ok()) return grid.status();
   if (Status status = FindArrays(*image, path, options); !status.ok()) return status;
   if (Status status = SetGrid(image->header, path, *grid, image->at); !status.ok()) return status;
@@ -205,7 +235,7 @@ template <const std::string_view& kKind>
 Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
   const auto image = OpenImage(path, kKind, options);
   if (!image.ok()) return image.status();
-  const auto& [file, pieces, bounds, arrays, at, header] = **image;
+  const auto& [file, pieces, bounds, array, arrays, at, header] = **image;
   if (pieces.size() > 1 || file.times().count > 1) return file.Wrong("its samples lie in several pieces, or are of several times");
   const auto plain = file.FindPlainSamples(*arrays[0], header.type, (*image)->Samples(pieces[0]));
   if (!plain.ok()) return plain.status();
@@ -217,7 +247,7 @@ template <const std::string_view& kKind>
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const auto image = OpenImage(path, kKind, options);
   if (!image.ok()) return image.status();
-  const auto& [file, pieces, bounds, arrays, at, header] = **image;
+  const auto& [file, pieces, bounds, array, arrays, at, header] = **image;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (Status status = file.CheckHolds(*arrays[i], header.type, (*image)->Samples(pieces[i])); !status.ok()) return status;
   }
@@ -259,8 +289,28 @@ Status Write(const FileSamples& samples, const std::string& path) {
 
 }  // namespace
 
+Result<ParallelImage> ReadParallelImage(const std::string& path, const ReadOptions& options) {
+  const bool rectilinear = ToLower(path).ends_with(".pvtr");
+  const auto image = OpenImage(path, rectilinear ? "PRectilinearGrid" : "PImageData", options);
+  if (!image.ok()) return image.status();
+  ParallelImage parallel{(*image)->header, (*image)->array, rectilinear ? kRectilinearName : kImageName};
+  for (const Piece& piece : (*image)->pieces) {
+    const auto size = (*image)->Voxels(piece);
+    if (size[0] * size[1] * size[2] == 0) continue;
+    Result<std::string> file = (*image)->file.SourceOf(piece.number);
+    if (!file.ok()) return file.status();
+    Box box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.begin[axis] = std::int32_t(piece.extent.begin[std::size_t(axis)] - (*image)->bounds.begin[std::size_t(axis)]);
+      box.end[axis] = box.begin[axis] + std::int32_t(size[std::size_t(axis)]);
+    }
+    parallel.pieces.push_back({*std::move(file), box});
+  }
+  return parallel;
+}
+
 VolumeFormat VtkImage() {
-  return {.name = "VTK image",
+  return {.name = kImageName,
           .endings = {".vti"},
           .options = {"time", "channel", "array"},
           .locate = Locate<kImage>,
@@ -271,7 +321,7 @@ VolumeFormat VtkImage() {
 }
 
 VolumeFormat VtkRectilinear() {
-  return {.name = "VTK rectilinear grid",
+  return {.name = kRectilinearName,
           .endings = {".vtr"},
           .options = {"time", "channel", "array"},
           .locate = Locate<kRectilinear>,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -189,19 +190,24 @@ Result<VtkXmlFile> VtkXmlFile::Open(const std::string& path, std::string_view ty
 
 bool VtkXmlFile::OnStart(const XmlTag& tag, std::string_view type) {
   if (std::exchange(in_array_, false)) arrays_.back().end = tag.begin;
-  const std::string parent = open_.empty() ? "" : open_.back(), grandparent = open_.size() < 2 ? "" : open_[open_.size() - 2];
+  // Parallel files have the same elements with a P before them, and no samples: PPointData, PDataArray.
+  const auto plain = [](const std::string& name) {
+    return name.size() > 1 && name[0] == 'P' && std::isupper(name[1]) != 0 ? name.substr(1) : name;
+  };
+  const std::string name = plain(tag.name), parent = open_.empty() ? "" : plain(open_.back()),
+                    grandparent = open_.size() < 2 ? "" : open_[open_.size() - 2];
   open_.push_back(tag.name);
-  if (tag.name == "VTKFile") file_ = tag;
+  if (name == "VTKFile") file_ = tag;
   if (tag.name == type) dataset_ = tag;
-  if (tag.name == "Piece") pieces_.push_back(tag);
-  if (tag.name == "PointData") point_scalars_ = tag.Attribute("Scalars");
-  if (tag.name == "CellData") cell_scalars_ = tag.Attribute("Scalars");
-  if (tag.name == "DataArray" && grandparent == "Piece") {
+  if (name == "Piece") pieces_.push_back(tag);
+  if (name == "PointData") point_scalars_ = tag.Attribute("Scalars");
+  if (name == "CellData") cell_scalars_ = tag.Attribute("Scalars");
+  if (name == "DataArray" && (grandparent == "Piece" || (grandparent == type && parallel()))) {
     constexpr std::size_t kMostArrays = 65536;
     in_array_ = arrays_.size() < kMostArrays;
-    if (in_array_) arrays_.push_back({tag, parent, pieces_.size() - 1, tag.end, tag.end});
+    if (in_array_) arrays_.push_back({tag, parent, grandparent == "Piece" ? pieces_.size() - 1 : 0, tag.end, tag.end});
   }
-  if (tag.name != "AppendedData") return true;
+  if (name != "AppendedData") return true;
   appended_ = tag.end;
   appended_encoding_ = tag.Attribute("encoding");
   return false;
@@ -269,6 +275,12 @@ GridArray VtkXmlFile::Described(const VtkArray& array) const {
           .type_name = type_name,
           .components = components.empty() ? 1 : ParseNumber<int>(components).value_or(0),
           .active = !active.empty() && active == array.name()};
+}
+
+Result<std::string> VtkXmlFile::SourceOf(std::size_t piece) const {
+  const std::string source = pieces_[piece].Attribute("Source");
+  if (source.empty()) return Wrong(fmt::format("piece {} names no file: Source is missing", piece));
+  return (std::filesystem::path(path_).parent_path() / source).string();
 }
 
 OfferedArrays VtkXmlFile::Offered() const {

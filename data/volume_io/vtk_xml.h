@@ -1,6 +1,8 @@
 // A file of VTK's XML formats (VTK's "VTK XML Formats"): its elements, and its data arrays, which stand in the elements as text or base64,
 // or appended raw or in base64; uncompressed or in blocks of zlib, LZ4 or LZMA. Blanks round the values of attributes do not count:
 // programs in Fortran write them. Errors name the path. One thread at a time.
+//
+// A parallel file ("PImageData") names files with a piece each, and the arrays that each of them has; it has no samples.
 #pragma once
 
 #include <fmt/format.h>
@@ -32,7 +34,7 @@ struct VtkArray {
   std::string name() const { return tag.Attribute("Name"); }
 };
 
-inline constexpr std::size_t kMostVtkPieces = 4096;
+inline constexpr std::size_t kMostVtkPieces = 1 << 14;
 
 struct VtkArrayType {
   SampleType type = SampleType::kUint8;
@@ -56,7 +58,10 @@ class VtkXmlFile {
   // The name of the active scalars of "PointData" or "CellData"; "": none.
   const std::string& ActiveScalars(std::string_view section) const { return section == "PointData" ? point_scalars_ : cell_scalars_; }
   const std::vector<VtkArray>& arrays() const { return arrays_; }
-  // Those of points and cells in the first piece, and their numbers in arrays().
+  bool parallel() const { return file_.Attribute("type").starts_with('P'); }
+  // The file of a piece of a parallel file. InvalidArgument: it names none.
+  Result<std::string> SourceOf(std::size_t piece) const;
+  // Those of points and cells in the first piece (of a parallel file: in each), and their numbers in arrays().
   OfferedArrays Offered() const;
   // `name` "": the first one of the section. InvalidArgument: there is none.
   Result<const VtkArray*> Find(std::size_t piece, std::string_view section, const std::string& name) const;

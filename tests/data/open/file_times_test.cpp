@@ -87,6 +87,42 @@ TEST_F(FileTimesTest, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(Read(directory_ / "t_*.nii").status().message(), HasSubstr("holds 2 times itself"));
 }
 
+// As ParaView and VTK's writers make them: in any order, with times of the simulation.
+TEST_F(FileTimesTest, AFileThatNamesFilesOfTimesIsASeries) {
+  for (const int number : {1, 2, 3}) Write("run/cell_" + std::to_string(number) + ".nrrd", number);
+  WriteFile(directory_ / "run.pvd", R"(<VTKFile type="Collection"><Collection><DataSet timestep="1.5" file="run/cell_3.nrrd"/>
+      <DataSet timestep="0.5" part="0" file="run/cell_1.nrrd"/><DataSet timestep="1" file="run/cell_2.nrrd"/></Collection></VTKFile>)");
+  WriteFile(directory_ / "run.nrrd.series", R"({"file-series-version": "1.0", "files": [{"name": "run/cell_1.nrrd", "time": 0.5},
+      {"name": "run/cell_3.nrrd", "time": 1.5}, {"name": "run/cell_2.nrrd", "time": 1}]})");
+  for (const std::string name : {"run.pvd", "run.nrrd.series"}) {
+    EXPECT_EQ(TimesOf(Read(directory_ / name)).count, 3);
+    EXPECT_EQ(TimesOf(Read(directory_ / name)).step, 0.5);
+    for (int time = 0; time < 3; ++time) EXPECT_EQ(ValueOf(Read(directory_ / (name + "?time=" + std::to_string(time)))), time + 1);
+  }
+}
+
+TEST_F(FileTimesTest, ASeriesThatIsWrongIsSaidInOneLine) {
+  const auto why = [&](const std::string& name, const std::string& text) {
+    WriteFile(directory_ / name, text);
+    return Read(directory_ / name).status().message();
+  };
+  const auto collection = [](const std::string& sets) {
+    return R"(<VTKFile type="Collection"><Collection>)" + sets + "</Collection></VTKFile>";
+  };
+  EXPECT_THAT(why("a.pvd", collection("")), HasSubstr("a.pvd: names 0 files, must name 1 to 100000"));
+  EXPECT_THAT(why("a.pvd", "<VTKFile type=\"ImageData\"/>"), HasSubstr("a.pvd: not a VTK file of type Collection"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='x' file='b.nrrd'/>")), HasSubstr("the time of b.nrrd is no number"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='1'/>")), HasSubstr("has an entry that names no file"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='1' file='b.nrrd'/><DataSet timestep='1' part='1' file='c.nrrd'/>")),
+              HasSubstr("names several files of the time 1"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='1' file='a.pvd'/>")), HasSubstr("a.pvd, which has several times itself"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='1' file='a*'/>")), HasSubstr("a*, which has several times itself"));
+  EXPECT_THAT(why("a.pvd", collection("<DataSet timestep='1' file='no.nrrd'/>")), HasSubstr("no.nrrd: no such file"));
+  EXPECT_THAT(why("a.vti.series", "{}"), HasSubstr("has no list \"files\""));
+  EXPECT_THAT(why("a.vti.series", "{"), HasSubstr("a.vti.series: not JSON"));
+  EXPECT_THAT(why("a.vti.series", R"({"files": [{"name": "b.nrrd"}]})"), HasSubstr("the time of b.nrrd is no number"));
+}
+
 TEST_F(FileTimesTest, AFileWithAStarInItsNameIsAFile) {
   Write("cell_*.nrrd", 7);
   Write("cell_1.nrrd", 1);

@@ -260,7 +260,7 @@ TEST_F(VtkTest, ScalarsOfBytesMayBeColors) {
 }
 
 TEST_F(VtkTest, FilesOfVtkThatAreNotReadAreNamed) {
-  EXPECT_THAT(WhyNot("v.pvti", "<VTKFile/>"), HasSubstr("v.pvti: a list of VTK files, which is not read; ParaView writes"));
+  EXPECT_THAT(WhyNot("v.pvtk", "<VTKFile/>"), HasSubstr("v.pvtk: a list of VTK files, which is not read; ParaView writes"));
   EXPECT_THAT(WhyNot("V.VTS", "<VTKFile/>"), HasSubstr("a curvilinear grid of VTK (StructuredGrid), which is not read"));
   EXPECT_THAT(WhyNot("v.vtp", "<VTKFile/>"), HasSubstr("a surface of VTK (PolyData), which holds no volume"));
   EXPECT_THAT(WhyNot("v.vtx", "<VTKFile/>"), HasSubstr("not a volume, which must end in ."));

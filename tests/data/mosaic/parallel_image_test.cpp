@@ -1,0 +1,152 @@
+// .pvti and .pvtr, whose pieces lie in files of their own.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+#include "data/open/open_source.h"
+#include "data/open/read_volume.h"
+#include "tests/data/volume_io/volume_files.h"
+#include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
+
+namespace slabstream {
+namespace {
+
+using testing::ContainsRegex;
+using testing::HasSubstr;
+
+constexpr Index3 kPoints = {14, 9, 11};
+constexpr Index3 kFirst = {-3, 2, 100};  // the extent of which begins there
+
+std::string ExtentOf(const Box& points) {
+  const Index3 low = points.begin + kFirst, high = points.end + kFirst - Uniform(1);
+  return fmt::format("{} {} {} {} {} {}", low.x, high.x, low.y, high.y, low.z, high.z);
+}
+
+// Numbers along x, then y, then z.
+template <class F>
+std::string Numbers(const Box& box, F value) {
+  std::string text;
+  for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+    for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
+      for (std::int32_t x = box.begin.x; x < box.end.x; ++x) text += fmt::format("{} ", value(x, y, z));
+    }
+  }
+  return text;
+}
+
+int PointValue(int x, int y, int z) { return x + 20 * y + 400 * z; }
+int CellValue(int x, int y, int z) { return 7 * x + 3 * y + z; }
+
+class ParallelImage : public testing::Test {
+ protected:
+  // Writes the pieces, whose points are those of `boxes`, and the file that names them.
+  std::string Write(const std::string& kind, const std::vector<Box>& boxes, const std::string& attributes = "") const {
+    const std::string letters = kind == "ImageData" ? "vti" : "vtr";
+    std::string pieces;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      const std::string name = fmt::format("parts/piece {}.{}", i, letters), extent = ExtentOf(boxes[i]);
+      const Box cells = {boxes[i].begin, boxes[i].end - Uniform(1)};
+      std::string coordinates;
+      for (int axis = 0; axis < 3 && letters == "vtr"; ++axis) {
+        coordinates += "<DataArray type=\"Float64\" format=\"ascii\">";
+        for (std::int32_t at = boxes[i].begin[axis]; at < boxes[i].end[axis]; ++at) coordinates += fmt::format("{} ", 5 + 0.5 * at);
+        coordinates += "</DataArray>";
+      }
+      const auto array = [](const std::string& array_name, const std::string& text) {
+        return fmt::format("<DataArray type=\"Int16\" Name=\"{}\" format=\"ascii\">{}</DataArray>", array_name, text);
+      };
+      WriteFile(directory_ / name,
+                fmt::format("<VTKFile type=\"{0}\" byte_order=\"LittleEndian\"><{0} WholeExtent=\"{1}\" {2}><Piece Extent=\"{1}\">"
+                            "<PointData>{3}</PointData><CellData>{4}</CellData><Coordinates>{5}</Coordinates></Piece></{0}></VTKFile>",
+                            kind, extent, attributes, array("p", Numbers(boxes[i], PointValue)), array("c", Numbers(cells, CellValue)),
+                            coordinates));
+      pieces += fmt::format("<Piece Extent=\"{}\" Source=\"{}\"/>", extent, name);
+    }
+    std::string path = directory_ / ("whole.p" + letters);
+    WriteFile(path, fmt::format("<VTKFile type=\"P{0}\" byte_order=\"LittleEndian\"><P{0} WholeExtent=\"{1}\" GhostLevel=\"0\" {2}>"
+                                "<PPointData><PDataArray type=\"Int16\" Name=\"p\"/></PPointData>"
+                                "<PCellData><PDataArray type=\"Int16\" Name=\"c\"/></PCellData>{3}</P{0}></VTKFile>",
+                                kind, ExtentOf({{0, 0, 0}, kPoints}), attributes, pieces));
+    return path;
+  }
+  static std::string WhyNot(const std::string& path, const ReadOptions& options = {.array = "p"}) {
+    return ReadVolume(path, options).status().message();
+  }
+
+  // Blocks that meet at their points, as VTK's writers make them.
+  static std::vector<Box> Blocks() {
+    std::vector<Box> blocks;
+    for (const auto& [z_begin, z_end] : {std::pair(0, 5), std::pair(4, 11)}) {
+      for (const auto& [x_begin, x_end] : {std::pair(0, 4), std::pair(3, 10), std::pair(9, 14)}) {
+        blocks.push_back({{x_begin, 0, z_begin}, {x_end, kPoints.y, z_end}});
+      }
+    }
+    return blocks;
+  }
+  static double ValueAt(const LoadedVolume& read, const Index3& v) {
+    return read.volume->description.mapping.FromStored(double(read.volume->block.samples<std::uint16_t>()[read.volume->block.Offset(v)]));
+  }
+
+  const TemporaryDirectory directory_;
+};
+
+TEST_F(ParallelImage, PiecesAreOneVolumeOfPointsOrCells) {
+  for (const std::string kind : {"ImageData", "RectilinearGrid"}) {
+    SCOPED_TRACE(kind);
+    const std::string path = Write(kind, Blocks(), kind == "ImageData" ? R"(Origin="5 6 7" Spacing="0.5 0.5 0.5")" : "");
+    const Result<LoadedVolume> points = ReadVolume(path, {.array = "p"}), cells = ReadVolume(path, {.array = "c"});
+    ASSERT_TRUE(points.ok() && cells.ok()) << points.status().message() << cells.status().message();
+    EXPECT_EQ(points->info.finest().geometry.size, kPoints);
+    EXPECT_EQ(cells->info.finest().geometry.size, kPoints - Uniform(1));
+    EXPECT_EQ(points->info.files.size(), 7U);
+    const Vec3 first = kind == "ImageData" ? Vec3{5, 6, 7} + 0.5 * ToVec3(kFirst) : Vec3{5, 5, 5};
+    EXPECT_EQ(points->info.finest().geometry.ToWorld({}), first);
+    EXPECT_EQ(cells->info.finest().geometry.ToWorld({}), (first + Vec3{0.25, 0.25, 0.25}));
+    for (std::int32_t z = 0; z < kPoints.z - 1; ++z) {
+      for (std::int32_t y = 0; y < kPoints.y - 1; ++y) {
+        for (std::int32_t x = 0; x < kPoints.x - 1; ++x) {
+          ASSERT_EQ(ValueAt(*points, {x, y, z}), PointValue(x, y, z));
+          ASSERT_EQ(ValueAt(*cells, {x, y, z}), CellValue(x, y, z));
+        }
+      }
+    }
+  }
+}
+
+// x of the file runs along -y of the world, and y along x.
+TEST_F(ParallelImage, PiecesAreTurnedAsTheWholeIs) {
+  const Result<LoadedVolume> read = ReadVolume(Write("ImageData", Blocks(), R"(Direction="0 1 0 -1 0 0 0 0 1")"), {.array = "p"});
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(read->info.finest().geometry.size, (Index3{kPoints.y, kPoints.x, kPoints.z}));
+  for (std::int32_t x = 0; x < kPoints.x; ++x) {
+    for (std::int32_t y = 0; y < kPoints.y; ++y) ASSERT_EQ(ValueAt(*read, {y, kPoints.x - 1 - x, 5}), PointValue(x, y, 5));
+  }
+}
+
+TEST_F(ParallelImage, WhatIsWrongIsSaidInOneLine) {
+  const std::string path = Write("ImageData", Blocks());
+  EXPECT_THAT(WhyNot(path, {.array = "q"}), HasSubstr("p, c"));
+  std::vector<Box> blocks = Blocks();
+  blocks.pop_back();
+  EXPECT_THAT(WhyNot(Write("ImageData", blocks)), HasSubstr("whole.pvti: its parts hold"));
+  const auto with = [&](const std::string& from, const std::string& to) {
+    FileBytes text = ReadFile(Write("ImageData", Blocks()));
+    WriteFile(path, text.replace(text.find(from), from.size(), to));
+    return WhyNot(path);
+  };
+  EXPECT_THAT(with("parts/piece 5.vti", "parts/piece 9.vti"), HasSubstr("piece 9.vti: No such file"));
+  EXPECT_THAT(with("parts/piece 5.vti", "whole.pvti"), HasSubstr("whole.pvti: a VTK file of type 'PImageData', must be ImageData"));
+  EXPECT_THAT(with("parts/piece 5.vti", "parts/piece 4.vti"),
+              ContainsRegex("whole.pvti: .*/piece 4.vti has 7 x 9 x 7 voxels, must have 5 x 9 x 7"));
+  EXPECT_THAT(with("Source=\"parts/piece 0.vti\"", ""), HasSubstr("piece 0 names no file: Source is missing"));
+  EXPECT_THAT(with("type=\"Int16\" Name=\"p\"", "type=\"Int32\" Name=\"p\""),
+              HasSubstr("piece 0.vti has samples of int16 from 0 and scale 1, must have int32"));
+  EXPECT_THAT(with("Name=\"p\"", "Name=\"r\""), HasSubstr("r, c"));
+}
+
+}  // namespace
+}  // namespace slabstream
