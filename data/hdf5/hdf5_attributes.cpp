@@ -129,7 +129,7 @@ std::optional<Attribute> OpenAttribute(hid_t file, const std::string& object, co
 
 bool IsNumber(hid_t type) {
   const H5T_class_t kind = H5Tget_class(type);
-  return (kind == H5T_INTEGER || kind == H5T_FLOAT) && H5Tget_size(type) <= sizeof(double);
+  return (kind == H5T_INTEGER || kind == H5T_FLOAT) && H5Tget_size(type) <= sizeof(long double);
 }
 
 // `joined`: texts of a fixed length are one text, in parts.

@@ -40,8 +40,10 @@ int CountNumbered(const std::vector<std::string>& names, const std::string& pref
 Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
   if (!file.ok()) return file.status();
-  if (!options.dataset.empty()) return AnyHdf5().read(*file, options, context);
-  const std::array layouts = {Imaris(), BigDataViewerHdf5(), AnyHdf5()};
+  // A path names a dataset of any file, and a bare name a mesh of openPMD.
+  const bool is_mesh = options.dataset.find('/') == std::string::npos && OpenPmd().recognises(**file);
+  if (!options.dataset.empty() && !is_mesh) return AnyHdf5().read(*file, options, context);
+  const std::array layouts = {Imaris(), BigDataViewerHdf5(), OpenPmd(), AnyHdf5()};
   const auto layout = std::ranges::find_if(layouts, [&](const Hdf5Layout& each) { return each.recognises(**file); });
   return layout->read(*file, options, context);
 }

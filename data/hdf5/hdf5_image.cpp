@@ -15,8 +15,8 @@
 namespace slabstream {
 namespace {
 
-const std::array<ImageLayout, 4>& Layouts() {
-  static const std::array<ImageLayout, 4> layouts = {ItkImage(), Minc(), VtkHdf(), Nexus()};
+const std::array<ImageLayout, 5>& Layouts() {
+  static const std::array<ImageLayout, 5> layouts = {ItkImage(), Minc(), VtkHdf(), Nexus(), OpenPmdMesh()};
   return layouts;
 }
 

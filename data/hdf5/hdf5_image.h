@@ -54,6 +54,7 @@ ImageLayout ItkImage();
 ImageLayout Minc();
 ImageLayout VtkHdf();
 ImageLayout Nexus();
+ImageLayout OpenPmdMesh();
 
 // By the attributes of the dataset and its dimension scales alone: axistags, netCDF-4 with the conventions of CF, labels of dimensions,
 // element_size_um and others. `scales`: for each axis the path of a dataset with its coordinates, "" where there is none; empty: the

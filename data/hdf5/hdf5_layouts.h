@@ -20,6 +20,7 @@ struct Hdf5Layout {
 
 Hdf5Layout Imaris();
 Hdf5Layout BigDataViewerHdf5();
+Hdf5Layout OpenPmd();
 Hdf5Layout AnyHdf5();  // a dataset of any other file (hdf5_image.h)
 
 // How many names PREFIX0, PREFIX1, ... there are without a gap.

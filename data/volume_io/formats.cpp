@@ -29,12 +29,13 @@ VolumeFormat Png();
 VolumeFormat Jpeg();
 VolumeFormat Jpeg2000();
 VolumeFormat Bmp();
+VolumeFormat Bov();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& FileFormats() {
   static const std::vector<VolumeFormat> formats = {
       Nifti(),          Mgh(), Nrrd(), MetaImage(), Tiff(),     Dicom(), Mrc(), UnstructuredGrid(), VtkLegacy(), VtkImage(),
-      VtkRectilinear(), Npy(), Png(),  Jpeg(),      Jpeg2000(), Bmp(),   Raw()};
+      VtkRectilinear(), Npy(), Png(),  Jpeg(),      Jpeg2000(), Bmp(),   Bov(), Raw()};
   return formats;
 }
 

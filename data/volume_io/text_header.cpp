@@ -47,7 +47,7 @@ Result<TextHeader> ReadTextHeader(const std::string& path, const TextFormat& for
     begin = newline == std::string::npos ? text.size() : newline + 1;
     if (header.end == 0) header.first_line = line;
     header.end = std::int64_t(begin);
-    if (line.empty()) break;
+    if (line.empty() && !format.header_alone) break;
     const std::size_t at = line.find_first_of(format.separators);
     if (line.front() == '#' || at == std::string::npos) continue;
     const std::string written(Trimmed(line.substr(0, at)));

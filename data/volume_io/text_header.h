@@ -1,4 +1,4 @@
-// Volume files with a text header, NRRD and MetaImage: lines "key: value" or "key = value", then the samples, or the name of their file.
+// Volume files with a text header, NRRD, MetaImage and BOV: lines "key: value" or "key = value", then the samples, or the name of their file.
 #pragma once
 
 #include <cstdint>
@@ -63,6 +63,7 @@ struct TextFormat {
   bool ignores_case;                   // whether keys are found by their lower case
   std::vector<const char*> data_keys;  // fields that name the samples' files
   bool data_ends_header;               // such a field is the last one; else an empty line ends the header
+  bool header_alone;                   // the header is all of the file: only its end ends it
   std::vector<const char*> required;   // keys of fields that must not be empty
   Result<RawHeader> (*read_header)(const TextHeader& text, const ReadOptions& options);
   Result<TextPayload> (*read_payload)(const TextHeader& text);

@@ -201,6 +201,52 @@ TEST_F(Hdf5ImageTest, VtkHdfCellsLieInTheirCentres) {
   ExpectRefused("is a VTKHDF file of type 'UnstructuredGrid', which is not supported");
 }
 
+// As openPMD-api writes them: iterations are times, and components of a vector channels.
+TEST_F(Hdf5ImageTest, MeshesOfOpenPmdLieOnTheirGridAtTheirIteration) {
+  const auto write = [&](const std::string& order) {
+    Hdf5Writer writer(path_);
+    std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+    for (const int iteration : {0, 50, 100}) {
+      const std::string base = fmt::format("/data/{}", iteration), mesh = base + "/fields/E";
+      for (const std::string component : {"x", "y"}) {
+        writer.Write(mesh + "/" + component, {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+        writer.Numbers(mesh + "/" + component, "position",
+                       order == "F" ? std::vector<double>{0.5, 0, 0.25} : std::vector<double>{0.25, 0, 0.5});
+        for (std::int16_t& sample : samples) sample = std::int16_t(sample + 100);
+      }
+      writer.Numbers(base, "time", {iteration * 0.02});
+      writer.Numbers(base, "timeUnitSI", {0.5});
+      writer.Text(mesh, "geometry", order == "theta" ? "thetaMode" : "cartesian");
+      writer.Text(mesh, "dataOrder", order);
+      writer.Numbers(mesh, "gridUnitSI", {0.1});
+      // Fortran's x, y and z are z, y and x of the dataset.
+      writer.Texts(mesh, "axisLabels", order == "F" ? std::vector<std::string>{"x", "y", "z"} : std::vector<std::string>{"z", "y", "x"});
+      writer.Numbers(mesh, "gridSpacing", order == "F" ? std::vector<double>{3, 2, 1} : std::vector<double>{1, 2, 3});
+      writer.Numbers(mesh, "gridGlobalOffset", order == "F" ? std::vector<double>{30, 20, 10} : std::vector<double>{10, 20, 30});
+    }
+    writer.Text("/", "openPMD", "1.1.0");
+    writer.Text("/", "meshesPath", "fields/");
+  };
+  for (const std::string order : {"C", "F"}) {
+    SCOPED_TRACE(order);
+    write(order);
+    for (int time = 0; time < 3; ++time) {
+      for (int channel = 0; channel < 2; ++channel) {
+        const auto source = Open({.time = TimeRange{time, time}, .channel = channel});
+        EXPECT_EQ(ValueAt(*source, {0.1 * (30 + 3 * 3.5), 0.1 * (20 + 2 * 2), 0.1 * (10 + 1.25)}),
+                  3 + 4 * (2 + 3) + 100 * (2 * time + channel));
+        EXPECT_EQ(source->info().times, (TimeAxis{3, 0.5, "s"}));
+        EXPECT_EQ(source->info().channels[1].name, "y");
+        EXPECT_EQ(source->info().finest().geometry.orientation.unit, LengthUnit::kMetre);
+      }
+    }
+    EXPECT_EQ(ValueAt(*Open({.dataset = "/data/50/fields/E/y"}), {4.05, 2.4, 1.125}), 23 + 300) << "a path is one dataset, on its grid";
+  }
+  ExpectRefused("has no mesh B; in /data/0/fields there are: E", {.dataset = "B", .describe = true});
+  write("theta");
+  ExpectRefused("has geometry 'thetaMode', which is not supported; supported: cartesian", {.describe = true});
+}
+
 // As netCDF-4 writes them.
 TEST_F(Hdf5ImageTest, CoordinatesPlaceTheAxesAndCfScalesTheValues) {
   std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);

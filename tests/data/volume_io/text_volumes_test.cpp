@@ -327,5 +327,58 @@ TEST_F(TextVolumes, SlantedLabelsKeepTheirNumbers) {
   }
 }
 
+class BovTest : public testing::Test {
+ protected:
+  // 4 x 3 x 2 numbers from 0 behind eight bytes, and a header of these lines.
+  Result<LoadedVolume> Read(const std::string& lines, bool big = false) const {
+    std::vector<double> values;
+    for (int i = 0; i < 24; ++i) values.push_back(i);
+    WriteFile(directory_ / "v.dat", FileBytes(8, 'x') + EncodeSamples(SampleType::kFloat32, values, big));
+    WriteFile(directory_ / "v.bov", lines);
+    return ReadVolume(directory_ / "v.bov");
+  }
+  std::string WhyNot(const std::string& lines) const { return Read(lines).status().message(); }
+
+  static constexpr const char* kLines =
+      "TIME: 1.5\n# a comment: of VisIt\n\nDATA_FILE: v.dat\nDATA_SIZE: 4 3 2\nDATA_FORMAT: FLOAT\nVARIABLE: \"rho\"\nBYTE_OFFSET: 8\n"
+      "BRICK_ORIGIN: 10. 20. 30.\nBRICK_SIZE: 12. 6. 4.\n";
+  const TemporaryDirectory directory_;
+};
+
+TEST_F(BovTest, NodesLieOnTheBordersAndCellsBetweenThem) {
+  for (const bool cells : {false, true}) {
+    for (const bool big : {false, true}) {
+      const auto read = Read(std::string(kLines) + (cells ? "CENTERING: zonal\n" : "") + (big ? "DATA_ENDIAN: BIG\n" : ""), big);
+      ASSERT_TRUE(read.ok()) << read.status().message();
+      const VolumeGeometry& geometry = read->volume->description.geometry;
+      EXPECT_EQ(geometry.size, (Index3{4, 3, 2}));
+      EXPECT_EQ(geometry.spacing, cells ? (Vec3{3, 2, 2}) : (Vec3{4, 3, 4}));
+      EXPECT_EQ(geometry.ToWorld({}), cells ? (Vec3{11.5, 21, 31}) : (Vec3{10, 20, 30}));
+      const std::span<const std::byte> bytes(read->volume->block.bytes);
+      for (int i = 0; i < 24; ++i) {
+        const double value = bytes.size() == 24 ? double(bytes[std::size_t(i)]) : double(read->volume->block.samples<float>()[i]);
+        EXPECT_EQ(value, i);
+      }
+    }
+  }
+}
+
+TEST_F(BovTest, WhatIsWrongIsSaidInOneLine) {
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string lines = kLines;
+    return WhyNot(lines.replace(lines.find(from), from.size(), to));
+  };
+  EXPECT_THAT(with("DATA_FILE: v.dat", ""), HasSubstr("v.bov: not a BOV volume: data_file is missing"));
+  EXPECT_THAT(with("v.dat", "v%05d.dat"), HasSubstr("its samples lie in several files, v%05d.dat, which is not supported"));
+  EXPECT_THAT(with("v.dat", "w.dat"), HasSubstr("w.dat: No such file"));
+  EXPECT_THAT(with("FLOAT", "HALF"), HasSubstr("DATA_FORMAT is 'half', must be BYTE, SHORT, INT, FLOAT or DOUBLE"));
+  EXPECT_THAT(with("4 3 2", "4 3"), HasSubstr("data_size is '4 3', must be 3 numbers"));
+  EXPECT_THAT(with("4 3 2", "4 3 20"), HasSubstr("truncated"));
+  EXPECT_THAT(with("BYTE_OFFSET: 8", "BYTE_OFFSET: x"), HasSubstr("BYTE_OFFSET is 'x'"));
+  EXPECT_THAT(with("TIME", "DATA_COMPONENTS: 0\nTIME"), HasSubstr("DATA_COMPONENTS is '0', must be in [1, 1024]"));
+  EXPECT_THAT(with("TIME", "CENTERING: face\nTIME"), HasSubstr("centering is 'face', must be nodal or zonal"));
+  EXPECT_THAT(with("12. 6. 4.", "0 6 4"), HasSubstr("BRICK_SIZE"));
+}
+
 }  // namespace
 }  // namespace slabstream
