@@ -10,7 +10,9 @@
 
 #include "common/base/check.h"
 #include "common/base/printable.h"
+#include "common/memory/pooled_vector.h"
 #include "common/volume/box_assembly.h"
+#include "data/mosaic/prolong.h"
 #include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
 #include "data/stores/read_threads.h"
@@ -21,70 +23,52 @@ namespace {
 // Sources hold their files open, of which a process may have about a thousand.
 constexpr std::size_t kMostOpen = 64;
 
-// The parts of a mosaic, which live as long as it or a read of it.
-class Parts {
+// The parts of all levels, which live as long as the mosaic or a read of it.
+class Parts : public std::enable_shared_from_this<Parts> {
  public:
-  Parts(std::string name, const SourceInfo& info, std::vector<MosaicPart> parts)
-      : name_(std::move(name)), level_(info.levels.front().description), exact_(info.exact), parts_(std::move(parts)) {}
+  Parts(std::string name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels)
+      : name_(std::move(name)), info_(std::move(info)), levels_(std::move(levels)) {}
 
-  const MosaicPart& part(std::size_t i) const { return parts_[i]; }
-  SampleType type() const { return exact_.type; }
-
-  // Voxels that lie in no part. Unlike Assemble, takes a part for once, since there may be many.
-  std::int64_t Missing() const {
-    std::vector<Box> missing = {level_.geometry.bounds()};
-    for (const MosaicPart& part : parts_) {
-      std::vector<Box> rest;
-      for (const Box& box : missing) {
-        const std::vector<Box> outside = Difference(box, part.box);
-        rest.insert(rest.end(), outside.begin(), outside.end());
-      }
-      missing = std::move(rest);
-    }
-    return BoxAssembly{{}, std::move(missing)}.missing_voxels();
-  }
-
-  // Blocks lie at multiples of their size in the volume, so those of parts that begin elsewhere are of no use.
-  Index3 BlockLike(Index3 block) const {
-    for (const MosaicPart& part : parts_) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (part.box.begin[axis] % block[axis] != 0) block[axis] = 1;
+  // Errors of MakeMosaic.
+  Result<SourceInfo> Check() {
+    for (const std::vector<MosaicPart>& parts : levels_) {
+      if (parts.empty() || parts.size() > kMaxMosaicParts) {
+        return Status::InvalidArgument(fmt::format("{}: has {} parts, must have 1 to {}", name_, parts.size(), kMaxMosaicParts));
       }
     }
-    return block;
+    const Result<std::shared_ptr<VolumeSource>> first = Source(int(levels_.size()) - 1, 0);
+    if (!first.ok()) return first.status();
+    const SampleType type = info_.exact.type;
+    if (levels_.size() > 1 && type != SampleType::kFloat32 && type != SampleType::kFloat64) {
+      return Status::InvalidArgument(fmt::format("{}: has samples of {}, must have float32 or float64", name_, ToString(type)));
+    }
+    const Box coarsest = info_.levels.back().description.geometry.bounds();
+    if (const std::int64_t missing = Assembled(int(levels_.size()) - 1, coarsest).missing_voxels(); missing > 0) {
+      return Status::InvalidArgument(fmt::format("{}: its parts hold {} of the {} voxels between them", name_,
+                                                 coarsest.voxel_count() - missing, coarsest.voxel_count()));
+    }
+    info_.whole = (*first)->info().whole;
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+      info_.levels[level].block = BlockLike((*first)->info().levels.front().block, levels_[level]);
+    }
+    return info_;
   }
 
-  // Which parts a box is read from.
-  BoxAssembly Assembled(const Box& box) const {
-    std::vector<Box> boxes;
-    std::vector<std::size_t> numbers;
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (Intersection(box, parts_[i].box).empty()) continue;
-      boxes.push_back(parts_[i].box);
-      numbers.push_back(i);
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, VolumeSource::ReadDone done) {
+    const auto reading = std::make_shared<BoxReading>(box, out, std::move(stop), std::move(done));
+    try {
+      const BoxAssembly assembly = Assembled(level, box);
+      for (const BoxAssembly::Part& copied : assembly.copied) {
+        // Not on the thread of whoever reads: it may have to be opened.
+        Begin(reading, [self = shared_from_this(), level, copied, reading] { self->ReadFrom(level, copied, reading); });
+      }
+      for (const Box& missing : assembly.missing) {
+        Begin(reading, [self = shared_from_this(), level, missing, reading] { self->Interpolate(level, missing, reading); });
+      }
+    } catch (const std::exception& error) {
+      reading->Fail(NoMemory(error));
     }
-    BoxAssembly assembly = Assemble(box, boxes);
-    for (BoxAssembly::Part& copied : assembly.copied) copied.source = numbers[copied.source];
-    return assembly;
-  }
-
-  // Waits.
-  Result<std::shared_ptr<VolumeSource>> Source(std::size_t i) {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(open_, i, &Open::part);
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
-      return open_.front().source;
-    }
-    Result<std::shared_ptr<VolumeSource>> source = parts_[i].open();
-    if (!source.ok()) return source;
-    if (Status status = Check(parts_[i], (*source)->info()); !status.ok()) return status;
-    if (open_.size() == kMostOpen) {
-      Add(open_.back().source->counts(), closed_);
-      open_.pop_back();
-    }
-    open_.push_front({i, *source});
-    return source;
+    reading->EndPart();
   }
 
   VolumeSource::Counts counts() {
@@ -96,6 +80,7 @@ class Parts {
 
  private:
   struct Open {
+    int level = 0;
     std::size_t part = 0;
     std::shared_ptr<VolumeSource> source;
   };
@@ -105,24 +90,135 @@ class Parts {
     all.chunks += counts.chunks;
   }
 
-  Status Check(const MosaicPart& part, const SourceInfo& info) const {
+  Status NoMemory(const std::exception& error) const {
+    return Status::ResourceExhausted(fmt::format("{}: a part cannot be read: {}", name_, error.what()));
+  }
+
+  // Blocks lie at multiples of their size in the level, so those of parts that begin elsewhere are of no use.
+  static Index3 BlockLike(Index3 block, const std::vector<MosaicPart>& parts) {
+    for (const MosaicPart& part : parts) {
+      for (int axis = 0; axis < 3; ++axis) {
+        if (part.box.begin[axis] % block[axis] != 0) block[axis] = 1;
+      }
+    }
+    return block;
+  }
+
+  // Which parts a box is read from. Unlike Assemble (box_assembly.h), looks at each part once, since there may be many.
+  BoxAssembly Assembled(int level, const Box& box) const {
+    const std::vector<MosaicPart>& parts = levels_[std::size_t(level)];
+    BoxAssembly assembly{{}, {box}};
+    for (std::size_t i = 0; i < parts.size() && !assembly.missing.empty(); ++i) {
+      if (Intersection(box, parts[i].box).empty()) continue;
+      std::vector<Box> missing;
+      for (const Box& each : assembly.missing) {
+        if (const Box common = Intersection(each, parts[i].box); !common.empty()) assembly.copied.push_back({i, common});
+        const std::vector<Box> rest = Difference(each, parts[i].box);
+        missing.insert(missing.end(), rest.begin(), rest.end());
+      }
+      assembly.missing = std::move(missing);
+    }
+    return assembly;
+  }
+
+  // Waits.
+  Result<std::shared_ptr<VolumeSource>> Source(int level, std::size_t i) {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::ranges::find_if(open_, [&](const Open& open) { return open.level == level && open.part == i; });
+    if (found != open_.end()) {
+      open_.splice(open_.begin(), open_, found);
+      return open_.front().source;
+    }
+    const MosaicPart& part = levels_[std::size_t(level)][i];
+    Result<std::shared_ptr<VolumeSource>> source = part.open();
+    if (!source.ok()) return source;
+    if (Status status = CheckPart(part, (*source)->info()); !status.ok()) return status;
+    if (open_.size() == kMostOpen) {
+      Add(open_.back().source->counts(), closed_);
+      open_.pop_back();
+    }
+    open_.push_front({level, i, *source});
+    return source;
+  }
+
+  Status CheckPart(const MosaicPart& part, const SourceInfo& info) const {
     const auto& [geometry, type, mapping] = info.finest();
+    const VolumeDescription& wanted = info_.finest();
     const auto text = [](const Index3& size) { return fmt::format("{} x {} x {} voxels", size.x, size.y, size.z); };
     if (geometry.size != part.box.size()) {
       return Status::InvalidArgument(
           fmt::format("{}: {} has {}, must have {}", name_, part.name, text(geometry.size), text(part.box.size())));
     }
-    const bool same_exact = info.exact.type == exact_.type && info.exact.mapping == exact_.mapping;
-    if (type == level_.type && mapping == level_.mapping && same_exact) return Status::Ok();
+    const auto& [exact_type, exact] = info_.exact;
+    if (type == wanted.type && mapping == wanted.mapping && info.exact.type == exact_type && info.exact.mapping == exact) {
+      return Status::Ok();
+    }
     return Status::InvalidArgument(fmt::format("{}: {} has samples of {} from {} and scale {}, must have {} from {} and scale {}", name_,
                                                part.name, ToString(info.exact.type), info.exact.mapping.offset, info.exact.mapping.scale,
-                                               ToString(exact_.type), exact_.mapping.offset, exact_.mapping.scale));
+                                               ToString(exact_type), exact.offset, exact.scale));
+  }
+
+  template <class Task>
+  void Begin(const std::shared_ptr<BoxReading>& reading, Task task) {
+    reading->BeginPart();
+    try {
+      PostRead(std::move(task));
+    } catch (const std::exception& error) {
+      reading->Fail(NoMemory(error));
+      reading->EndPart();
+    }
+  }
+
+  // Where a part of the box that is read goes.
+  BoxRoom RoomFor(const Box& part, const BoxReading& reading) const {
+    BoxRoom room = reading.out();
+    const Index3 offset = part.begin - reading.box().begin;
+    room.first += (offset.x + offset.y * room.row + offset.z * room.slice) * std::int64_t(CopiedBytes(info_.exact.type, room.exact));
+    return room;
+  }
+
+  static VolumeSource::ReadDone EndOf(const std::shared_ptr<BoxReading>& reading) {
+    return [reading](Status status) {
+      if (!status.ok()) reading->Fail(std::move(status));
+      reading->EndPart();
+    };
+  }
+
+  void ReadFrom(int level, const BoxAssembly::Part& copied, const std::shared_ptr<BoxReading>& reading) {
+    const VolumeSource::ReadDone end = EndOf(reading);
+    if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
+    Result<std::shared_ptr<VolumeSource>> source = Source(level, copied.source);
+    if (!source.ok()) return end(Printable(source.status()));
+    const Index3 begin = levels_[std::size_t(level)][copied.source].box.begin;
+    (*source)->Read(0, {copied.box.begin - begin, copied.box.end - begin}, RoomFor(copied.box, *reading), reading->stop(),
+                    [end, keep = *source](Status status) { end(std::move(status)); });
+  }
+
+  void Interpolate(int level, const Box& missing, const std::shared_ptr<BoxReading>& reading) {
+    const VolumeSource::ReadDone end = EndOf(reading);
+    if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
+    const VolumeGeometry &fine = info_.levels[std::size_t(level)].description.geometry,
+                         &coarse = info_.levels[std::size_t(level) + 1].description.geometry;
+    const Box between = BoxBetween(missing, fine, coarse);
+    const bool exact = reading->out().exact;
+    const auto samples =
+        std::make_shared<UnwrittenVector<std::byte>>(std::size_t(between.voxel_count()) * CopiedBytes(info_.exact.type, exact));
+    Read(level + 1, between, BoxRoom::Dense(between, samples->data(), exact), reading->stop(),
+         [self = shared_from_this(), samples, missing, &fine, &coarse, reading, end](Status status) {
+           if (!status.ok()) return end(std::move(status));
+           const BoxRoom room = self->RoomFor(missing, *reading);
+           if (room.exact && self->info_.exact.type == SampleType::kFloat64) {
+             Prolong(reinterpret_cast<const double*>(samples->data()), missing, fine, coarse, room);
+           } else {
+             Prolong(reinterpret_cast<const float*>(samples->data()), missing, fine, coarse, room);
+           }
+           end(Status::Ok());
+         });
   }
 
   const std::string name_;
-  const VolumeDescription level_;
-  const ExactType exact_;
-  const std::vector<MosaicPart> parts_;
+  SourceInfo info_;  // complete once it is checked
+  const std::vector<std::vector<MosaicPart>> levels_;
   std::mutex mutex_;             // guards what follows
   std::list<Open> open_;         // the last one that was wanted first; at most kMostOpen
   VolumeSource::Counts closed_;  // of those that are not open any more
@@ -130,72 +226,28 @@ class Parts {
 
 class MosaicSource : public VolumeSource {
  public:
-  MosaicSource(std::string name, SourceInfo info, std::shared_ptr<Parts> parts)
-      : name_(std::move(name)), info_(std::move(info)), parts_(std::move(parts)) {}
+  MosaicSource(SourceInfo info, std::shared_ptr<Parts> parts) : info_(std::move(info)), parts_(std::move(parts)) {}
 
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return parts_->counts(); }
-
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
-    CHECK(level == 0 && !box.empty() && info_.finest().geometry.bounds().Contains(box)) << "a box outside the volume";
-    const auto reading = std::make_shared<BoxReading>(box, out, std::move(stop), std::move(done));
-    const auto failed = [this, &reading](const std::exception& error) {
-      reading->Fail(Status::ResourceExhausted(fmt::format("{}: a part cannot be read: {}", name_, error.what())));
-    };
-    try {
-      for (const BoxAssembly::Part& copied : parts_->Assembled(box).copied) {
-        reading->BeginPart();
-        try {
-          // Not on the thread of whoever reads: it may have to be opened.
-          PostRead([parts = parts_, reading, copied] { ReadFrom(*parts, copied, reading); });
-        } catch (const std::exception& error) {
-          failed(error);
-          reading->EndPart();
-        }
-      }
-    } catch (const std::exception& error) {
-      failed(error);
-    }
-    reading->EndPart();
+    CHECK(!box.empty() && info_.levels.at(std::size_t(level)).description.geometry.bounds().Contains(box)) << "a box outside the volume";
+    parts_->Read(level, box, out, std::move(stop), std::move(done));
   }
 
  private:
-  static void ReadFrom(Parts& parts, const BoxAssembly::Part& copied, const std::shared_ptr<BoxReading>& reading) {
-    const auto end = [reading](Status status) {
-      if (!status.ok()) reading->Fail(std::move(status));
-      reading->EndPart();
-    };
-    if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
-    Result<std::shared_ptr<VolumeSource>> source = parts.Source(copied.source);
-    if (!source.ok()) return end(Printable(source.status()));
-    BoxRoom out = reading->out();
-    const Index3 offset = copied.box.begin - reading->box().begin, begin = parts.part(copied.source).box.begin;
-    out.first += (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(CopiedBytes(parts.type(), out.exact));
-    (*source)->Read(0, {copied.box.begin - begin, copied.box.end - begin}, out, reading->stop(),
-                    [end, keep = *source](Status status) { end(std::move(status)); });
-  }
-
-  const std::string name_;
   const SourceInfo info_;
   const std::shared_ptr<Parts> parts_;
 };
 
 }  // namespace
 
-Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, std::vector<MosaicPart> parts) {
-  if (parts.empty() || parts.size() > kMaxMosaicParts) {
-    return Status::InvalidArgument(fmt::format("{}: has {} parts, must have 1 to {}", name, parts.size(), kMaxMosaicParts));
-  }
-  const auto all = std::make_shared<Parts>(name, info, std::move(parts));
-  const Result<std::shared_ptr<VolumeSource>> first = all->Source(0);
-  if (!first.ok()) return first.status();
-  const std::int64_t voxels = info.finest().geometry.bounds().voxel_count();
-  if (const std::int64_t missing = all->Missing(); missing > 0) {
-    return Status::InvalidArgument(fmt::format("{}: its parts hold {} of the {} voxels between them", name, voxels - missing, voxels));
-  }
-  info.whole = (*first)->info().whole;
-  info.levels.front().block = all->BlockLike((*first)->info().levels.front().block);
-  return std::shared_ptr<VolumeSource>(std::make_shared<MosaicSource>(name, std::move(info), all));
+Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels) {
+  CHECK(!levels.empty() && levels.size() == info.levels.size());
+  const auto parts = std::make_shared<Parts>(name, std::move(info), std::move(levels));
+  Result<SourceInfo> checked = parts->Check();
+  if (!checked.ok()) return checked.status();
+  return std::shared_ptr<VolumeSource>(std::make_shared<MosaicSource>(*std::move(checked), parts));
 }
 
 }  // namespace slabstream

@@ -13,8 +13,6 @@
 
 namespace slabstream {
 
-VolumeFormat VtkParallelImage();
-
 namespace {
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
@@ -35,8 +33,8 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
     parts.push_back({piece.file, TurnedBox{placed->turn, size, {}, {}}.Turned(piece.box), open});
     files.emplace_back(piece.file);
   }
-  SourceInfo info = InfoOfFile(VtkParallelImage(), path, image->header, *placed, files, Uniform(1), options);
-  return MakeMosaic(path, std::move(info), std::move(parts));
+  SourceInfo info = InfoOfFile("VTK parallel image", path, image->header, *placed, files, Uniform(1), options);
+  return MakeMosaic(path, std::move(info), {std::move(parts)});
 }
 
 }  // namespace

@@ -85,7 +85,7 @@ Result<Decoded> Decode(const VolumeFormat& format, const std::string& path, cons
   if (!raw.ok()) return Printable(raw.status());
   const Result<WorldPlacement> placed = PlaceInWorld(raw->header, path);
   if (!placed.ok()) return placed.status();
-  SourceInfo info = InfoOfFile(format, path, raw->header, *placed, raw->other_files, raw->header.size, options);
+  SourceInfo info = InfoOfFile(std::string(format.name), path, raw->header, *placed, raw->other_files, raw->header.size, options);
   info.whole = true;
   info.levels.front().block = placed->geometry.size;
   if (!options.headers_only) {

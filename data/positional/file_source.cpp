@@ -91,18 +91,15 @@ class PositionalSource : public VolumeSource {
   const SourceContext context_;
 };
 
-// Where the samples lie. None: it must be decoded as a whole.
-Result<std::optional<LocatedVolume>> Locate(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
-  if (format.locate == nullptr || options.channel == kLuminance) return std::optional<LocatedVolume>();
-  const Result<LocatedSamples> located = format.locate(path, options);
-  if (!located.ok() && format.read != nullptr) return std::optional<LocatedVolume>();
-  if (!located.ok()) return located.status();
-  const RawHeader& header = located->header;
+// What a header says. None: it must be decoded as a whole.
+Result<std::optional<LocatedVolume>> Described(const std::string& format, const std::string& path, const LocatedSamples& located,
+                                               const ReadOptions& options) {
+  const RawHeader& header = located.header;
   if (Status status = CheckChannel(path, header, options); !status.ok()) return status;
   const Result<WorldPlacement> placed = PlaceInWorld(header, path);
   if (!placed.ok()) return placed.status();
   if (placed->slant) return std::optional<LocatedVolume>();
-  Result<Payload> payload = PayloadOfVolume(path, *located);
+  Result<Payload> payload = PayloadOfVolume(path, located);
   if (!payload.ok()) return payload.status();
   const std::vector<std::filesystem::path> beside = payload->FilesBeside(path);
   const bool in_order = payload->compressed() || !payload->more.empty();
@@ -116,20 +113,35 @@ Result<std::optional<LocatedVolume>> Locate(const VolumeFormat& format, const st
   return std::optional(LocatedVolume{header, *std::move(payload), placed->turn, component, std::move(info)});
 }
 
-}  // namespace
-
-Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
-                                               const SourceContext& context) {
-  Result<std::optional<LocatedVolume>> found = Locate(format, path, options);
-  if (!found.ok()) return found.status();
-  if (!*found) return OpenDecoded(format, path, options);
-  LocatedVolume& volume = **found;
+Result<std::shared_ptr<VolumeSource>> OpenDescribed(const std::string& path, LocatedVolume volume, const ReadOptions& options,
+                                                    const SourceContext& context) {
   if (volume.info.slices)
     return std::shared_ptr<VolumeSource>(std::make_shared<SliceStream>(path, std::move(volume), options.progress, context));
   Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume.header, volume.payload, volume.component);
   if (!samples.ok()) return samples.status();
   return std::shared_ptr<VolumeSource>(
       std::make_shared<PositionalSource>(std::move(volume.info), volume.turn, *std::move(samples), context));
+}
+
+}  // namespace
+
+Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
+                                               const SourceContext& context) {
+  if (format.locate == nullptr || options.channel == kLuminance) return OpenDecoded(format, path, options);
+  const Result<LocatedSamples> located = format.locate(path, options);
+  if (!located.ok() && format.read != nullptr) return OpenDecoded(format, path, options);
+  if (!located.ok()) return located.status();
+  Result<std::optional<LocatedVolume>> found = Described(std::string(format.name), path, *located, options);
+  if (!found.ok()) return found.status();
+  return *found ? OpenDescribed(path, **std::move(found), options, context) : OpenDecoded(format, path, options);
+}
+
+Result<std::shared_ptr<VolumeSource>> OpenLocated(const std::string& format, const std::string& path, const LocatedSamples& located,
+                                                  const SourceContext& context) {
+  Result<std::optional<LocatedVolume>> found = Described(format, path, located, {});
+  if (!found.ok()) return found.status();
+  CHECK(found->has_value()) << "axes that are not at right angles";
+  return OpenDescribed(path, **std::move(found), {}, context);
 }
 
 }  // namespace slabstream

@@ -4,14 +4,14 @@
 
 namespace slabstream {
 
-SourceInfo InfoOfFile(const VolumeFormat& format, const std::string& path, const RawHeader& header, const WorldPlacement& placed,
+SourceInfo InfoOfFile(const std::string& format, const std::string& path, const RawHeader& header, const WorldPlacement& placed,
                       const std::vector<std::filesystem::path>& beside, const Index3& block, const ReadOptions& options) {
   const auto [type, shift] = KeptTypeOf(header.type);
   // value = scale * (stored + shift) + offset
   const VolumeDescription description = {placed.geometry, type, {header.rescale.scale, header.rescale.FromStored(shift)}};
   const std::array<int, 3>& from = placed.turn.from;
   SourceInfo info = {.levels = {{description, {block[from[0]], block[from[1]], block[from[2]]}}},
-                     .format = std::string(format.name),
+                     .format = format,
                      .file_type = std::string(ToString(header.type)),
                      .exact = {header.type, header.rescale},
                      .labels = header.labels || options.labels,

@@ -21,7 +21,7 @@ struct LocatedVolume {
 
 // The description of a file of which the header and its place in the world are known. `beside`: what is read besides `path`. `block`: of
 // SourceLevel, by the axes of the file.
-SourceInfo InfoOfFile(const VolumeFormat& format, const std::string& path, const RawHeader& header, const WorldPlacement& placed,
+SourceInfo InfoOfFile(const std::string& format, const std::string& path, const RawHeader& header, const WorldPlacement& placed,
                       const std::vector<std::filesystem::path>& beside, const Index3& block, const ReadOptions& options);
 
 }  // namespace slabstream
