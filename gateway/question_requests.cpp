@@ -21,14 +21,19 @@ namespace {
 constexpr int kMaxQuestions = 32;  // under way: fewer than a client may have
 static_assert(kMaxQuestions < int(kMaxOpenQuestions));
 
-// Which channel of the dataset, and which time.
+// Which channel of the dataset, or of points which channels, and which time.
 template <class Query>
 Query About(FieldReader& read, Query query) {
-  query.field = read.Get("field", "");
+  const std::string field = read.Get("field", "");
   query.time = read.Get("time", "");
-  for (const std::string& text : {query.field, query.time}) {
+  for (const std::string& text : {field, query.time}) {
     if (text.size() > kMaxNameBytes)
       read.Refuse(fmt::format("field or time has {} bytes, at most {} are possible", text.size(), kMaxNameBytes));
+  }
+  if constexpr (requires { query.field; }) {
+    query.field = field;
+  } else if (!field.empty()) {
+    query.channels = read.Value(ParseNames("field", field));
   }
   return query;
 }

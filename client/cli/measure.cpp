@@ -106,9 +106,6 @@ Result<Measures> Parse(const MeasureOptions& options) {
   if (options.csv && !(labels_alone && options.labels)) {
     return Status::InvalidArgument("--csv is the table of --labels, without any other measure; --json writes all of them");
   }
-  if (options.labels && options.volume.connection.local_workers > 0 && !options.layers.any()) {
-    return Status::InvalidArgument("--labels needs a FILE of labels with --local: only datasets of a service have labels of their own");
-  }
   return measures;
 }
 
@@ -116,6 +113,7 @@ Result<Measures> Parse(const MeasureOptions& options) {
 Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeometry& geometry, const MeasureOptions& options,
                      const Measures& measures) {
   const std::string &field = options.volume.field, &time = options.volume.time;
+  const auto channels = field.empty() ? std::vector<std::string>() : std::vector{field};
   const Vec3 spacing = geometry.spacing;
   const std::string_view unit = PluralOf(UnitOf(geometry));
   Json found = Json::array();
@@ -132,7 +130,7 @@ Result<Json> Measure(Client& client, const std::string& dataset, const VolumeGeo
     const double voxels = Length(p[1] - p[0]) / std::min({spacing.x, spacing.y, spacing.z});
     const int samples = options.samples > 0 ? options.samples : int(std::clamp(std::ceil(voxels) + 1, 2.0, double(kMaxSamplePoints)));
     const Result<std::vector<VolumeSample>> along =
-        client.SampleAt({.dataset = dataset, .points = PointsAlong(p[0], p[1], samples), .field = field, .time = time});
+        client.SampleAt({.dataset = dataset, .points = PointsAlong(p[0], p[1], samples), .channels = channels, .time = time});
     if (!along.ok()) return along.status();
     Json profile = {{"measure", "profile"}, {"unit", unit}};
     profile.update(ProfileJson(*along));

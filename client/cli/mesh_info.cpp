@@ -11,6 +11,7 @@
 #include "client/cli/commands.h"
 #include "client/report/volume_text.h"
 #include "client/request/json_value.h"
+#include "common/base/printable.h"
 #include "common/renderers/registry.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
@@ -49,6 +50,7 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::opt
   for (const GridArray& array : info.arrays) {
     text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, array.TypeText());
   }
+  for (const std::string& note : info.notes) text += fmt::format("note         {}\n", Printable(note));
   return text + fmt::format("values       {} ... {} in {}\n", ValueText(range.min), ValueText(range.max), info.arrays[info.array].name);
 }
 
@@ -68,6 +70,7 @@ Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
           {"bounds", {{"low", VectorJson(loaded.bounds.low)}, {"high", VectorJson(loaded.bounds.high)}}},
           {"arrays", arrays},
           {"array", info.arrays[info.array].name},
+          {"notes", info.notes},
           {"range", {{"min", range.min}, {"max", range.max}}}};
 }
 

@@ -158,7 +158,9 @@ void AddSource(const Command& app, AskedVolume& volume) {
   app.GroupOptions("Options");
   app.AddText("SOURCE", volume.source, kSourceHelp).Required();
   AddReadOptions(app, kOfRequests);
-  app.AddText("--channel", volume.field, "Which channel, by its number or name; of a file also luminance, of red, green and blue")
+  app.AddText(
+         "--channel", volume.field,
+         "Which channel, by its number or name (`value`: channels, separated by commas); of a file also luminance, of red, green and blue")
       .TypeName("CHANNEL")
       .Default("the first one that is shown");
   app.AddText("--time", volume.time, "Which time: its number, a number with a unit of time, or last, the newest one")

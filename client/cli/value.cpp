@@ -22,10 +22,13 @@ Status RunValue(const ValueOptions& options) {
     if (!point.ok()) return point.status();
     points.push_back(*point);
   }
+  const std::string& names = options.volume.field;
+  Result<std::vector<std::string>> channels = names.empty() ? std::vector<std::string>() : ParseNames("--channel", names);
+  if (!channels.ok()) return channels.status();
   Result<ServiceConnection> connection = ServiceConnection::Open(options.volume.connection, options.volume.source, options.layers);
   if (!connection.ok()) return connection.status();
   const Result<std::vector<VolumeSample>> samples = connection->client().SampleAt(
-      {.dataset = connection->dataset(), .points = std::move(points), .field = options.volume.field, .time = options.volume.time});
+      {.dataset = connection->dataset(), .points = std::move(points), .channels = *std::move(channels), .time = options.volume.time});
   if (!samples.ok()) return samples.status();
   Json json = Json::array();
   for (const VolumeSample& sample : *samples) {

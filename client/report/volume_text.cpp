@@ -18,23 +18,23 @@ Json Vector(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 // A data value that is a whole number of at most 64 bits.
-std::optional<Int128> WholeValue(const VolumeSample& sample) {
+std::optional<Int128> WholeValue(const std::optional<double>& value, std::int64_t rest) {
   constexpr double kEnd = 0x1p64;
-  if (!sample.value || std::abs(*sample.value) > kEnd || std::trunc(*sample.value) != *sample.value) return std::nullopt;
-  return Int128(*sample.value) + sample.rest;
+  if (!value || std::abs(*value) > kEnd || std::trunc(*value) != *value) return std::nullopt;
+  return Int128(*value) + rest;
 }
 
 // A whole number is one in JSON, too.
-Json ValueJson(const VolumeSample& sample) {
-  const std::optional<Int128> whole = WholeValue(sample);
+Json ValueJson(const std::optional<double>& value, std::int64_t rest) {
+  const std::optional<Int128> whole = WholeValue(value, rest);
   if (whole && *whole >= 0 && *whole <= std::numeric_limits<std::uint64_t>::max()) return std::uint64_t(*whole);
   if (whole && *whole < 0 && *whole >= std::numeric_limits<std::int64_t>::min()) return std::int64_t(*whole);
-  return OrNull(sample.value);
+  return OrNull(value);
 }
 
 std::string TextOfValue(const VolumeSample& sample) {
   if (!sample.value) return "value not finite";
-  if (const std::optional<Int128> whole = WholeValue(sample)) return fmt::format("value {}", *whole);
+  if (const std::optional<Int128> whole = WholeValue(sample.value, sample.rest)) return fmt::format("value {}", *whole);
   return "value " + ValueText(*sample.value);
 }
 
@@ -92,9 +92,10 @@ Json SampleJson(const VolumeSample& sample) {
   Json json = {{"at", Vector(sample.at)}, {"inside", sample.inside}, {"voxel", nullptr}, {"value", nullptr}};
   if (!sample.inside) return json;
   json["voxel"] = {sample.voxel.x, sample.voxel.y, sample.voxel.z};
-  json["value"] = ValueJson(sample);
+  json["value"] = ValueJson(sample.value, sample.rest);
   if (sample.label) json["label"] = {{"value", sample.label->value}, {"name", sample.label->name}};
-  if (sample.overlay) json["overlay"] = *sample.overlay;
+  json["fields"] = Json::array();
+  for (const FieldSample& field : sample.fields) json["fields"].push_back({{"name", field.name}, {"value", ValueJson(field.value, 0)}});
   json["interpolated"] = OrNull(sample.interpolated);
   return json;
 }
@@ -176,7 +177,10 @@ std::string SampleText(const VolumeSample& sample) {
   text += "  " + TextOfValue(sample);
   if (sample.label)
     text += fmt::format("  label {}{}{}", sample.label->value, sample.label->name.empty() ? "" : " ", Printable(sample.label->name));
-  if (sample.overlay) text += "  overlay " + ValueText(*sample.overlay);
+  for (std::size_t i = 1; i < sample.fields.size(); ++i) {
+    const FieldSample& field = sample.fields[i];
+    text += fmt::format("  {} {}", Printable(field.name), field.value ? ValueText(*field.value) : "none");
+  }
   return text;
 }
 

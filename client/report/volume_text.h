@@ -26,8 +26,8 @@ Json LabelJson(const Label& label);
 // {"dataset", "labels": [LabelJson, ...]}
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 
-// {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"; "interpolated"}. Null: there is
-// none.
+// {"at", "inside", "voxel", "value", "label": {"value", "name"} if there are labels, "fields": [{"name", "value"}, ...], "interpolated"}.
+// Null: there is none. Outside the volume: the first four.
 Json SampleJson(const VolumeSample& sample);
 // The same with "hit", and "depth"; {"hit": false} if there is none.
 Json PickJson(const PickReply& picked);
@@ -51,7 +51,7 @@ Json LabelStatisticsJson(const StatisticsReply& reply);
 std::string LabelStatisticsCsv(const StatisticsReply& reply);
 std::string LabelStatisticsText(const StatisticsReply& reply);
 
-// One line.
+// One line. The first field is the one that "value" is of.
 std::string SampleText(const VolumeSample& sample);
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -134,9 +135,14 @@ Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes)
   if (fs::is_directory(path, error)) return Status::InvalidArgument(fmt::format("'{}' is a directory", path));
   std::ifstream file(path, std::ios::binary);
   if (!file) return Status::InvalidArgument(fmt::format("'{}' cannot be read: {}", path, std::strerror(errno)));
-  std::string text(max_bytes + 1, '\0');  // one more than allowed tells "too long" from "just right", for pipes too
-  file.read(text.data(), std::streamsize(text.size()));
-  text.resize(std::size_t(file.gcount()));
+  std::string text;
+  std::size_t got = 0;
+  while (file && got <= max_bytes) {  // one more than allowed tells "too long" from "just right", for pipes too
+    text.resize(std::min(max_bytes + 1, std::max(2 * got, std::size_t{1} << 16)));
+    file.read(text.data() + got, std::streamsize(text.size() - got));
+    got += std::size_t(file.gcount());
+  }
+  text.resize(got);
   if (text.size() > max_bytes) return Status::ResourceExhausted(fmt::format("'{}' is longer than {} bytes", path, max_bytes));
   return text;
 }

@@ -15,8 +15,8 @@ namespace slabstream {
 
 // kTint: labels colour the material that the transfer function shows; one that is not shown takes its material away.
 // kSurface: a label is material of its own, in place of the volume's. kHighlight: as kTint, but the material of a label that is not shown
-// stays as it is.
-enum class LabelMode : std::uint8_t { kTint = 1, kSurface = 2, kHighlight = 3 };
+// stays as it is. kAuto: kSurface of a dataset of labels alone, else kTint.
+enum class LabelMode : std::uint8_t { kTint = 1, kSurface = 2, kHighlight = 3, kAuto = 4 };
 
 // Of kSurface. kBlocky: a place has the label of the voxel that it lies in. kSmooth: labels are smoothed (common/frame/smooth_label.h).
 enum class LabelSurface : std::uint8_t { kBlocky = 1, kSmooth = 2 };
@@ -42,7 +42,7 @@ struct LabelOpacity {
 };
 
 struct LabelChoice {
-  LabelMode mode = LabelMode::kTint;
+  LabelMode mode = LabelMode::kAuto;
   double tint = kDefaultTint;  // [0, 1]: share of the label's colour; not of kSurface
   // Opacities of labels; a label that is not named has 1, none is named twice; at most kMaxLabels.
   std::vector<LabelOpacity> opacities;
@@ -71,7 +71,7 @@ struct LabelLook {
     std::uint64_t first = 0, last = 0;  // both included
     friend bool operator==(const Span&, const Span&) = default;
   };
-  LabelMode mode = LabelMode::kTint;  // or kSurface; kHighlight is kTint without `hides`
+  LabelMode mode = LabelMode::kTint;  // or kSurface; kHighlight is kTint without `hides`, kAuto one of the two
   double tint = kDefaultTint;
   std::vector<Entry> entries;  // values rise; other labels have their StandardColor and the opacity 1
   std::vector<Span> shown;     // rise and do not touch; empty: all labels

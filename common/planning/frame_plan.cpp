@@ -137,6 +137,13 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   plan.alternates = policy.assignment->alternates;
   plan.pixel_error = policy.pixel_error;
   PlaceBoxes(plan);
+  // Parts of several levels become as many boxes as memory needs, whatever the number of groups.
+  if (plan.groups.size() > std::size_t(kMaxGroups)) {
+    return Status::ResourceExhausted(
+        fmt::format("the picture takes {} groups of boxes, and at most {} are possible: a coarser level (--detail), more memory or more "
+                    "workers take fewer",
+                    plan.groups.size(), kMaxGroups));
+  }
   // Nothing is in front of a single box.
   const bool several = plan.groups.size() > 1 || plan.groups.front().placements.size() > 1;
   if (several && UsesOcclusion(plan.setup)) plan.setup.front = FindOpaqueFront(plan.layout->extinction, plan.setup);

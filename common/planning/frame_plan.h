@@ -92,8 +92,8 @@ struct Roster {
 // The part of a plan that does not depend on the policy. InvalidArgument: a view that cannot be rendered, or a frame that is too large.
 Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 
-// Pure. Unavailable: no worker in the roster. `layout` was made for the setup's volume and look and this policy, and for as many slots as
-// the roster has.
+// Pure. Unavailable: no worker in the roster. ResourceExhausted: more than kMaxGroups groups. `layout` was made for the setup's volume and
+// look and this policy, and for as many slots as the roster has.
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
                             const Turn& turn = {}, const ClientTakes& client = {});
 // Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps.

@@ -10,14 +10,6 @@
 namespace slabstream {
 namespace {
 
-std::string NameOf(const ShownFields& shown, int number) {
-  if (shown.dataset == nullptr) return "volume";
-  const std::vector<FieldInfo>& fields = shown.dataset->fields;
-  const std::string& name = fields[std::size_t(number)].name;
-  if (!name.empty()) return Printable(name);
-  return std::ranges::count(fields, true, &FieldInfo::channel) > 1 ? fmt::format("channel {}", number) : "volume";
-}
-
 void AddBar(const ShownFields& shown, int number, const TransferFunction& transfer, PictureKey& key) {
   double most = 0;
   for (const OpacityPoint& point : transfer.opacities) most = std::max(most, point.opacity);
@@ -35,7 +27,7 @@ void AddBar(const ShownFields& shown, int number, const TransferFunction& transf
     if (low.value < colors.front().value) colors.insert(colors.begin(), low);
     if (high.value > colors.back().value) colors.push_back(high);
   }
-  if (colors.front().value < colors.back().value) key.bars.push_back({NameOf(shown, number), std::move(colors)});
+  if (colors.front().value < colors.back().value) key.bars.push_back({Printable(TitleOf(shown, number)), std::move(colors)});
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ class Divider {
   LevelPartition Divide() {
     const Box bounds = {{0, 0, 0}, request_.size};
     nodes_.resize(1);
-    PartLevels(0, bounds);
+    PartLevels(bounds);
     std::size_t shown = leaves_.size();
     while (!leaves_.empty() && shown < kMostShown) {
       const Leaf largest = leaves_.top();
@@ -113,12 +113,51 @@ class Divider {
     return best;
   }
 
-  void PartLevels(std::uint32_t node, const Box& box) {
-    const std::optional<Cut> cut = BetweenLevels(box);
-    if (!cut) return Keep(node, box, map_.Of(ZonesIn(box).begin));
-    const auto [lower, upper] = Split(node, box, *cut);
-    PartLevels(lower.node, lower.box);
-    PartLevels(upper.node, upper.box);
+  // Zones of several levels, as one box of the finest one.
+  struct Mixed {
+    std::int64_t waste = 0;  // bytes of it beyond those of each zone at its own level
+    Part part;
+    // Which one is parted next: that of the most waste, or the first of them.
+    friend bool operator<(const Mixed& a, const Mixed& b) { return std::tuple(a.waste, b.part.node) < std::tuple(b.waste, a.part.node); }
+  };
+
+  std::uint8_t FinestIn(const Box& zones) const {
+    std::uint8_t finest = LevelMap::kOutside;
+    for (const Index3& zone : IndicesIn(zones)) finest = std::min(finest, map_.Of(zone));
+    return finest;
+  }
+
+  Mixed MixedOf(const Part& part) const {
+    const Box zones = ZonesIn(part.box);
+    const std::uint8_t finest = FinestIn(zones);
+    if (finest == LevelMap::kOutside) return {0, part};
+    std::int64_t needed = 0;
+    for (const Index3& zone : IndicesIn(zones)) {
+      if (map_.Of(zone) != LevelMap::kOutside) needed += request_.bytes_of({map_.BoxOf(zone, request_.size), map_.Of(zone)});
+    }
+    // Zones have borders of their own, so together they may take more than the box.
+    return {std::max<std::int64_t>(request_.bytes_of({part.box, finest}) - needed, 0) + 1, part};
+  }
+
+  // Each box takes time of its own, and a plan has limits. So where levels lie in many small parts, as in adaptive meshes, boxes hold zones
+  // of several levels, and are drawn from the finest of them.
+  void PartLevels(const Box& bounds) {
+    constexpr std::size_t kMostParts = 512;
+    std::priority_queue<Mixed> mixed;
+    mixed.push(MixedOf({0, bounds}));
+    while (!mixed.empty()) {
+      const Part part = mixed.top().part;
+      mixed.pop();
+      const bool full = mixed.size() + leaves_.size() + 1 >= kMostParts;
+      const std::optional<Cut> cut = full ? std::nullopt : BetweenLevels(part.box);
+      if (!cut) {
+        Keep(part.node, part.box, FinestIn(ZonesIn(part.box)));
+        continue;
+      }
+      const auto [lower, upper] = Split(part.node, part.box, *cut);
+      mixed.push(MixedOf(lower));
+      mixed.push(MixedOf(upper));
+    }
   }
 
   void Keep(std::uint32_t node, const Box& box, std::uint8_t level) {

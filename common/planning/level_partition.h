@@ -1,4 +1,5 @@
-// LevelPartition: boxes of a picture that is drawn from several levels. Each box lies in zones of one level (LevelMap).
+// LevelPartition: boxes of a picture that is drawn from several levels. Each box lies in zones of one level (LevelMap), or of several, of
+// which it has the finest.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@ namespace slabstream {
 
 struct LevelPartition {
   Partition partition;
-  std::vector<std::uint8_t> levels;  // by box, as in LevelMap::of_zone
+  std::vector<std::uint8_t> levels;  // by box, as in LevelMap::of_zone; no zone of a box has a finer one
 };
 
 struct LevelPartitionRequest {
@@ -28,7 +29,8 @@ struct LevelPartitionRequest {
   std::function<Index3(std::uint8_t level)> blocks_of;
 };
 
-// Pure. A kd-tree: planes between zones first part levels, where they part most, then halve what is too large.
+// Pure. A kd-tree: planes between zones first part levels, where they part most, into about 512 boxes at most; then they halve what is too
+// large.
 LevelPartition DivideByLevels(const LevelPartitionRequest& request);
 
 }  // namespace slabstream

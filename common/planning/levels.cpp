@@ -45,11 +45,11 @@ double WidthAt(const Camera::ImageExtent& extent, const Camera& camera) {
   return camera.PixelSizeAt(perspective ? std::max(extent.nearest, 1e-6 * camera.target_depth) : camera.target_depth);
 }
 
-// A map without levels yet: at most 16 zones along an axis, none of less than 32 voxels.
-LevelMap ZonesOf(const Index3& size) {
+// A map without levels yet: at most so many zones along an axis, none of less than 32 voxels.
+LevelMap ZonesOf(const Index3& size, int most = 16) {
   LevelMap map{.levels = {}};
   for (const Axis axis : kAxes) {
-    map.side[axis] = std::max(32, std::int32_t(std::bit_ceil(std::uint32_t(size[axis] + 15) / 16)));
+    map.side[axis] = std::max(32, std::int32_t(std::bit_ceil(std::uint32_t(size[axis] + most - 1) / std::uint32_t(most))));
     map.counts[axis] = (size[axis] - 1) / map.side[axis] + 1;
   }
   return map;
@@ -96,10 +96,30 @@ void Even(LevelMap& map) {
   }
 }
 
+// By zone: the finest of the levels of `map` that has voxels of its own there, or beside it, where they count for what is interpolated.
+std::vector<std::uint8_t> RefinedIn(const LevelMap& map, const VolumeLevels& levels) {
+  std::vector<std::uint8_t> finest(CountIn(map.counts), std::uint8_t(map.levels.size() - 1));
+  const VolumeGeometry& grid = levels.levels[std::size_t(map.levels.front())].geometry;
+  for (std::size_t n = map.levels.size(); n-- > 0;) {
+    const auto level = std::size_t(map.levels[n]);
+    const VolumeGeometry& geometry = levels.levels[level].geometry;
+    const std::vector<Box> everywhere = {geometry.bounds()};
+    const GridMap to_grid = MapBetween(geometry, grid);
+    for (const Box& box : levels.refined[level] != nullptr ? *levels.refined[level] : everywhere) {
+      const Box there = CoveringVoxels(Grown(box, 1, geometry.bounds()), to_grid, grid.size);
+      for (const Index3& zone : IndicesIn({there.begin / map.side, (there.end - Uniform(1)) / map.side + Uniform(1)})) {
+        finest[NumberIn(map.counts, zone)] = std::uint8_t(n);
+      }
+    }
+  }
+  return finest;
+}
+
 // The map of a picture whose finest level is `first`.
 LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const FrameSetup& setup) {
+  constexpr int kMostOfMesh = 32;
   const VolumeDescription& grid = levels.levels[std::size_t(first)];
-  LevelMap map = ZonesOf(grid.geometry.size);
+  LevelMap map = levels.refined.empty() ? ZonesOf(grid.geometry.size) : ZonesOf(grid.geometry.size, kMostOfMesh);
   int end = first;
   const auto fits = [&](const VolumeDescription& level) {
     return level.type == grid.type && level.mapping == grid.mapping && CanStandIn(level.geometry, grid.geometry);
@@ -109,6 +129,10 @@ LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const Frame
     const int level = CoarsestFor(detail * width, levels, end);
     map.of_zone.push_back(width > 0 ? std::uint8_t(std::max(level - first, 0)) : LevelMap::kOutside);
   });
+  if (!levels.refined.empty()) {
+    const std::vector<std::uint8_t> refined = RefinedIn(map, levels);
+    for (std::size_t i = 0; i < refined.size(); ++i) map.of_zone[i] = std::max(map.of_zone[i], refined[i]);
+  }
   Even(map);
   return map;
 }
@@ -208,13 +232,17 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     const double width = setup->unit * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera);
     return LevelMap{.levels = {CoarsestFor(detail * width, levels, count)}};
   };
-  const bool mixes =
-      camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();
+  const bool mixes = (camera.projection == Projection::kPerspective || !levels.refined.empty()) && setup->renderer->Can(Ability::kLevels) &&
+                     setup->transfer.isosurfaces.empty();
   if (!mixes) return whole();
 
   const double least = LeastWidth(finest, *setup);
   if (least == 0) return whole();
-  return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
+  for (int first = CoarsestFor(detail * least, levels, count);; ++first) {
+    LevelMap map = MapOf(detail, levels, first, *setup);
+    // The frame's grid is a level that is drawn.
+    if (std::ranges::find(map.of_zone, 0) != map.of_zone.end() || first + 1 == count) return WithoutUnused(std::move(map));
+  }
 }
 
 Result<double> DetailOf(const FrameRequest& request, const VolumeGeometry& finest, const std::shared_ptr<const VolumeSummary>& overview,

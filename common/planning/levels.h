@@ -21,6 +21,9 @@ namespace slabstream {
 
 struct VolumeLevels {
   std::vector<VolumeDescription> levels;  // finest first; more than one
+  // Of an adaptive mesh: where each level has voxels of its own, those of the next coarser level tell the others. Null: everywhere. Empty:
+  // it is none.
+  std::vector<std::shared_ptr<const std::vector<Box>>> refined = {};
   // The summary of the level that statistics are taken from: its range and histogram are those of the dataset, at every
   // level.
   std::shared_ptr<const VolumeSummary> overview;
@@ -33,7 +36,8 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels);
 // request.level names. Counts are those axes along which a level has coarser voxels than the finest one.
 //
 // In perspective, far parts need coarser voxels than near ones. If the renderer has Ability::kLevels, each zone of a regular grid is drawn
-// from the coarsest level that suits its nearest point. A request with isosurfaces is drawn from one level: two levels do not agree on
+// from the coarsest level that suits its nearest point. In an adaptive mesh no zone is drawn from a level that has no voxels of its own
+// there, whatever the projection. A request with isosurfaces is drawn from one level: two levels do not agree on
 // where a surface meets their border.
 //
 // Errors of ResolveRequest and MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.

@@ -66,12 +66,12 @@ std::vector<LabelLook::Span> Joined(std::vector<LabelLook::Span> spans) {
 
 // `slice`: of a slice, which keeps the grey values of hidden labels.
 Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table, bool slice) {
-  LabelLook look{.mode = choice.mode == LabelMode::kHighlight ? LabelMode::kTint : choice.mode, .tint = choice.tint};
+  LabelLook look{.mode = choice.mode == LabelMode::kSurface ? choice.mode : LabelMode::kTint, .tint = choice.tint};
   look.smooth = choice.surface == LabelSurface::kSmooth;
   if (look.smooth && choice.mode != LabelMode::kSurface) {
     return Status::InvalidArgument("label-surface is 'smooth', but label-mode is not 'surface', the mode in which labels have surfaces");
   }
-  look.hides = choice.mode == LabelMode::kTint && !slice;
+  look.hides = look.mode == LabelMode::kTint && choice.mode != LabelMode::kHighlight && !slice;
   const auto rgb = [](const LabelColor& color) { return Rgb{color[0], color[1], color[2]}; };
   for (const Label& label : table.labels) look.entries.push_back({label.value, rgb(label.color)});
   for (const LabelRange& range : choice.shown) {
@@ -170,7 +170,13 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
           "dataset \"{}\" has labels and no values, and renderer '{}' shows no labels; --label-mode surface chooses one that does",
           request.dataset, request.renderer));
     }
-    ShownLabels(request).mode = LabelMode::kSurface;
+    LabelMode& mode = ShownLabels(request).mode;
+    if (mode == LabelMode::kTint || mode == LabelMode::kHighlight) {
+      return Status::InvalidArgument(
+          fmt::format("label-mode is '{}', but dataset \"{}\" has labels and no values to colour, so it must be auto or surface",
+                      mode == LabelMode::kTint ? "tint" : "highlight", request.dataset));
+    }
+    mode = LabelMode::kSurface;
   }
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
   const Result<std::vector<const RendererKind*>> able =

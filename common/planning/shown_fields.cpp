@@ -101,6 +101,14 @@ TransferFunction Ramp(const Rgb& color, const ScalarRange& range, double gamma, 
 
 }  // namespace
 
+std::string TitleOf(const ShownFields& shown, int number) {
+  if (shown.dataset == nullptr) return "volume";
+  const std::vector<FieldInfo>& fields = shown.dataset->fields;
+  const std::string& name = fields[std::size_t(number)].name;
+  if (!name.empty()) return name;
+  return std::ranges::count(fields, true, &FieldInfo::channel) > 1 ? fmt::format("channel {}", number) : "volume";
+}
+
 Result<FieldNumbers> FieldsToShow(const FrameRequest& request, const DatasetFields& dataset) {
   const int count = dataset.values();
   std::vector<bool> shows(std::size_t(count), false);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/base/status.h"
@@ -47,6 +48,9 @@ struct ShownFields {
 
 // Whether it has no values: its labels show without being asked for, and its volume is hollow (data/sources/hollow_source.h).
 inline bool HasLabelsAlone(const DatasetFields& dataset) { return dataset.labels() && dataset.fields.back().shown; }
+
+// The name of a field, or "channel 3", by its number; of one channel "volume".
+std::string TitleOf(const ShownFields& shown, int number);
 
 struct FieldNumbers {
   std::vector<int> numbers;  // ascending. The first one is the picture's volume: a channel, even if the request shows none

@@ -20,14 +20,20 @@ struct LabelAt {
   friend bool operator==(const LabelAt&, const LabelAt&) = default;
 };
 
+struct FieldSample {
+  std::string name;                  // as people read it (TitleOf)
+  std::optional<double> value = {};  // data value at the centre of the voxel; none: there is none here
+  friend bool operator==(const FieldSample&, const FieldSample&) = default;
+};
+
 struct VolumeSample {
   Vec3 at;              // the point, of the world
   bool inside = false;  // the volume fills half a voxel beyond the centres of its outermost voxels; else nothing of what follows
   Index3 voxel = {};    // that holds the point
   std::optional<double> value = {};         // data value of the voxel; none: it is not finite
   std::optional<LabelAt> label = {};        // if the dataset has labels
-  std::optional<double> overlay = {};       // data value of its overlay; none: there is none here
-  std::optional<double> interpolated = {};  // data value at the point itself, trilinear (ProbeVolume::Interpolated); none: it is not finite
+  std::vector<FieldSample> fields = {};     // of all fields of values that were asked for, by their numbers
+  std::optional<double> interpolated = {};  // data value at the point itself (ProbeVolume::Interpolated); none: not finite, or a label
   std::int64_t rest = 0;                    // of `value`, as of ExactValue
   friend bool operator==(const VolumeSample&, const VolumeSample&) = default;
 };

@@ -93,7 +93,11 @@ inline FrameRequest PictureOf(const Question& question) {
           return query.frame;
         } else {
           FrameRequest picture{.dataset = query.dataset};
-          if (!query.field.empty()) picture.channels = {query.field};
+          if constexpr (requires { query.channels; }) {
+            picture.channels = query.channels;
+          } else if (!query.field.empty()) {
+            picture.channels = {query.field};
+          }
           picture.time = query.time;
           return picture;
         }

@@ -425,7 +425,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     open.entry = name;
     open.check = 0;
     open.fields = {};
-    open.overlay = open.labels = {};
+    open.labels = {};
     open.others = {};
     open.summary = nullptr;
   }

@@ -168,15 +168,10 @@ struct AnswerQuestion {
   std::shared_ptr<const VolumeSummary> summary;
   // the levels, for a ViewQuery about such a dataset; its summary is the overview's
   std::shared_ptr<const VolumeLevels> levels = nullptr;
-  ShownFields fields = {};  // the field that it is about
+  ShownFields fields = {};  // the fields that it is about; `others` with one level each
   // A SummaryQuery about the time that it names, and not about all: range and histogram are those of the voxels, which `summary` is not of.
   bool at_time = false;
-  // Fields that it is about, too; `summary` is null of one that is not there, or that the question does not need.
-  struct Other {
-    DatasetId dataset = 0;  // 0: a SummaryQuery, which needs no voxels
-    std::shared_ptr<const VolumeSummary> summary = nullptr;
-  };
-  Other overlay = {}, labels = {};
+  CoarserVolume labels = {};  // `summary` is null: there are none, or it does not need them; `dataset` is 0 of a SummaryQuery
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

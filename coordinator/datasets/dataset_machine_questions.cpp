@@ -50,24 +50,36 @@ Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLe
   }
   open.entry = LevelName(open.entry, level);
   open.check = Seek(open.entry);
+  for (Use::Entry& other : open.others) {
+    if (datasets.Find(other.name)->levels == nullptr) continue;
+    other.name = LevelName(other.name, level);  // a channel, which has the levels of the volume
+    other.check = Seek(other.name);
+  }
   return Status::Ok();
 }
 
-// Of a dataset that is open: the question waits for the first field that it is about, and for others; or for what must be known before
-// (SourceOf). Errors of FieldsToShow, TimeToShow and SourceOf.
+// Of a dataset that is open: the question waits for the fields that it is about, or for what must be known before (SourceOf). Errors of
+// FieldsToShow, TimeToShow and SourceOf.
 Status DatasetMachine::State::FindField(OpenQuestion& open) {
   const FrameRequest picture = PictureOf(open.question);
   Result<ShownAtTime> shown = WhatShows(picture, datasets.Find(picture.dataset)->fields);
   if (!shown.ok()) return shown.status();
   ShownFields found = std::move(shown->fields);
-  if (FrameOf(open.question) == nullptr && !found.volume_shows) found.volume = shown->numbers[1];
   const DatasetFields& fields = *found.dataset;
+  if (FrameOf(open.question) == nullptr) {
+    if (!std::exchange(found.volume_shows, true)) found.volume = shown->numbers[1];
+    const bool names_none = picture.channels.empty();
+    const auto is_no_other = [&](const FieldVolume& other) { return names_none || other.labels || other.number == found.volume; };
+    std::erase_if(found.others, is_no_other);
+    // Points that no field is named for tell of the first one and of the overlay.
+    const int last = fields.values() - 1;
+    const bool has_overlay = !fields.fields[std::size_t(last)].channel && last != found.volume;
+    if (names_none && has_overlay && std::holds_alternative<SampleQuery>(open.question)) found.others.push_back({.number = last});
+  }
   const bool of_points = std::holds_alternative<SampleQuery>(open.question) || std::holds_alternative<PickQuery>(open.question);
-  const bool of_view = std::holds_alternative<ViewQuery>(open.question);
   const auto* const statistics = std::get_if<StatisticsQuery>(&open.question);
   const bool of_labels = of_points || (statistics != nullptr && statistics->labels) || LabelsOf(picture) != nullptr ||
                          HasLabelsAlone(fields) || std::holds_alternative<SummaryQuery>(open.question);
-  if (!of_view) found.others.clear();  // the question is about the first one
   Status failed;
   // False: something else must be ready first, or `failed`.
   const auto find = [&](int field, Use::Entry& entry) {
@@ -80,19 +92,17 @@ Status DatasetMachine::State::FindField(OpenQuestion& open) {
     if (!source->ready) std::tie(open.entry, open.check) = std::tie(entry.name, entry.check);
     return source->ready;
   };
-  Use::Entry volume, overlay, labels;
+  Use::Entry volume, labels;
   if (!find(found.volume, volume)) return failed;
-  const int last = fields.values() - 1;
-  if (of_points && !fields.fields[std::size_t(last)].channel && last != found.volume && !find(last, overlay)) return failed;
   if (of_labels && fields.labels() && !find(*fields.labels(), labels)) return failed;
   std::vector<Use::Entry> others(found.others.size());
   for (std::size_t i = 0; i < others.size(); ++i) {
     if (!find(found.others[i].number, others[i])) return failed;
   }
+  for (FieldVolume& other : found.others) other.of_volume = {0};
   open.fields = std::move(found);
   open.entry = volume.name;
   open.check = volume.check;
-  open.overlay = std::move(overlay);
   open.labels = std::move(labels);
   open.others = std::move(others);
   return Status::Ok();
@@ -117,15 +127,28 @@ void DatasetMachine::State::AskExecutor() {
       }
       if (!can_be_asked(open)) continue;
     }
-    const bool of_summary = std::holds_alternative<SummaryQuery>(open.question);
-    for (Use::Entry* const other : {&open.overlay, &open.labels}) {
-      if (of_summary || other->name.empty() || datasets.Find(other->name)->levels == nullptr) continue;
-      other->name = LevelName(other->name, 0);
-      other->check = Seek(other->name);
+    const bool of_summary = std::holds_alternative<SummaryQuery>(open.question),
+               about_view = std::holds_alternative<ViewQuery>(open.question);
+    const auto seek_finest = [&](Use::Entry& other) {
+      if (about_view || other.name.empty() || datasets.Find(other.name)->levels == nullptr) return;
+      other.name = LevelName(other.name, 0);
+      other.check = Seek(other.name);
+    };
+    if (!of_summary) seek_finest(open.labels);
+    for (std::size_t i = 0; i < open.others.size(); ++i) {
+      if (!open.fields.dataset->fields[std::size_t(open.fields.others[i].number)].channel) seek_finest(open.others[i]);
     }
     if (!can_be_asked(open)) continue;
+    // What is known of a field, with the voxels of those that have one level by now.
+    const auto known = [&](const Use::Entry& of) -> CoarserVolume {
+      const DatasetTable::Entry& found = *datasets.Find(of.name);
+      return {found.levels != nullptr ? 0 : found.id, found.overview()};
+    };
+    const auto note_others = [&] {
+      for (std::size_t i = 0; i < open.others.size(); ++i) open.fields.others[i].levels = {known(open.others[i])};
+    };
+    note_others();
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
-    const bool about_view = std::holds_alternative<ViewQuery>(open.question);
     std::shared_ptr<const VolumeSummary> summary;
     const auto* const about = std::get_if<SummaryQuery>(&open.question);
     const bool at_time = about != nullptr && !about->time.empty() && open.fields.dataset->times.count > 1;
@@ -152,25 +175,10 @@ void DatasetMachine::State::AskExecutor() {
       summary = std::make_shared<const VolumeSummary>(std::move(of_all));
     }
     open.asked = true;
+    note_others();
     AnswerQuestion ask{id,          open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
                        open.fields, at_time};
-    const auto other = [&](const Use::Entry& of) -> AnswerQuestion::Other {
-      if (of.name.empty()) return {};
-      const DatasetTable::Entry& found = *datasets.Find(of.name);
-      return {found.levels != nullptr ? 0 : found.id, found.overview()};
-    };
-    ask.overlay = other(open.overlay);
-    ask.labels = other(open.labels);
-    for (std::size_t i = 0; i < open.others.size(); ++i) {
-      ask.fields.others[i].levels = {{1, datasets.Find(open.others[i].name)->overview()}};
-      ask.fields.others[i].of_volume = {0};
-    }
-    const FrameRequest* const frame = FrameOf(open.question);
-    if (frame != nullptr && (LabelsOf(*frame) != nullptr || HasLabelsAlone(*open.fields.dataset)) && !about_view) {
-      const FieldVolume labels = {
-          .number = *open.fields.dataset->labels(), .labels = true, .levels = {{ask.labels.dataset, ask.labels.summary}}, .of_volume = {0}};
-      ask.fields.others.push_back(labels);
-    }
+    if (!open.labels.name.empty()) ask.labels = known(open.labels);
     actions.emplace_back(std::move(ask));
   }
   for (const auto& [id, why] : wrong) {

@@ -63,18 +63,15 @@ struct DatasetMachine::State {
     std::string entry;                                       // the entry of the table that it waits for
     CheckId check = 0;                                       // the check of its files, which must be over first; 0: none
     bool asked = false;                                      // whether the executor was asked
-    ShownFields fields = {};                                 // once it waits for the field that it is about: that field alone
+    ShownFields fields = {};                                 // once it waits for the fields that it is about: these alone
     std::shared_ptr<const VolumeSummary> summary = nullptr;  // once it waits for voxels of a level, but is about all of them
-    // Other entries that it waits for; without a name: none.
-    Use::Entry overlay = {}, labels = {};
-    std::vector<Use::Entry> others = {};  // of a ViewQuery: fields.others
+    Use::Entry labels = {};                                  // without a name: it needs none
+    std::vector<Use::Entry> others = {};                     // of fields.others
 
     // All of them.
     std::vector<Use::Entry> entries() const {
       std::vector<Use::Entry> all = {{entry, check}};
-      for (const Use::Entry& other : {overlay, labels}) {
-        if (!other.name.empty()) all.push_back(other);
-      }
+      if (!labels.name.empty()) all.push_back(labels);
       all.insert(all.end(), others.begin(), others.end());
       return all;
     }

@@ -54,7 +54,8 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
   const ExactValue value = volume.exact ? volume.exact(voxel) : ExactValue{mapping.FromStored(volume.StoredAt(voxel))};
   sample.value = finite(value.value);
   sample.rest = value.rest;
-  sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
+  if (!IsOfLabels(summary.description.type))
+    sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
   if (volume.label) sample.label = LabelAt{volume.label(voxel), {}};
   return sample;
 }

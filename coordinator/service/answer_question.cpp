@@ -115,8 +115,10 @@ Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
 }
 
 Status NoLabels(const StatisticsQuery& query) {
-  return Status::InvalidArgument(
-      fmt::format("dataset \"{}\" has no labels to measure: --data NAME=FILE,labels=FILE gives it some", query.dataset));
+  return Status::InvalidArgument(fmt::format(
+      "dataset \"{}\" has no labels to measure: --labels FILE gives a file some, and --data NAME=FILE,labels=FILE a dataset of a "
+      "service",
+      query.dataset));
 }
 
 Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
@@ -314,20 +316,34 @@ Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& a
   return AnswerView(query, asked.summary->description.geometry, asked.summary, asked.fields);
 }
 
-// The values of the overlay at the voxels that samples tell of.
-Status AddOverlay(const AnswerQuestion& asked, const VoxelServer::Samples& overlay, std::span<VolumeSample> samples) {
-  const VolumeGeometry& grid = asked.summary->description.geometry;
-  const VolumeDescription& of = asked.overlay.summary->description;
-  std::optional<ReadVoxels> read;
-  if (overlay.in_parts.source != nullptr) read.emplace(overlay.in_parts);
-  const ProbeVolume volume{.voxels = read ? read->voxels() : ProbedVoxels(overlay.view())};
+// What the fields hold at the voxels that samples tell of.
+Status AddFields(const AnswerQuestion& asked, const std::vector<VoxelServer::Samples>& others, std::span<VolumeSample> samples) {
+  const ShownFields& fields = asked.fields;
+  const VolumeDescription& volume = asked.summary->description;
+  const bool volume_shows = fields.volume_shows && !IsOfLabels(volume.type);
   for (VolumeSample& sample : samples) {
-    const Vec3 p = DataPoint(of.geometry, grid.ToWorld(ToVec3(sample.voxel)));
-    if (!sample.inside || !of.geometry.bounds().Contains(VoxelAt(p))) continue;
-    const double value = of.mapping.FromStored(volume.Interpolated(p));
-    if (std::isfinite(value)) sample.overlay = value;
+    if (sample.inside && volume_shows) sample.fields.push_back({TitleOf(fields, fields.volume), sample.value});
   }
-  return read ? read->status() : Status::Ok();
+  for (std::size_t i = 0; i < fields.others.size(); ++i) {
+    const FieldVolume& field = fields.others[i];
+    if (field.labels || samples.empty()) continue;
+    if (!others[i].any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+    const VolumeDescription& of = field.levels.front().summary->description;
+    std::optional<ReadVoxels> read;
+    if (others[i].in_parts.source != nullptr) read.emplace(others[i].in_parts);
+    const ProbeVolume voxels{.voxels = read ? read->voxels() : ProbedVoxels(others[i].view())};
+    for (VolumeSample& sample : samples) {
+      if (!sample.inside) continue;
+      FieldSample& found = sample.fields.emplace_back(FieldSample{TitleOf(fields, field.number)});
+      const Vec3 voxel = ToVec3(sample.voxel);
+      const Vec3 p = of.geometry == volume.geometry ? voxel : DataPoint(of.geometry, volume.geometry.ToWorld(voxel));
+      if (!of.geometry.bounds().Contains(VoxelAt(p))) continue;
+      const double value = of.mapping.FromStored(voxels.Interpolated(p));
+      if (std::isfinite(value)) found.value = value;
+    }
+    if (read && !read->status().ok()) return read->status();
+  }
+  return Status::Ok();
 }
 
 // The labels of the volume's voxels. `status`: the first failure of a read. It must outlive this, and so must `of`.
@@ -357,6 +373,13 @@ Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::S
     return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary, asked.fields);
   }
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary, asked);
+  const bool of_values =
+      std::holds_alternative<StatisticsQuery>(asked.question) || std::holds_alternative<JointHistogramQuery>(asked.question);
+  if (of_values && IsOfLabels(asked.summary->description.type)) {
+    return Status::InvalidArgument(
+        fmt::format("dataset \"{}\" has labels and no values to measure: measure a volume with these labels, which may be the same file",
+                    DatasetOf(asked.question)));
+  }
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (asked.at_time) return AnswerAtTime(std::get<SummaryQuery>(asked.question), asked, samples);
   if (samples.in_parts.source != nullptr) {
@@ -385,8 +408,8 @@ void NameLabels(const AnswerQuestion& asked, std::span<VolumeSample> samples) {
 
 }  // namespace
 
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay,
-                               const VoxelServer::Samples& labels) {
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples,
+                               const std::vector<VoxelServer::Samples>& others, const VoxelServer::Samples& labels) {
   Status read_labels = Status::Ok();
   Result<QuestionReply> reply = AnswerOf(asked, samples, labels.any() ? LabelsBesideVolume(asked, labels, read_labels) : ReadLabels());
   if (!read_labels.ok()) return read_labels;
@@ -395,7 +418,7 @@ Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::S
   if (auto* const samples_of = std::get_if<SampleReply>(&*reply)) points = samples_of->samples;
   if (auto* const pick = std::get_if<PickReply>(&*reply); pick != nullptr && pick->sample) points = {&*pick->sample, 1};
   if (labels.any()) NameLabels(asked, points);
-  const Status added = overlay.any() ? AddOverlay(asked, overlay, points) : Status::Ok();
+  const Status added = AddFields(asked, others, points);
   return added.ok() ? std::move(reply) : added;
 }
 

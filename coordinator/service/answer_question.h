@@ -1,6 +1,8 @@
 // The answers to questions about what a dataset holds. They may take milliseconds, and longer if voxels are read for them.
 #pragma once
 
+#include <vector>
+
 #include "coordinator/datasets/dataset_machine.h"
 #include "coordinator/service/voxel_server.h"
 
@@ -8,8 +10,8 @@ namespace slabstream {
 
 // Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
 // Any thread.
-// `overlay`, `labels`: of the fields of these names in `asked`.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const VoxelServer::Samples& overlay = {},
-                               const VoxelServer::Samples& labels = {});
+// `others`: of the other fields of `asked`, if it is about points. `labels`: of its labels.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples,
+                               const std::vector<VoxelServer::Samples>& others = {}, const VoxelServer::Samples& labels = {});
 
 }  // namespace slabstream

@@ -175,6 +175,7 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
   auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
     described->levels.push_back(levels[level].description);
+    if (levels.front().refined != nullptr) described->refined.push_back(levels[level].refined);
     SourceAtLevel at{.source = opened.source,
                      .surveyed = opened.survey.summary,
                      .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
@@ -285,10 +286,13 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   const std::optional<StoredAt>& stored = action.summary->stored;
+  std::vector<VoxelServer::Samples> others;
+  for (const FieldVolume& field : action.fields.others) others.push_back(voxels_.Find(field.levels.front().dataset));
   return PostResult(
       answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset), overlay = voxels_.Find(action.overlay.dataset),
-       labels = voxels_.Find(action.labels.dataset)] { return AnswerTo(action, samples, overlay, labels); },
+      [action, samples = voxels_.Find(action.dataset), others = std::move(others), labels = voxels_.Find(action.labels.dataset)] {
+        return AnswerTo(action, samples, others, labels);
+      },
       EndOf<QuestionAnswered>(action.id));
 }
 

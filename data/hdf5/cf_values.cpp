@@ -9,14 +9,6 @@
 namespace slabstream {
 namespace {
 
-// Whole numbers of the same bytes with or without a sign, as `_Unsigned` says.
-std::optional<SampleType> Meant(SampleType type, bool is_unsigned) {
-  const std::string name(ToString(type));
-  if (!WholeNumbers(type)) return std::nullopt;
-  const bool is_now = name.starts_with('u');
-  return is_now == is_unsigned ? type : SampleTypeNamed(is_unsigned ? "u" + name : name.substr(1));
-}
-
 bool SaysTrue(std::string text) {
   std::ranges::transform(text, text.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
   return text == "true";
@@ -32,14 +24,21 @@ std::optional<Limits> WholeNumbers(SampleType type) {
   });
 }
 
-void DescribeValues(Hdf5File& file, const Hdf5Dataset& dataset, ImageDescription& image) {
-  const std::string& path = dataset.path();
+std::optional<SampleType> WithSign(SampleType type, bool has_sign) {
+  const std::string name(ToString(type));
+  if (!WholeNumbers(type)) return std::nullopt;
+  const bool has_one = !name.starts_with('u');
+  return has_one == has_sign ? type : SampleTypeNamed(has_sign ? name.substr(1) : "u" + name);
+}
+
+void DescribeValues(AttributedFile& file, const DatasetFacts& dataset, ImageDescription& image) {
+  const std::string& path = dataset.path;
   ElementMeaning& meaning = image.meaning;
-  std::optional<Limits> all = WholeNumbers(dataset.type());
+  std::optional<Limits> all = WholeNumbers(dataset.type);
   if (const auto text = file.Text(path, "_Unsigned"); text && all) {
-    image.type = Meant(dataset.type(), SaysTrue(*text));
+    image.type = WithSign(dataset.type, !SaysTrue(*text));
     all = WholeNumbers(*image.type);
-    if (image.type != dataset.type()) image.notes.push_back(fmt::format("samples are {}, as _Unsigned says", ToString(*image.type)));
+    if (image.type != dataset.type) image.notes.push_back(fmt::format("samples are {}, as _Unsigned says", ToString(*image.type)));
   }
   // A number of the dataset's type, as the type that is meant.
   const auto element = [&](double number) {

@@ -17,7 +17,7 @@ namespace {
 std::string LastPart(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
 // The axis that a coordinate variable of CF is for: by its attributes, else by its name.
-std::string NameOfScale(Hdf5File& file, const std::string& scale) {
+std::string NameOfScale(AttributedFile& file, const std::string& scale) {
   static constexpr std::pair<std::string_view, std::string_view> kStandardNames[] = {
       {"longitude", "x"}, {"projection_x_coordinate", "x"}, {"grid_longitude", "x"},
       {"latitude", "y"},  {"projection_y_coordinate", "y"}, {"grid_latitude", "y"},
@@ -34,7 +34,7 @@ std::string NameOfScale(Hdf5File& file, const std::string& scale) {
 }
 
 // vigra and ilastik: a list of axes in JSON, in the order of the dataset. A resolution of 0 is none.
-Result<bool> TakeAxistags(Hdf5File& file, const std::string& path, ImageDescription& image) {
+Result<bool> TakeAxistags(AttributedFile& file, const std::string& path, ImageDescription& image) {
   const std::optional<std::string> text = file.Text(path, "axistags");
   if (!text) return false;
   const std::string named = file.Named(path) + ": axistags";
@@ -54,7 +54,7 @@ Result<bool> TakeAxistags(Hdf5File& file, const std::string& path, ImageDescript
 }
 
 // Numbers of an attribute, one for each axis, or for each one that is neither time nor channel, or for the last three of these.
-bool TakeNumbers(Hdf5File& file, const std::string& path, const char* attribute, ImageDescription& image, double ImageAxis::*member) {
+bool TakeNumbers(AttributedFile& file, const std::string& path, const char* attribute, ImageDescription& image, double ImageAxis::*member) {
   std::vector<double> numbers = file.Numbers(path, attribute).value_or(std::vector<double>{});
   std::vector<ImageAxis*> axes;
   for (ImageAxis& axis : image.axes) {
@@ -70,7 +70,7 @@ bool TakeNumbers(Hdf5File& file, const std::string& path, const char* attribute,
 }
 
 // Fiji and PlantSeg, funlib, CREMI: numbers in the order of the axes.
-void TakeSizes(Hdf5File& file, const std::string& path, ImageDescription& image) {
+void TakeSizes(AttributedFile& file, const std::string& path, ImageDescription& image) {
   static constexpr std::pair<const char*, std::optional<LengthUnit>> kAttributes[] = {
       {"element_size_um", LengthUnit::kMicrometre}, {"voxel_size", std::nullopt}, {"resolution", std::nullopt}};
   for (const auto& [attribute, stated] : kAttributes) {
@@ -87,7 +87,7 @@ void TakeSizes(Hdf5File& file, const std::string& path, ImageDescription& image)
 }
 
 // Where coordinates are even, they place the axis.
-void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t size, ImageAxis& axis, ImageDescription& image) {
+void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64_t size, ImageAxis& axis, ImageDescription& image) {
   const AxisKind kind = AxisNamed(axis.name);
   if (scale.empty() || kind == AxisKind::kChannel) return;
   // netCDF writes a scale for each dimension, also where no variable has its coordinates.
@@ -98,12 +98,15 @@ void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t siz
   const std::string named = Printable(LastPart(scale) + (unit.empty() ? "" : " (" + unit + ")"));
   const std::optional<EvenSteps> even = EvenStepsOf(*values);
   if (kind == AxisKind::kTime) {
-    if (even) axis.step = even->step;
+    if (!even) return;
+    axis.step = even->step;
     axis.time_unit = unit.substr(0, unit.find(' '));  // "hours since 2000-01-01"
     return;
   }
   if (!even && size > 1) {
-    LogWarning(fmt::format("{}: coordinates {} are not evenly spaced; voxels along it are shown at a distance of 1", file.path(), named));
+    image.notes.push_back(
+        fmt::format("coordinates {} are not evenly spaced: {}; voxels along it are shown at a distance of 1", named, WhyUneven(*values)));
+    LogWarning(fmt::format("{}: {}", file.path(), image.notes.back()));
     return;
   }
   if (!even && !std::isfinite(values->front())) return;
@@ -118,9 +121,9 @@ void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t siz
 
 }  // namespace
 
-Result<ImageDescription> DescribeByAttributes(Hdf5File& file, const Hdf5Dataset& dataset, std::vector<std::string> scales) {
-  const std::string& path = dataset.path();
-  ImageDescription image{.axes = std::vector<ImageAxis>(dataset.size().size()), .labels = dataset.enumeration()};
+Result<ImageDescription> DescribeByAttributes(AttributedFile& file, const DatasetFacts& dataset, std::vector<std::string> scales) {
+  const std::string& path = dataset.path;
+  ImageDescription image{.format = file.format(), .axes = std::vector<ImageAxis>(dataset.size.size()), .labels = dataset.enumeration};
   const bool of_group = !scales.empty();
   if (!of_group) scales = file.DimensionScales(path);
   scales.resize(image.axes.size());
@@ -136,12 +139,11 @@ Result<ImageDescription> DescribeByAttributes(Hdf5File& file, const Hdf5Dataset&
     image.axes_from = "labels of dimensions";
   }
   TakeSizes(file, path, image);
-  for (std::size_t i = 0; i < image.axes.size(); ++i) TakeCoordinates(file, scales[i], dataset.size()[i], image.axes[i], image);
+  for (std::size_t i = 0; i < image.axes.size(); ++i) TakeCoordinates(file, scales[i], dataset.size[i], image.axes[i], image);
   if (const auto others = file.Text(path, "coordinates"); others && image.world == World::kVoxels) {
     image.notes.push_back(fmt::format("coordinates '{}' have more than one axis and are not used", Printable(*others)));
   }
   DescribeValues(file, dataset, image);
-  if (file.Text("/", "_NCProperties")) image.format = "netCDF-4";
   return image;
 }
 

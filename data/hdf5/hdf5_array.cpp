@@ -6,17 +6,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/check.h"
-#include "common/base/printable.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
-#include "data/sources/decode_chunk.h"
-#include "data/stores/store.h"
+#include "data/sources/file_array.h"
 
 namespace slabstream {
 namespace {
@@ -130,122 +127,25 @@ Result<CodecChain> CodecsOf(const std::vector<Hdf5Filter>& filters, std::size_t 
   return chain;
 }
 
-class Hdf5Array : public ChunkedArray, public std::enable_shared_from_this<Hdf5Array> {
- public:
-  Hdf5Array(std::shared_ptr<Hdf5Dataset> dataset, SourceContext context, ArrayShape shape, CodecChain codecs)
-      : dataset_(std::move(dataset)),
-        context_(std::move(context)),
-        shape_(std::move(shape)),
-        codecs_(std::move(codecs)),
-        store_(FileStore(dataset_->file())) {}
-
-  const ArrayShape& shape() const override { return shape_; }
-
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    // The library may read parts of its index, so its lock may take a while.
-    context_->PostDecode([self = shared_from_this(), at = std::vector(index.begin(), index.end()), done = std::move(done)] {
-      try {
-        self->Find(at, done);
-      } catch (const std::exception& error) {  // before anything else could call it
-        done(Status::ResourceExhausted(self->Named() + " cannot be read: " + error.what()));
-      }
-    });
+// The codecs of one chunk, of those of all: the byte order, if it is the other one, and a codec for each filter. Filters may have been left
+// out.
+CodecChain Applied(const Hdf5Dataset& dataset, const CodecChain& codecs, std::span<const std::uint64_t> index, std::uint32_t left_out) {
+  bool cut = false;
+  for (std::size_t axis = 0; axis < index.size(); ++axis) cut = cut || (index[axis] + 1) * dataset.chunk()[axis] > dataset.size()[axis];
+  if (cut && !dataset.filters_cut_chunks()) left_out = ~std::uint32_t{0};
+  const std::size_t before = codecs.size() - dataset.filters().size();
+  CodecChain applied(codecs.begin(), codecs.begin() + std::ptrdiff_t(before));
+  for (std::size_t i = before; i < codecs.size(); ++i) {
+    if ((left_out >> (i - before) & 1) == 0) applied.push_back(codecs[i]);
   }
-
- private:
-  // Bytes of the file, and how they are packed.
-  void Read(const Hdf5StoredChunk& stored, CodecChain codecs, std::uint64_t bytes, const std::vector<std::uint64_t>& index,
-            ChunkDone done) {
-    std::string what = fmt::format("{}: chunk {} of dataset '{}'", dataset_->file(), fmt::join(index, "."), Printable(dataset_->path()));
-    const auto decode = [self = shared_from_this(), codecs = std::move(codecs), bytes, wanted = stored.bytes, what = std::move(what),
-                         done](Result<Bytes> answer) {
-      if (answer.status().code() == StatusCode::kNotFound)
-        answer = Status::Unavailable(what + ": the file is gone");  // no chunk is missing
-      if (answer.ok() && answer->size() != wanted) answer = Status::DataLoss(what + ": the file ends before it does");
-      DecodeOn(self->context_, codecs, std::move(answer), bytes, what, done);
-    };
-    store_->Read("file", {stored.begin, stored.bytes}, stored.bytes, decode);
-  }
-
-  void Find(const std::vector<std::uint64_t>& index, const ChunkDone& done) {
-    if (dataset_->layout() == Hdf5Dataset::Layout::kContiguous) {
-      if (!dataset_->begin()) return done(std::optional<StoredChunk>());
-      const Hdf5StoredChunk slice = Slice(index);
-      return Read(slice, codecs_, slice.bytes, index, done);
-    }
-    const Result<std::optional<Hdf5StoredChunk>> chunk = dataset_->Find(index);
-    if (!chunk.ok()) return done(chunk.status());
-    if (!*chunk) return done(std::optional<StoredChunk>());
-    // Filters make what does not shrink a little longer.
-    const std::uint64_t bytes = shape_.chunk_bytes();
-    if ((*chunk)->bytes > 2 * bytes + 65536) {
-      return done(Status::DataLoss(fmt::format("{} has a chunk of {} stored bytes, which has {}", Named(), (*chunk)->bytes, bytes)));
-    }
-    Read(**chunk, Applied(index, (*chunk)->left_out), bytes, index, done);
-  }
-
-  // Of a dataset in one piece.
-  Hdf5StoredChunk Slice(const std::vector<std::uint64_t>& index) const {
-    std::uint64_t first = 0, count = 1;
-    for (std::size_t axis = 0; axis < index.size(); ++axis) {
-      const std::uint64_t begin = index[axis] * shape_.chunk[axis], all = dataset_->size()[axis];
-      first = first * all + begin;
-      count *= std::min(shape_.chunk[axis], all - begin);
-    }
-    const std::uint64_t bytes = BytesPerSample(shape_.type);
-    return {*dataset_->begin() + first * bytes, count * bytes, 0};
-  }
-
-  // The codecs of one chunk: filters may have been left out.
-  CodecChain Applied(const std::vector<std::uint64_t>& index, std::uint32_t left_out) const {
-    bool cut = false;
-    for (std::size_t axis = 0; axis < index.size(); ++axis) cut = cut || (index[axis] + 1) * shape_.chunk[axis] > dataset_->size()[axis];
-    if (cut && !dataset_->filters_cut_chunks()) left_out = ~std::uint32_t{0};
-    const std::size_t before = codecs_.size() - dataset_->filters().size();  // the byte order
-    CodecChain applied(codecs_.begin(), codecs_.begin() + std::ptrdiff_t(before));
-    for (std::size_t i = before; i < codecs_.size(); ++i) {
-      if ((left_out >> (i - before) & 1) == 0) applied.push_back(codecs_[i]);
-    }
-    return applied;
-  }
-
-  std::string Named() const { return fmt::format("{}: dataset '{}'", dataset_->file(), Printable(dataset_->path())); }
-
-  const std::shared_ptr<Hdf5Dataset> dataset_;
-  const SourceContext context_;
-  const ArrayShape shape_;
-  const CodecChain codecs_;  // the byte order, if it is the other one, and a codec for each filter
-  const std::shared_ptr<Store> store_;
-};
-
-// All of a compact dataset.
-class SmallArray : public ChunkedArray {
- public:
-  SmallArray(ArrayShape shape, Bytes samples) : shape_(std::move(shape)), samples_(std::move(samples)) {}
-  const ArrayShape& shape() const override { return shape_; }
-  void ReadChunk(std::span<const std::uint64_t>, ChunkDone done) override { done(std::optional(StoredChunk{samples_, samples_.size()})); }
-
- private:
-  const ArrayShape shape_;
-  const Bytes samples_;
-};
-
-// A slice of at most kHdf5SliceBytes that lies in one piece.
-std::vector<std::uint64_t> SliceOf(const std::vector<std::uint64_t>& size, std::uint64_t element_bytes) {
-  std::vector<std::uint64_t> slice(size.size(), 1);
-  std::uint64_t most = kHdf5SliceBytes / element_bytes;  // elements
-  for (std::size_t axis = size.size(); axis-- > 0 && most > 1;) {
-    slice[axis] = std::min(size[axis], most);
-    most = slice[axis] == size[axis] ? most / slice[axis] : 1;
-  }
-  return slice;
+  return applied;
 }
 
 }  // namespace
 
 Result<std::shared_ptr<ChunkedArray>> MakeHdf5Array(std::shared_ptr<Hdf5Dataset> dataset, const SourceContext& context,
                                                     std::optional<SampleType> as, std::vector<std::uint64_t> size) {
-  const std::string named = fmt::format("{}: dataset '{}'", dataset->file(), Printable(dataset->path()));
+  const std::string named = dataset->named();
   const std::size_t element_bytes = BytesPerSample(dataset->type());
   CHECK(!as || BytesPerSample(*as) == element_bytes);
   if (size.empty()) size = dataset->size();
@@ -258,26 +158,43 @@ Result<std::shared_ptr<ChunkedArray>> MakeHdf5Array(std::shared_ptr<Hdf5Dataset>
                                                dataset->size()[axis], axis, size[axis]));
   }
   ArrayShape shape{.size = std::move(size), .type = as.value_or(dataset->type()), .fill = dataset->fill()};
-  switch (dataset->layout()) {
-    case Hdf5Dataset::Layout::kCompact: {
-      Result<Bytes> samples = dataset->ReadCompact();
-      if (!samples.ok()) return samples.status();
-      shape.chunk = dataset->size();
-      return std::shared_ptr<ChunkedArray>(std::make_shared<SmallArray>(std::move(shape), *std::move(samples)));
-    }
-    case Hdf5Dataset::Layout::kContiguous:
-      if (shape.size != dataset->size()) return Status::InvalidArgument(named + " is larger than its image, but has no chunks");
-      shape.chunk = SliceOf(shape.size, element_bytes);
-      shape.cut_at_end = true;
-      break;
-    case Hdf5Dataset::Layout::kChunked: shape.chunk = dataset->chunk(); break;
+  if (dataset->layout() == Hdf5Dataset::Layout::kCompact) {
+    Result<Bytes> samples = dataset->ReadCompact();
+    if (!samples.ok()) return samples.status();
+    shape.chunk = dataset->size();
+    return MakeHeldArray(std::move(shape), *std::move(samples));
   }
+  if (dataset->layout() == Hdf5Dataset::Layout::kContiguous) {
+    if (shape.size != dataset->size()) return Status::InvalidArgument(named + " is larger than its image, but has no chunks");
+    return MakePlainArray(dataset->file(), named, std::move(shape), {.begin = dataset->begin(), .big_endian = dataset->big_endian()},
+                          context);
+  }
+  shape.chunk = dataset->chunk();
   CodecChain codecs;
   if (dataset->big_endian() && element_bytes > 1) codecs.push_back(SwapBytesCodec(element_bytes));
   const Result<CodecChain> filters = CodecsOf(dataset->filters(), element_bytes, named);
   if (!filters.ok()) return filters.status();
   codecs.insert(codecs.end(), filters->begin(), filters->end());
-  return std::shared_ptr<ChunkedArray>(std::make_shared<Hdf5Array>(std::move(dataset), context, std::move(shape), std::move(codecs)));
+  const std::string path = dataset->file();
+  const auto find = [dataset = std::move(dataset), codecs, named,
+                     bytes = shape.chunk_bytes()](std::span<const std::uint64_t> index) -> Result<std::optional<FilePiece>> {
+    const Result<std::optional<Hdf5StoredChunk>> chunk = dataset->Find(index);
+    if (!chunk.ok()) return chunk.status();
+    if (!*chunk) return std::optional<FilePiece>();
+    // Filters make what does not shrink a little longer.
+    if ((*chunk)->bytes > 2 * bytes + 65536) {
+      return Status::DataLoss(fmt::format("{} has a chunk of {} stored bytes, which has {}", named, (*chunk)->bytes, bytes));
+    }
+    return std::optional(FilePiece{(*chunk)->begin, (*chunk)->bytes, Applied(*dataset, codecs, index, (*chunk)->left_out), bytes});
+  };
+  return MakeFileArray(path, named, std::move(shape), find, context);
+}
+
+Result<std::shared_ptr<ChunkedArray>> Hdf5File::Array(const std::string& dataset, const SourceContext& context,
+                                                      std::optional<SampleType> as) {
+  Result<std::shared_ptr<Hdf5Dataset>> opened = Dataset(dataset);
+  if (!opened.ok()) return opened.status();
+  return MakeHdf5Array(*std::move(opened), context, as);
 }
 
 }  // namespace slabstream

@@ -11,9 +11,6 @@
 
 namespace slabstream {
 
-// Chunks of datasets that are stored in one piece are slices of at most this, or one row.
-inline constexpr std::uint64_t kHdf5SliceBytes = std::uint64_t{1} << 20;
-
 // `as`: what its samples are taken for, of as many bytes as their type; nullopt: what the file says. `size`: how much of the dataset is
 // meant, along each axis; empty: all. Reads compact datasets at once. InvalidArgument: one of the filters is not supported, which the
 // message names; the size is that of another number of axes, or above the dataset's. DataLoss.

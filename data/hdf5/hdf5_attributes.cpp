@@ -24,8 +24,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kMostAttributeBytes = 64 << 10;
-
 // So many elements, in an object of that number in a heap at that address of the file.
 struct HeapPlace {
   std::uint32_t elements = 0;
@@ -122,7 +120,9 @@ std::optional<Attribute> OpenAttribute(hid_t file, const std::string& object, co
   if (!type.ok() || !space.ok()) return std::nullopt;
   const hssize_t count = H5Sget_simple_extent_npoints(space.id());
   const std::size_t bytes = H5Tget_size(type.id());
-  if (count < 1 || bytes < 1 || bytes > kMostAttributeBytes || std::size_t(count) > kMostAttributeBytes / bytes) return std::nullopt;
+  if (count < 1 || bytes < 1 || bytes > AttributedFile::kMostAttributeBytes ||
+      std::size_t(count) > AttributedFile::kMostAttributeBytes / bytes)
+    return std::nullopt;
   const H5T_class_t kind = H5Tget_class(type.id());
   return Attribute{std::move(id), std::move(type), std::size_t(count), bytes, kind};
 }
@@ -139,7 +139,7 @@ std::optional<std::vector<std::string>> ReadTexts(hid_t file, const Attribute& a
   if (H5Tis_variable_str(attribute.type.id()) > 0) {
     const std::optional<std::vector<HeapPlace>> places = HeapPlaces(attribute.id.id(), attribute.count);
     if (!places) return std::nullopt;
-    std::size_t left = kMostAttributeBytes;
+    std::size_t left = AttributedFile::kMostAttributeBytes;
     for (const HeapPlace& place : *places) {
       std::optional<std::string> text = ReadHeap(file, place, 1, left);
       if (!text) return std::nullopt;

@@ -95,9 +95,9 @@ Status Hdf5Dataset::DescribeType(hid_t stored) {
                     kind == H5T_COMPOUND ? NamesOfMembers(type.id()) : NameOf(kind), 8 * bytes,
                     used == 8 * bytes ? "" : fmt::format(", of which {} are used", used)));
   }
-  type_ = *found;
+  facts_.type = *found;
   big_endian_ = H5Tget_order(type.id()) == H5T_ORDER_BE;
-  enumeration_ = enumerated && !truth;
+  facts_.enumeration = enumerated && !truth;
   return Status::Ok();
 }
 
@@ -116,13 +116,13 @@ Status Hdf5Dataset::DescribeLayout(hid_t creation) {
   }
   layout_ = Layout::kChunked;
   std::array<hsize_t, H5S_MAX_RANK> chunk{};
-  if (H5Pget_chunk(creation, int(chunk.size()), chunk.data()) != int(size_.size()))
+  if (H5Pget_chunk(creation, int(chunk.size()), chunk.data()) != int(facts_.size.size()))
     return Refused("has chunks with other axes than it has");
-  chunk_.assign(chunk.begin(), chunk.begin() + std::ptrdiff_t(size_.size()));
-  std::uint64_t bytes = BytesPerSample(type_);
+  chunk_.assign(chunk.begin(), chunk.begin() + std::ptrdiff_t(facts_.size.size()));
+  std::uint64_t bytes = BytesPerSample(facts_.type);
   for (const std::uint64_t along : chunk_) {
     if (along < 1 || along > kMostChunkBytes / bytes) {
-      return Status::ResourceExhausted(file_->Named(path_) + fmt::format(" has chunks of more than {} bytes", kMostChunkBytes));
+      return Status::ResourceExhausted(named() + fmt::format(" has chunks of more than {} bytes", kMostChunkBytes));
     }
     bytes *= along;
   }
@@ -150,28 +150,26 @@ Status Hdf5Dataset::Describe() {
 
   const Hdf5Id space(H5Dget_space(id_), H5Sclose);
   std::array<hsize_t, H5S_MAX_RANK> size{};
-  const int axes = space.ok() ? H5Sget_simple_extent_dims(space.id(), size.data(), nullptr) : -1;
-  if (axes < 1) return Refused("has no axes: it is one value, or none");
-  if (axes > int(kMaxArrayAxes)) return Refused(fmt::format("has {} axes, must have at most {}", axes, kMaxArrayAxes));
-  size_.assign(size.begin(), size.begin() + axes);
-  if (std::ranges::find(size_, 0U) != size_.end()) return Refused(fmt::format("is empty: it is of {}", fmt::join(size_, " x ")));
+  const int axes = space.ok() ? H5Sget_simple_extent_dims(space.id(), size.data(), nullptr) : 0;
+  facts_.size.assign(size.begin(), size.begin() + std::max(axes, 0));
+  if (Status status = file_->CheckSize(facts_.path, facts_.size); !status.ok()) return status;
 
   const Hdf5Id type(H5Dget_type(id_), H5Tclose);
   if (!type.ok()) return Refused("has no type: " + Hdf5Complaint());
   if (Status status = DescribeType(type.id()); !status.ok()) return status;
   if (Status status = DescribeLayout(creation.id()); !status.ok()) return status;
 
-  fill_.assign(BytesPerSample(type_), std::byte{0});
+  fill_.assign(BytesPerSample(facts_.type), std::byte{0});
   H5D_fill_value_t fill{};
   if (H5Pfill_value_defined(creation.id(), &fill) >= 0 && fill == H5D_FILL_VALUE_USER_DEFINED) {
-    if (H5Pget_fill_value(creation.id(), type.id(), fill_.data()) >= 0 && big_endian_) SwapByteOrder(type_, fill_);
+    if (H5Pget_fill_value(creation.id(), type.id(), fill_.data()) >= 0 && big_endian_) SwapByteOrder(facts_.type, fill_);
   }
   return Status::Ok();
 }
 
 Result<std::optional<Hdf5StoredChunk>> Hdf5Dataset::Find(std::span<const std::uint64_t> index) const {
   std::array<hsize_t, kMaxArrayAxes> offset{};
-  for (std::size_t axis = 0; axis < size_.size(); ++axis) offset[axis] = index[axis] * chunk_[axis];
+  for (std::size_t axis = 0; axis < facts_.size.size(); ++axis) offset[axis] = index[axis] * chunk_[axis];
   const Hdf5Lock lock;
   std::uint32_t left_out = 0;
   if (const auto place = FindHdf5Chunk(file_->id_, id_, offset.data(), left_out)) {
@@ -179,23 +177,23 @@ Result<std::optional<Hdf5StoredChunk>> Hdf5Dataset::Find(std::span<const std::ui
   }
   // The index answered, and has no address. If it is damaged, the first failure is one of the index.
   if (Hdf5FailedFirst(H5E_DATASET, H5E_CANTGET)) return std::optional<Hdf5StoredChunk>();
-  return Status::DataLoss(file_->Named(path_) + " has a damaged index of chunks: " + Hdf5Complaint());
+  return Status::DataLoss(named() + " has a damaged index of chunks: " + Hdf5Complaint());
 }
 
 Result<Bytes> Hdf5Dataset::ReadCompact() const {
   constexpr std::uint64_t kMost = 64 << 10;  // as the format allows
-  std::uint64_t bytes = BytesPerSample(type_);
-  for (const std::uint64_t along : size_) {
-    if (along > kMost / bytes) return Status::DataLoss(file_->Named(path_) + " is compact, and has more than 64 KiB");
+  std::uint64_t bytes = BytesPerSample(facts_.type);
+  for (const std::uint64_t along : facts_.size) {
+    if (along > kMost / bytes) return Status::DataLoss(named() + " is compact, and has more than 64 KiB");
     bytes *= along;
   }
   AlignedVector<std::byte> samples(bytes);
   const Hdf5Lock lock;
   const Hdf5Id type(H5Dget_type(id_), H5Tclose);  // as it is stored
   if (H5Dread(id_, type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()) < 0) {
-    return Status::DataLoss(file_->Named(path_) + " cannot be read: " + Hdf5Complaint());
+    return Status::DataLoss(named() + " cannot be read: " + Hdf5Complaint());
   }
-  if (big_endian_) SwapByteOrder(type_, samples);
+  if (big_endian_) SwapByteOrder(facts_.type, samples);
   return Bytes(std::move(samples));
 }
 

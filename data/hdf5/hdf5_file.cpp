@@ -89,12 +89,6 @@ Result<std::shared_ptr<Hdf5File>> Hdf5File::Open(const std::string& path) {
   Hdf5Id id(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose);
   if (!id.ok()) {
     const std::string complaint = Hdf5Complaint(), newer = NewerThanLibrary(complaint);
-    std::array<char, 3> first{};
-    if (::pread(descriptor.number(), first.data(), first.size(), 0) == 3 && std::string_view(first.data(), first.size()) == "CDF") {
-      return Status::InvalidArgument(path +
-                                     ": is a classic netCDF file, as MINC 1 has them, which is not supported; nccopy -k nc4 and "
-                                     "mincconvert -2 make HDF5 files of them");
-    }
     return Status::InvalidArgument(path + (newer.empty() ? ": not an HDF5 file, or damaged: " + complaint : newer));
   }
   return std::shared_ptr<Hdf5File>(new Hdf5File(path, id.Release()));
@@ -104,6 +98,8 @@ Hdf5File::~Hdf5File() {
   const Hdf5Lock lock;
   (void)H5Fclose(id_);
 }
+
+std::string Hdf5File::format() { return Text("/", "_NCProperties") ? "netCDF-4" : "HDF5"; }
 
 bool Hdf5File::Has(const std::string& object) {
   const Hdf5Lock lock;
@@ -115,7 +111,7 @@ Result<std::vector<std::string>> Hdf5File::Names(const std::string& group) {
   const Hdf5Lock lock;
   LinkList links = HardLinks(id_, group, kMostNames + 1);
   if (links.names.size() > kMostNames) {
-    return Status::ResourceExhausted(fmt::format("{}: group '{}' holds more than {} names", path_, Printable(group), kMostNames));
+    return Status::ResourceExhausted(fmt::format("{}: group '{}' holds more than {} names", path(), Printable(group), kMostNames));
   }
   std::ranges::sort(links.names, {}, InNaturalOrder);
   return std::move(links.names);
@@ -164,8 +160,6 @@ Status Hdf5File::CannotOpen(const std::string& dataset) const {
   return Status::NotFound(Named(dataset) + " cannot be opened: " + complaint);
 }
 
-std::string Hdf5File::Named(const std::string& dataset) const { return path_ + ": dataset '" + Printable(dataset) + "'"; }
-
 Result<std::shared_ptr<Hdf5Dataset>> Hdf5File::Dataset(const std::string& path) {
   std::shared_ptr<Hdf5Dataset> dataset;  // given back after the lock, which it takes
   const Hdf5Lock lock;
@@ -174,6 +168,11 @@ Result<std::shared_ptr<Hdf5Dataset>> Hdf5File::Dataset(const std::string& path) 
   dataset.reset(new Hdf5Dataset(shared_from_this(), path, id.Release()));
   if (Status status = dataset->Describe(); !status.ok()) return status;
   return dataset;
+}
+
+Result<DatasetFacts> Hdf5File::Describe(const std::string& dataset) {
+  const Result<std::shared_ptr<Hdf5Dataset>> opened = Dataset(dataset);
+  return opened.ok() ? Result<DatasetFacts>((*opened)->facts()) : opened.status();
 }
 
 Result<std::vector<double>> Hdf5File::SmallDataset(const std::string& path) {

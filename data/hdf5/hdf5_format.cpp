@@ -1,26 +1,28 @@
 #include "data/hdf5/hdf5_format.h"
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <string_view>
 #include <utility>
 
+#include "data/hdf5/classic_netcdf.h"
+#include "data/hdf5/hdf5_image.h"
 #include "data/hdf5/hdf5_layouts.h"
 
 namespace slabstream {
 namespace {
 
-bool IsHdf5(const std::string& path, const ReadOptions&) {
+bool BeginsWith(const std::string& path, std::string_view signature) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::array<char, kSignature.size()> first{};
-  return std::ifstream(path, std::ios::binary).read(first.data(), first.size()) &&
-         std::string_view(first.data(), first.size()) == kSignature;
+  std::string first(signature.size(), '\0');
+  return std::ifstream(path, std::ios::binary).read(first.data(), std::streamsize(first.size())) && first == signature;
 }
+
+bool IsClassicNetcdf(const std::string& path) { return BeginsWith(path, "CDF"); }
+
+bool Recognises(const std::string& path, const ReadOptions&) { return BeginsWith(path, "\x89HDF\r\n\x1a\n") || IsClassicNetcdf(path); }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   Result<Pyramid> pyramid = ReadHdf5(path, options, context);
@@ -38,20 +40,24 @@ int CountNumbered(const std::vector<std::string>& names, const std::string& pref
 }
 
 Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  if (IsClassicNetcdf(path)) {
+    const Result<std::unique_ptr<AttributedFile>> file = OpenClassicNetcdf(path);
+    return file.ok() ? ReadImage(**file, options, context) : file.status();
+  }
   const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
   if (!file.ok()) return file.status();
+  for (const Hdf5Layout& layout : {Imaris(), BigDataViewerHdf5()}) {
+    if (options.dataset.empty() && layout.recognises(**file)) return layout.read(*file, options, context);
+  }
   // A path names a dataset of any file, and a bare name a mesh of openPMD.
-  const bool is_mesh = options.dataset.find('/') == std::string::npos && OpenPmd().recognises(**file);
-  if (!options.dataset.empty() && !is_mesh) return AnyHdf5().read(*file, options, context);
-  const std::array layouts = {Imaris(), BigDataViewerHdf5(), OpenPmd(), AnyHdf5()};
-  const auto layout = std::ranges::find_if(layouts, [&](const Hdf5Layout& each) { return each.recognises(**file); });
-  return layout->read(*file, options, context);
+  if (options.dataset.find('/') == std::string::npos && IsOpenPmd(**file)) return ReadOpenPmd(**file, options, context);
+  return ReadImage(**file, options, context);
 }
 
 VolumeFormat Hdf5() {
   return {.name = "HDF5",
           .endings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"},
-          .recognises = IsHdf5,
+          .recognises = Recognises,
           .options = {"time", "channel", "dataset"},
           .open = Open};
 }

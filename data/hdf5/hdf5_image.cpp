@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <set>
+#include <sstream>
 
-#include "data/hdf5/hdf5_array.h"
-#include "data/hdf5/hdf5_layouts.h"
+#include "common/base/printable.h"
 #include "data/sources/axis_choice.h"
+#include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/stated_field.h"
@@ -21,50 +24,69 @@ const std::array<ImageLayout, 5>& Layouts() {
 }
 
 // Datasets, for messages: "'/a' of 100 x 20 x 30 uint16".
-std::string Listed(const std::shared_ptr<Hdf5File>& file, const std::vector<std::string>& paths) {
+std::string Listed(AttributedFile& file, const std::vector<std::string>& paths) {
   constexpr std::size_t kMost = 16, kMostBytes = 800;
   std::string list;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     if (i == kMost || list.size() > kMostBytes) return list + fmt::format(" and {} more", paths.size() - i);
-    const Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(paths[i]);
+    const Result<DatasetFacts> dataset = file.Describe(paths[i]);
     const std::string what =
-        dataset.ok() ? fmt::format("of {} {}", fmt::join((*dataset)->size(), " x "), ToString((*dataset)->type())) : "which cannot be read";
-    list += fmt::format("{}'{}' {}", list.empty() ? "" : ", ", paths[i], what);
+        dataset.ok() ? fmt::format("of {} {}", fmt::join(dataset->size, " x "), ToString(dataset->type)) : "which cannot be read";
+    list += fmt::format("{}'{}' {}", list.empty() ? "" : ", ", Printable(paths[i]), what);
   }
   return list;
 }
 
-// Of a file without a dataset of three axes or more, those of two: slices.
-Result<std::vector<std::string>> SlicesIn(const std::shared_ptr<Hdf5File>& file, const Hdf5File::Found& found) {
-  for (const std::string& path : found.closed) {
-    if (const Status status = file->Dataset(path).status(); !status.ok()) return status;
+// Leaves out what other datasets name, by the conventions of CF, as coordinates of several axes or as bounds of their cells.
+void LeaveOutCoordinates(AttributedFile& file, std::vector<std::string>& paths) {
+  std::set<std::string> named;
+  for (const std::string& path : file.Datasets(1).paths) {
+    for (const char* const attribute : {"bounds", "climatology", "coordinates"}) {
+      std::istringstream names(file.Text(path, attribute).value_or(""));
+      for (std::string name; names >> name;) named.insert(path.substr(0, path.rfind('/') + 1) + name);
+    }
   }
-  std::vector<std::string> slices = file->Datasets(2).paths;
-  if (slices.empty()) return Status::InvalidArgument(file->path() + ": has no dataset of two axes or more");
+  std::vector<std::string> others;
+  std::ranges::copy_if(paths, std::back_inserter(others), [&](const std::string& path) { return !named.contains(path); });
+  if (!others.empty()) paths = std::move(others);
+}
+
+// Of a file without a dataset of three axes or more, those of two: slices.
+Result<std::vector<std::string>> SlicesIn(AttributedFile& file, const AttributedFile::Found& found) {
+  for (const std::string& path : found.closed) {
+    if (const Status status = file.Describe(path).status(); !status.ok()) return status;
+  }
+  std::vector<std::string> slices = file.Datasets(2).paths;
+  if (slices.empty()) return Status::InvalidArgument(file.path() + ": has no dataset of two axes or more");
   return slices;
 }
 
-Result<std::string> ChosenDataset(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options) {
+Result<std::string> ChosenDataset(AttributedFile& file, const ReadOptions& options) {
   if (!options.dataset.empty()) return options.dataset.starts_with('/') ? options.dataset : "/" + options.dataset;
+  // Arrays of grids are no images.
+  const bool cgns = file.Has("/CGNSLibraryVersion"), exodus = file.Numbers("/", "floating_point_word_size").has_value();
+  const std::string_view why = cgns ? kWhyNotCgns : exodus ? kWhyNotExodus : WhyUnread(file.path());
+  if (!why.empty()) return Status::InvalidArgument(fmt::format("{}: {}", file.path(), why));
   std::vector<std::string> paths;
   for (const ImageLayout& layout : Layouts()) {
-    Result<std::vector<std::string>> images = layout.images(*file);
+    Result<std::vector<std::string>> images = layout.images(file);
     if (!images.ok()) return images.status();
     paths = *std::move(images);
     if (!paths.empty()) break;
   }
   if (paths.empty()) {
-    Hdf5File::Found found = file->Datasets(3);
+    AttributedFile::Found found = file.Datasets(3);
     Result<std::vector<std::string>> images = found.paths.empty() ? SlicesIn(file, found) : std::move(found.paths);
     if (!images.ok()) return images.status();
     paths = *std::move(images);
+    if (paths.size() > 1) LeaveOutCoordinates(file, paths);
   }
   if (paths.size() == 1) return paths[0];
   return Status::InvalidArgument(
-      fmt::format("{}: has {} datasets, of which --dataset takes one: {}", file->path(), paths.size(), Listed(file, paths)));
+      fmt::format("{}: has {} datasets, of which --dataset takes one: {}", file.path(), paths.size(), Listed(file, paths)));
 }
 
-Result<ImageDescription> Described(Hdf5File& file, const Hdf5Dataset& dataset) {
+Result<ImageDescription> Described(AttributedFile& file, const DatasetFacts& dataset) {
   for (const ImageLayout& layout : Layouts()) {
     Result<std::optional<ImageDescription>> image = layout.describe(file, dataset);
     if (!image.ok()) return image.status();
@@ -102,28 +124,30 @@ std::string NoteOfAxes(const ImageDescription& image, const std::vector<AxisKind
   return fmt::format("axes of the dataset: {} (by {})", fmt::join(names, ", "), image.axes_from.empty() ? "their order" : image.axes_from);
 }
 
-Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
+}  // namespace
+
+Result<Pyramid> ReadImage(AttributedFile& file, const ReadOptions& options, const SourceContext& context) {
   const Result<std::string> path = ChosenDataset(file, options);
   if (!path.ok()) return path.status();
-  Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(*path);
+  const Result<DatasetFacts> dataset = file.Describe(*path);
   if (!dataset.ok()) return dataset.status();
-  Result<ImageDescription> image = Described(*file, **dataset);
+  Result<ImageDescription> image = Described(file, *dataset);
   if (!image.ok()) return image.status();
-  const std::string named = file->Named(*path);
+  const std::string named = file.Named(*path);
   std::vector<std::string> names;
   for (const ImageAxis& axis : image->axes) names.push_back(axis.name);
   const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(named, names, options);
   if (!kinds.ok()) return kinds.status();
-  const std::vector<std::uint64_t> sizes = (*dataset)->size();
+  const std::vector<std::uint64_t>& sizes = dataset->size;
   const Result<ChosenAxes> choice = ChooseAxes(named, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   if (choice->axes[0] < 0 || choice->axes[1] < 0) return Status::InvalidArgument(named + " has no axes x and y");
   const Result<WorldPlacement> placed = PlaceInWorld(HeaderOf(*image, *choice, sizes), named);
   if (!placed.ok()) return placed.status();
-  if (placed->slant) return Status::InvalidArgument(named + " has axes that are not at right angles, which is not supported in HDF5 files");
+  if (placed->slant)
+    return Status::InvalidArgument(named + " has axes that are not at right angles, which is not supported in HDF5 and netCDF files");
 
-  const std::string stored_type(ToString((*dataset)->type()));
-  Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, image->type);
+  Result<std::shared_ptr<ChunkedArray>> array = file.Array(*path, context, image->type);
   if (!array.ok()) return array.status();
   Pyramid pyramid{.orientation = placed->geometry.orientation, .rescale = image->meaning.mappings.front()};
   if (!image->meaning.linear()) {
@@ -140,10 +164,10 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   for (std::size_t i = 0; i < 3; ++i) level.axes[i] = choice->axes[std::size_t(placed->turn.from[i])];
   pyramid.levels.push_back(std::move(level));
   pyramid.info = {.format = image->format,
-                  .file_type = stored_type,
+                  .file_type = std::string(ToString(dataset->type)),
                   .labels = image->labels,
                   .notes = std::move(image->notes),
-                  .files = {file->path()}};
+                  .files = {file.path()}};
   choice->Describe(pyramid.info);
   if (const auto time = std::ranges::find(*kinds, AxisKind::kTime); time != kinds->end()) {
     const ImageAxis& axis = image->axes[std::size_t(time - kinds->begin())];
@@ -151,12 +175,6 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   }
   pyramid.info.notes.insert(pyramid.info.notes.begin(), NoteOfAxes(*image, *kinds));
   return pyramid;
-}
-
-}  // namespace
-
-Hdf5Layout AnyHdf5() {
-  return {[](Hdf5File&) { return true; }, Read};
 }
 
 }  // namespace slabstream

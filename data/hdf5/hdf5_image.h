@@ -1,5 +1,6 @@
-// What an HDF5 file says of a dataset that is one image: what its axes are, where its voxels lie and what its samples stand for. Each
-// layout reads this from its own groups and attributes; what follows from it is the same for all (hdf5_image.cpp, which has the only list).
+// What a file of HDF5 or classic netCDF says of a dataset that is one image: what its axes are, where its voxels lie and what its samples
+// stand for. Each layout reads this from its own groups and attributes; what follows from it is the same for all (hdf5_image.cpp, which has
+// the only list).
 #pragma once
 
 #include <optional>
@@ -9,8 +10,11 @@
 #include "common/base/status.h"
 #include "common/math/vec.h"
 #include "common/volume/orientation.h"
-#include "data/hdf5/hdf5_file.h"
+#include "data/hdf5/attributed_file.h"
+#include "data/sources/chunked_source.h"
 #include "data/sources/mapped_array.h"
+#include "data/sources/read_context.h"
+#include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
@@ -24,7 +28,7 @@ struct ImageAxis {
 };
 
 struct ImageDescription {
-  std::string format = "HDF5";
+  std::string format = {};
   std::vector<ImageAxis> axes = {};  // the dataset's axes, the slowest first
   std::string axes_from = {};        // what names them, for a note: "axistags"; "": nothing does, so their order decides
   World world = World::kVoxels;      // kVoxels: only lengths are known
@@ -41,13 +45,15 @@ struct Limits {
   double least = 0, most = 0;
 };
 std::optional<Limits> WholeNumbers(SampleType type);
+// Whole numbers of the same bytes with or without a sign; nullopt: it is another type.
+std::optional<SampleType> WithSign(SampleType type, bool has_sign);
 
 struct ImageLayout {
   // Paths of the images in a file of the layout. Empty: it is of another one. InvalidArgument: it is of this one, but of a kind that is not
   // supported.
-  Result<std::vector<std::string>> (*images)(Hdf5File& file) = nullptr;
+  Result<std::vector<std::string>> (*images)(AttributedFile& file) = nullptr;
   // nullopt: the dataset does not belong to the layout. InvalidArgument, DataLoss: what the file says of it is wrong.
-  Result<std::optional<ImageDescription>> (*describe)(Hdf5File& file, const Hdf5Dataset& dataset) = nullptr;
+  Result<std::optional<ImageDescription>> (*describe)(AttributedFile& file, const DatasetFacts& dataset) = nullptr;
 };
 
 ImageLayout ItkImage();
@@ -59,10 +65,17 @@ ImageLayout OpenPmdMesh();
 // By the attributes of the dataset and its dimension scales alone: axistags, netCDF-4 with the conventions of CF, labels of dimensions,
 // element_size_um and others. `scales`: for each axis the path of a dataset with its coordinates, "" where there is none; empty: the
 // dimension scales that the dataset has.
-Result<ImageDescription> DescribeByAttributes(Hdf5File& file, const Hdf5Dataset& dataset, std::vector<std::string> scales = {});
+Result<ImageDescription> DescribeByAttributes(AttributedFile& file, const DatasetFacts& dataset, std::vector<std::string> scales = {});
 
 // The type and the meaning of samples by the conventions of CF: scale_factor, add_offset, _FillValue, missing_value, valid_range,
 // _Unsigned. What of them applies is noted.
-void DescribeValues(Hdf5File& file, const Hdf5Dataset& dataset, ImageDescription& image);
+void DescribeValues(AttributedFile& file, const DatasetFacts& dataset, ImageDescription& image);
+
+// A dataset of a file as a source: the one that `options` names, else the only image. Errors of VolumeFormat::open.
+Result<Pyramid> ReadImage(AttributedFile& file, const ReadOptions& options, const SourceContext& context);
+
+// openPMD, whose iterations are times. options.dataset: the name of a mesh; "": the only one. Errors of VolumeFormat::open.
+bool IsOpenPmd(AttributedFile& file);
+Result<Pyramid> ReadOpenPmd(AttributedFile& file, const ReadOptions& options, const SourceContext& context);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// How programs lay volumes out in HDF5 files. hdf5_format.cpp has the only list.
+// How programs lay volumes of several levels out in HDF5 files. hdf5_format.cpp has the only list.
 #pragma once
 
 #include <memory>
@@ -20,8 +20,6 @@ struct Hdf5Layout {
 
 Hdf5Layout Imaris();
 Hdf5Layout BigDataViewerHdf5();
-Hdf5Layout OpenPmd();
-Hdf5Layout AnyHdf5();  // a dataset of any other file (hdf5_image.h)
 
 // How many names PREFIX0, PREFIX1, ... there are without a gap.
 int CountNumbered(const std::vector<std::string>& names, const std::string& prefix);

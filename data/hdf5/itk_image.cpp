@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kImages = "/ITKImage/", kSamples = "/VoxelData";
 
-Result<std::vector<std::string>> Images(Hdf5File& file) {
+Result<std::vector<std::string>> Images(AttributedFile& file) {
   std::vector<std::string> images;
   const Result<std::vector<std::string>> names = file.Names("/ITKImage");
   if (!names.ok()) return names.status();
@@ -21,8 +21,8 @@ Result<std::vector<std::string>> Images(Hdf5File& file) {
   return images;
 }
 
-Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Dataset& dataset) {
-  const std::string& path = dataset.path();
+Result<std::optional<ImageDescription>> Describe(AttributedFile& file, const DatasetFacts& dataset) {
+  const std::string& path = dataset.path;
   if (!path.starts_with(kImages) || !path.ends_with(kSamples)) return std::optional<ImageDescription>();
   const std::string group = path.substr(0, path.size() - kSamples.size());
   const Result<std::vector<double>> spacing = file.SmallDataset(group + "/Spacing"), origin = file.SmallDataset(group + "/Origin"),
@@ -30,7 +30,7 @@ Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Datas
   for (const auto* numbers : {&spacing, &origin, &directions}) {
     if (!numbers->ok()) return numbers->status();
   }
-  const std::size_t sides = spacing->size(), axes = dataset.size().size();
+  const std::size_t sides = spacing->size(), axes = dataset.size.size();
   const bool components = axes == sides + 1;
   if ((axes != sides && !components) || origin->size() != sides || directions->size() != sides * sides) {
     return Status::InvalidArgument(file.Named(path) +

@@ -1,6 +1,7 @@
-// MINC 2: minc-2.0/image/0/image, whose attribute dimorder names its axes; minc-2.0/dimensions says where they run. Integers stand for
-// values between image-min and image-max, which may differ from slice to slice. Source: the MINC 2.0 File Format Reference,
-// https://en.wikibooks.org/wiki/MINC/Reference/MINC2.0_File_Format_Reference
+// MINC. In version 2 minc-2.0/image/0/image has the samples, its attribute dimorder names its axes, and minc-2.0/dimensions says where they
+// run; in version 1, which is classic netCDF, all of these are variables of the file. Integers stand for values between image-min and
+// image-max, which may differ from slice to slice. Sources: the MINC 2.0 File Format Reference,
+// https://en.wikibooks.org/wiki/MINC/Reference/MINC2.0_File_Format_Reference, and the MINC 1 Programmer's Guide.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,9 +16,12 @@ namespace {
 
 constexpr std::string_view kRoot = "/minc-2.0", kSamples = "/image";
 
-Result<std::vector<std::string>> Images(Hdf5File& file) {
+bool IsVersion1(AttributedFile& file) { return file.Text(std::string(kSamples), "varid").value_or("") == "MINC standard variable"; }
+
+Result<std::vector<std::string>> Images(AttributedFile& file) {
   const std::string path = fmt::format("{}/image/0{}", kRoot, kSamples);
-  return file.Has(path) ? std::vector<std::string>{path} : std::vector<std::string>{};
+  if (file.Has(path)) return std::vector<std::string>{path};
+  return IsVersion1(file) ? std::vector<std::string>{std::string(kSamples)} : std::vector<std::string>{};
 }
 
 std::vector<std::string> Split(const std::string& names) {
@@ -28,17 +32,17 @@ std::vector<std::string> Split(const std::string& names) {
 }
 
 // Floats are data values.
-Status DescribeScale(Hdf5File& file, const Hdf5Dataset& dataset, ImageDescription& image) {
-  const std::string& path = dataset.path();
+Status DescribeScale(AttributedFile& file, const DatasetFacts& dataset, ImageDescription& image) {
+  const std::string& path = dataset.path;
   const std::string group = path.substr(0, path.size() - kSamples.size());
-  const std::optional<Limits> all = WholeNumbers(dataset.type());
-  if (!all || dataset.enumeration() || !file.Has(group + "/image-min") || !file.Has(group + "/image-max")) return Status::Ok();
+  const std::optional<Limits> all = WholeNumbers(image.type.value_or(dataset.type));
+  if (!all || dataset.enumeration || !file.Has(group + "/image-min") || !file.Has(group + "/image-max")) return Status::Ok();
   const Result<std::vector<double>> least = file.SmallDataset(group + "/image-min"), most = file.SmallDataset(group + "/image-max");
   if (!least.ok()) return least.status();
   if (!most.ok()) return most.status();
   ElementMeaning& meaning = image.meaning;
   std::uint64_t slices = 1;
-  while (slices < least->size() && meaning.mapped_axes < dataset.size().size()) slices *= dataset.size()[meaning.mapped_axes++];
+  while (slices < least->size() && meaning.mapped_axes < dataset.size.size()) slices *= dataset.size[meaning.mapped_axes++];
   if (slices != least->size() || slices != most->size()) {
     return Status::InvalidArgument(file.Named(path) +
                                    fmt::format(" has {} numbers in image-min and {} in image-max, must have one for all of it or "
@@ -65,19 +69,29 @@ Status DescribeScale(Hdf5File& file, const Hdf5Dataset& dataset, ImageDescriptio
   return Status::Ok();
 }
 
-Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Dataset& dataset) {
-  const std::string& path = dataset.path();
-  if (!path.starts_with(kRoot) || !path.ends_with(kSamples)) return std::optional<ImageDescription>();
-  ImageDescription image{.format = "MINC 2", .axes_from = "dimorder", .world = World::kPatient, .labels = dataset.enumeration()};
-  const std::vector<std::string> order = Split(file.Text(path, "dimorder").value_or(""));
-  if (order.size() != dataset.size().size()) {
+Result<std::optional<ImageDescription>> Describe(AttributedFile& file, const DatasetFacts& dataset) {
+  const std::string& path = dataset.path;
+  const bool version1 = path == kSamples && IsVersion1(file);
+  if (!version1 && (!path.starts_with(kRoot) || !path.ends_with(kSamples))) return std::optional<ImageDescription>();
+  ImageDescription image{.format = "MINC 2", .axes_from = "dimorder", .world = World::kPatient, .labels = dataset.enumeration};
+  const std::string dimensions = version1 ? "/" : fmt::format("{}/dimensions/", kRoot);
+  std::vector<std::string> order = Split(file.Text(path, "dimorder").value_or(""));
+  if (version1) {
+    image.format = "MINC 1";
+    image.axes_from = "its dimensions";
+    order = file.DimensionScales(path);
+    for (std::string& name : order) name.erase(0, dimensions.size());
+    const std::string sign = file.Text(path, "signtype").value_or(dataset.type == SampleType::kInt8 ? "unsigned" : "signed__");
+    image.type = WithSign(dataset.type, sign != "unsigned");
+  }
+  if (order.size() != dataset.size.size()) {
     return Status::InvalidArgument(
-        file.Named(path) + fmt::format(" has {} axes, of which its attribute dimorder names {}", dataset.size().size(), order.size()));
+        file.Named(path) + fmt::format(" has {} axes, of which its attribute dimorder names {}", dataset.size.size(), order.size()));
   }
   for (const std::string& name : order) {
     ImageAxis axis{.name = name == "vector_dimension" ? "c" : name};
     if (name == "xspace" || name == "yspace" || name == "zspace") {
-      const std::string dimension = fmt::format("{}/dimensions/{}", kRoot, name);
+      const std::string dimension = dimensions + name;
       if (file.Text(dimension, "spacing").value_or("").starts_with("irregular")) {
         LogWarning(fmt::format("{}: its voxels along {} are not evenly spaced; they are shown as if they were", file.path(), name));
       }
@@ -88,7 +102,7 @@ Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Datas
       if (cosines && cosines->size() == 3) axis.direction = Vec3{(*cosines)[0], (*cosines)[1], (*cosines)[2]};
     }
     if (name == "time") {
-      if (const auto step = file.Numbers(fmt::format("{}/dimensions/time", kRoot), "step")) axis.step = step->front();
+      if (const auto step = file.Numbers(dimensions + "time", "step")) axis.step = step->front();
       axis.time_unit = "s";
     }
     image.axes.push_back(std::move(axis));

@@ -5,9 +5,9 @@
 namespace slabstream {
 namespace {
 
-std::string ClassOf(Hdf5File& file, const std::string& group) { return file.Text(group, "NX_class").value_or(""); }
+std::string ClassOf(AttributedFile& file, const std::string& group) { return file.Text(group, "NX_class").value_or(""); }
 
-Result<std::vector<std::string>> Images(Hdf5File& file) {
+Result<std::vector<std::string>> Images(AttributedFile& file) {
   constexpr int kMostSteps = 8;
   std::string group;
   for (int step = 0; step < kMostSteps; ++step) {
@@ -20,10 +20,10 @@ Result<std::vector<std::string>> Images(Hdf5File& file) {
   return std::vector<std::string>{};
 }
 
-Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Dataset& dataset) {
-  const std::string group = dataset.path().substr(0, dataset.path().rfind('/'));
+Result<std::optional<ImageDescription>> Describe(AttributedFile& file, const DatasetFacts& dataset) {
+  const std::string group = dataset.path.substr(0, dataset.path.rfind('/'));
   const std::optional<std::vector<std::string>> axes = file.Texts(group.empty() ? "/" : group, "axes");
-  if (!axes || axes->size() != dataset.size().size() || ClassOf(file, group.empty() ? "/" : group) != "NXdata") {
+  if (!axes || axes->size() != dataset.size.size() || ClassOf(file, group.empty() ? "/" : group) != "NXdata") {
     return std::optional<ImageDescription>();
   }
   std::vector<std::string> scales;

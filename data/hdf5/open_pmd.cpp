@@ -7,7 +7,6 @@
 
 #include "common/text/parse_number.h"
 #include "data/hdf5/hdf5_image.h"
-#include "data/hdf5/hdf5_layouts.h"
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/stated_field.h"
@@ -15,18 +14,16 @@
 namespace slabstream {
 namespace {
 
-bool IsOpenPmd(Hdf5File& file) { return file.Text("/", "openPMD").has_value(); }
-
 std::string ParentOf(const std::string& path) { return path.substr(0, path.find_last_of('/')); }
 
 // Attributes of a mesh lie with its dataset, or with the group of its components.
-Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Dataset& dataset) {
-  const std::string& path = dataset.path();
+Result<std::optional<ImageDescription>> Describe(AttributedFile& file, const DatasetFacts& dataset) {
+  const std::string& path = dataset.path;
   if (!IsOpenPmd(file)) return std::optional<ImageDescription>();
   const std::string mesh = file.Numbers(path, "gridSpacing") ? path : ParentOf(path);
   std::vector<double> spacing = file.Numbers(mesh, "gridSpacing").value_or(std::vector<double>());
   if (spacing.empty()) return std::optional<ImageDescription>();
-  const std::size_t count = dataset.size().size();
+  const std::size_t count = dataset.size.size();
   const std::string geometry = file.Text(mesh, "geometry").value_or("cartesian");
   if (geometry != "cartesian") {
     return Status::InvalidArgument(file.Named(path) +
@@ -64,7 +61,7 @@ struct Iterations {
   TimeAxis times;
 };
 
-Result<Iterations> IterationsOf(Hdf5File& file) {
+Result<Iterations> IterationsOf(AttributedFile& file) {
   Iterations iterations;
   Result<std::vector<std::string>> names = file.Names("/data");
   if (!names.ok()) return names.status();
@@ -86,17 +83,17 @@ Result<Iterations> IterationsOf(Hdf5File& file) {
 }
 
 // The datasets of a mesh, one for each component: a constant component has none.
-struct Mesh {
+struct PmdMesh {
   std::vector<std::string> paths;
   std::vector<FieldInfo> channels;  // with their names
 };
 
-Mesh MeshAt(Hdf5File& file, const std::string& path) {
-  if (file.Dataset(path).ok()) return {{path}, {}};
-  Mesh mesh;
+PmdMesh MeshAt(AttributedFile& file, const std::string& path) {
+  if (file.Describe(path).ok()) return {{path}, {}};
+  PmdMesh mesh;
   const Result<std::vector<std::string>> names = file.Names(path);
   for (const std::string& name : names.ok() ? *names : std::vector<std::string>()) {
-    if (!file.Dataset(path + "/" + name).ok()) continue;
+    if (!file.Describe(path + "/" + name).ok()) continue;
     mesh.paths.push_back(path + "/" + name);
     mesh.channels.push_back({.name = name});
   }
@@ -104,7 +101,7 @@ Mesh MeshAt(Hdf5File& file, const std::string& path) {
 }
 
 // Of the meshes in this group the only one, or the one that options.dataset names.
-Result<Mesh> ChosenMesh(Hdf5File& file, const std::string& group, const ReadOptions& options) {
+Result<PmdMesh> ChosenMesh(AttributedFile& file, const std::string& group, const ReadOptions& options) {
   const Result<std::vector<std::string>> names = file.Names(group);
   if (!names.ok()) return names.status();
   std::vector<std::string> meshes;
@@ -117,22 +114,26 @@ Result<Mesh> ChosenMesh(Hdf5File& file, const std::string& group, const ReadOpti
   return Status::InvalidArgument(fmt::format("{}: {}; in {} there are: {}", file.path(), why, group, fmt::join(meshes, ", ")));
 }
 
-Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
-  const Result<Iterations> iterations = IterationsOf(*file);
+}  // namespace
+
+bool IsOpenPmd(AttributedFile& file) { return file.Text("/", "openPMD").has_value(); }
+
+Result<Pyramid> ReadOpenPmd(AttributedFile& file, const ReadOptions& options, const SourceContext& context) {
+  const Result<Iterations> iterations = IterationsOf(file);
   if (!iterations.ok()) return iterations.status();
-  const Result<std::int64_t> time = ChosenVolume(file->path(), iterations->times.count, options);
+  const Result<std::int64_t> time = ChosenVolume(file.path(), iterations->times.count, options);
   if (!time.ok()) return time.status();
-  std::string meshes = file->Text("/", "meshesPath").value_or("fields/");
+  std::string meshes = file.Text("/", "meshesPath").value_or("fields/");
   while (meshes.ends_with('/')) meshes.pop_back();
-  const Result<Mesh> mesh = ChosenMesh(*file, fmt::format("/data/{}/{}", iterations->names[std::size_t(*time)], meshes), options);
+  const Result<PmdMesh> mesh = ChosenMesh(file, fmt::format("/data/{}/{}", iterations->names[std::size_t(*time)], meshes), options);
   if (!mesh.ok()) return mesh.status();
-  const Result<int> channel = mesh->channels.empty() ? Result(0) : ChosenChannel(file->path(), mesh->channels, options);
+  const Result<int> channel = mesh->channels.empty() ? Result(0) : ChosenChannel(file.path(), mesh->channels, options);
   if (!channel.ok()) return channel.status();
   ReadOptions of_dataset = options;
   of_dataset.time.reset();
   if (!mesh->channels.empty()) of_dataset.channel.reset();
   of_dataset.dataset = mesh->paths[std::size_t(*channel)];
-  Result<Pyramid> pyramid = AnyHdf5().read(file, of_dataset, context);
+  Result<Pyramid> pyramid = ReadImage(file, of_dataset, context);
   if (!pyramid.ok()) return pyramid;
   pyramid->info.times = iterations->times;
   pyramid->info.time = int(*time);
@@ -141,12 +142,8 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   return pyramid;
 }
 
-}  // namespace
-
 ImageLayout OpenPmdMesh() {
-  return {[](Hdf5File&) { return Result(std::vector<std::string>()); }, Describe};
+  return {[](AttributedFile&) { return Result(std::vector<std::string>()); }, Describe};
 }
-
-Hdf5Layout OpenPmd() { return {IsOpenPmd, Read}; }
 
 }  // namespace slabstream

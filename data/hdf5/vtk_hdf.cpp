@@ -14,7 +14,7 @@ namespace {
 const std::string kRoot = "/VTKHDF";
 const std::string kPointData = "/VTKHDF/PointData", kCellData = "/VTKHDF/CellData";
 
-Result<std::vector<std::string>> Images(Hdf5File& file) {
+Result<std::vector<std::string>> Images(AttributedFile& file) {
   if (!file.Has(kRoot)) return std::vector<std::string>{};
   const std::string type = file.Text(kRoot, "Type").value_or("");
   if (type != "ImageData") {
@@ -33,8 +33,8 @@ Result<std::vector<std::string>> Images(Hdf5File& file) {
   return images;
 }
 
-Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Dataset& dataset) {
-  const std::string& path = dataset.path();
+Result<std::optional<ImageDescription>> Describe(AttributedFile& file, const DatasetFacts& dataset) {
+  const std::string& path = dataset.path;
   const bool cells = path.starts_with(kCellData + "/");
   if (!cells && !path.starts_with(kPointData + "/")) return std::optional<ImageDescription>();
   const auto numbers = [&](const char* name, std::vector<double> otherwise) {
@@ -63,11 +63,11 @@ Result<std::optional<ImageDescription>> Describe(Hdf5File& file, const Hdf5Datas
                           .direction = Vec3{direction[i], direction[3 + i], direction[6 + i]}});
     sides.push_back(std::uint64_t(std::clamp(cells ? std::max(1.0, points - 1) : points, 0.0, 1e9)));
   }
-  const std::size_t first = image.axes.size() - 3, axes = dataset.size().size();
+  const std::size_t first = image.axes.size() - 3, axes = dataset.size.size();
   if (axes == image.axes.size() + 1) image.axes.push_back({"c"});
-  if (axes != image.axes.size() || !std::equal(sides.begin(), sides.end(), dataset.size().begin() + std::ptrdiff_t(first))) {
+  if (axes != image.axes.size() || !std::equal(sides.begin(), sides.end(), dataset.size.begin() + std::ptrdiff_t(first))) {
     return Status::InvalidArgument(file.Named(path) + fmt::format(" is of {}, but WholeExtent says {} along z, y and x{}",
-                                                                  fmt::join(dataset.size(), " x "), fmt::join(sides, " x "),
+                                                                  fmt::join(dataset.size, " x "), fmt::join(sides, " x "),
                                                                   cells ? " for cells" : ""));
   }
   if (cells) image.notes.emplace_back("samples of cells lie in their centres");

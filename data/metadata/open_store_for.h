@@ -5,9 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "common/text/url.h"
 #include "data/sources/chunked_source.h"
 #include "data/sources/read_context.h"
 #include "data/stores/store.h"
+#include "data/stores/watched_object.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -18,6 +20,12 @@ inline Result<std::shared_ptr<Store>> OpenStoreFor(const std::string& path, cons
   if (std::error_code error; options.follow_links && std::filesystem::is_directory(path, error))
     return FolderStore(path, Links::kMayLeadOut);
   return OpenStore(path, {.query = options.query, .headers = options.headers});
+}
+
+// Behind an address the shape of the finest array tells that times have come. `array_key`: of the object that was read for it.
+inline void FollowTimes(const std::shared_ptr<Store>& store, const std::string& array_key, const ReadOptions& options, Pyramid& pyramid) {
+  if (options.time || pyramid.levels.front().time_axis < 0 || !IsUrl(store->name())) return;
+  pyramid.info.growth = WatchObject(store, array_key);
 }
 
 using OpenPyramidFunction = Result<Pyramid> (*)(const std::shared_ptr<Store>& store, const ReadOptions& options,

@@ -50,6 +50,10 @@ class Parts : public std::enable_shared_from_this<Parts> {
     info_.whole = (*first)->info().whole;
     for (std::size_t level = 0; level < levels_.size(); ++level) {
       info_.levels[level].block = BlockLike((*first)->info().levels.front().block, levels_[level]);
+      if (level + 1 == levels_.size()) break;
+      auto boxes = std::make_shared<std::vector<Box>>();
+      for (const MosaicPart& part : levels_[level]) boxes->push_back(part.box);
+      info_.levels[level].refined = std::move(boxes);
     }
     return info_;
   }
@@ -57,13 +61,13 @@ class Parts : public std::enable_shared_from_this<Parts> {
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, VolumeSource::ReadDone done) {
     const auto reading = std::make_shared<BoxReading>(box, out, std::move(stop), std::move(done));
     try {
-      const BoxAssembly assembly = Assembled(level, box);
-      for (const BoxAssembly::Part& copied : assembly.copied) {
-        // Not on the thread of whoever reads: it may have to be opened.
-        Begin(reading, [self = shared_from_this(), level, copied, reading] { self->ReadFrom(level, copied, reading); });
-      }
-      for (const Box& missing : assembly.missing) {
-        Begin(reading, [self = shared_from_this(), level, missing, reading] { self->Interpolate(level, missing, reading); });
+      auto assembly = std::make_shared<const BoxAssembly>(Assembled(level, box));
+      if (assembly->missing.empty()) {
+        ReadParts(level, assembly, reading);
+      } else {
+        Begin(reading, [self = shared_from_this(), level, assembly, reading] {
+          self->EndIfItThrows(reading, [&] { self->Interpolate(level, assembly, reading); });
+        });
       }
     } catch (const std::exception& error) {
       reading->Fail(NoMemory(error));
@@ -161,8 +165,14 @@ class Parts : public std::enable_shared_from_this<Parts> {
   template <class Task>
   void Begin(const std::shared_ptr<BoxReading>& reading, Task task) {
     reading->BeginPart();
+    EndIfItThrows(reading, [&] { PostRead(std::move(task)); });
+  }
+
+  // What `task` ends when it has done its work.
+  template <class Task>
+  void EndIfItThrows(const std::shared_ptr<BoxReading>& reading, Task&& task) {
     try {
-      PostRead(std::move(task));
+      task();
     } catch (const std::exception& error) {
       reading->Fail(NoMemory(error));
       reading->EndPart();
@@ -184,6 +194,21 @@ class Parts : public std::enable_shared_from_this<Parts> {
     };
   }
 
+  // A task for several parts, which may be small. Not on the thread of whoever reads: they may have to be opened.
+  void ReadParts(int level, const std::shared_ptr<const BoxAssembly>& assembly, const std::shared_ptr<BoxReading>& reading) {
+    constexpr std::size_t kTogether = 8;
+    for (std::size_t first = 0; first < assembly->copied.size(); first += kTogether) {
+      const std::size_t count = std::min(kTogether, assembly->copied.size() - first);
+      Begin(reading, [self = shared_from_this(), level, assembly, first, count, reading] {
+        for (std::size_t i = first; i < first + count; ++i) {
+          reading->BeginPart();
+          self->EndIfItThrows(reading, [&] { self->ReadFrom(level, assembly->copied[i], reading); });
+        }
+        reading->EndPart();
+      });
+    }
+  }
+
   void ReadFrom(int level, const BoxAssembly::Part& copied, const std::shared_ptr<BoxReading>& reading) {
     const VolumeSource::ReadDone end = EndOf(reading);
     if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
@@ -194,25 +219,31 @@ class Parts : public std::enable_shared_from_this<Parts> {
                     [end, keep = *source](Status status) { end(std::move(status)); });
   }
 
-  void Interpolate(int level, const Box& missing, const std::shared_ptr<BoxReading>& reading) {
+  // Of a box some voxels of which lie in no part. One read of the coarser level is quicker than one for each of the gaps, so what lies
+  // between them is interpolated, too, before the parts are read.
+  void Interpolate(int level, const std::shared_ptr<const BoxAssembly>& assembly, const std::shared_ptr<BoxReading>& reading) {
     const VolumeSource::ReadDone end = EndOf(reading);
     if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
+    Box gaps;
+    for (const Box& missing : assembly->missing) gaps = Hull(gaps, missing);
     const VolumeGeometry &fine = info_.levels[std::size_t(level)].description.geometry,
                          &coarse = info_.levels[std::size_t(level) + 1].description.geometry;
-    const Box between = BoxBetween(missing, fine, coarse);
+    const Box between = BoxBetween(gaps, fine, coarse);
     const bool exact = reading->out().exact;
     const auto samples =
         std::make_shared<UnwrittenVector<std::byte>>(std::size_t(between.voxel_count()) * CopiedBytes(info_.exact.type, exact));
     Read(level + 1, between, BoxRoom::Dense(between, samples->data(), exact), reading->stop(),
-         [self = shared_from_this(), samples, missing, &fine, &coarse, reading, end](Status status) {
-           if (!status.ok()) return end(std::move(status));
-           const BoxRoom room = self->RoomFor(missing, *reading);
-           if (room.exact && self->info_.exact.type == SampleType::kFloat64) {
-             Prolong(reinterpret_cast<const double*>(samples->data()), missing, fine, coarse, room);
-           } else {
-             Prolong(reinterpret_cast<const float*>(samples->data()), missing, fine, coarse, room);
+         [self = shared_from_this(), level, assembly, samples, gaps, &fine, &coarse, reading, end](Status status) {
+           if (status.ok()) {
+             const BoxRoom room = self->RoomFor(gaps, *reading);
+             if (room.exact && self->info_.exact.type == SampleType::kFloat64) {
+               Prolong(reinterpret_cast<const double*>(samples->data()), gaps, fine, coarse, room);
+             } else {
+               Prolong(reinterpret_cast<const float*>(samples->data()), gaps, fine, coarse, room);
+             }
+             self->ReadParts(level, assembly, reading);
            }
-           end(Status::Ok());
+           end(std::move(status));
          });
   }
 

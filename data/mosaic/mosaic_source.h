@@ -26,9 +26,9 @@ inline constexpr std::size_t kMaxMosaicParts = 1 << 17;  // of a level
 
 // `info`: of the volume; `levels`: the parts of each of its levels. What the sources say of their samples (type, mapping, exact) is the
 // same; with several levels, samples are float32 or float64. Opens the first part, of which info.whole and the levels' blocks become those
-// of the volume. Parts of a level may overlap where they have the same samples, as pieces do that meet at their points. InvalidArgument,
-// naming `name`: no part or more than kMaxMosaicParts, or voxels of the coarsest level that lie in none. Of the first part, or of a read:
-// errors of MosaicPart::open; InvalidArgument: its source has another size or samples.
+// of the volume, and says where levels are refined. Parts of a level may overlap where they have the same samples, as pieces do that meet
+// at their points. InvalidArgument, naming `name`: no part or more than kMaxMosaicParts, or voxels of the coarsest level that lie in none.
+// Of the first part, or of a read: errors of MosaicPart::open; InvalidArgument: its source has another size or samples.
 Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels);
 
 }  // namespace slabstream

@@ -221,10 +221,12 @@ class Container {
     if (!kinds.ok()) return kinds.status();
     const Result<ChosenAxes> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
     if (!choice.ok()) return choice.status();
-    choice->Describe(pyramid.info);
-    pyramid.info.times = TimesOf(node.field(), group.field(), choice->times);
     pyramid.levels.push_back(
         {.array = *array, .axes = choice->axes, .at = choice->at, .time_axis = choice->time_axis, .channel_axis = choice->channel_axis});
+    if (pyramid.levels.size() > 1) return Status::Ok();
+    choice->Describe(pyramid.info);
+    pyramid.info.times = TimesOf(node.field(), group.field(), choice->times);
+    FollowTimes(store_, Join(node.path, kAttributes), options, pyramid);
     return Status::Ok();
   }
 

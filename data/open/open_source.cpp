@@ -24,10 +24,12 @@
 
 namespace slabstream {
 
-// Each in the folder of its name; VTK's in data/mosaic.
+// Each in the folder of its name; AMReX's and VTK's in data/mosaic.
+VolumeFormat Amrex();
 VolumeFormat N5();
 VolumeFormat Precomputed();
 VolumeFormat VtkParallelImage();
+VolumeFormat Xdmf();
 VolumeFormat Zarr();
 
 namespace {
@@ -57,7 +59,7 @@ Result<std::shared_ptr<VolumeSource>> OpenAs(const VolumeFormat& format, const s
 
 const std::vector<VolumeFormat>& VolumeFormats() {
   static const std::vector<VolumeFormat> kFormats = [] {
-    std::vector<VolumeFormat> formats = {Hdf5(), N5(), Precomputed(), VtkParallelImage(), Zarr()};
+    std::vector<VolumeFormat> formats = {Amrex(), Hdf5(), N5(), Precomputed(), VtkParallelImage(), Xdmf(), Zarr()};
     formats.insert(formats.end(), FileFormats().begin(), FileFormats().end());
     std::ranges::find(formats, "TIFF", &VolumeFormat::name)->open = OpenTiff;
     return formats;

@@ -9,6 +9,7 @@
 #include "common/base/printable.h"
 #include "data/positional/decoded_source.h"
 #include "data/positional/located_volume.h"
+#include "data/positional/packed_source.h"
 #include "data/positional/slice_stream.h"
 #include "data/positional/stored_samples.h"
 #include "data/sources/box_reading.h"
@@ -99,7 +100,7 @@ Result<std::optional<LocatedVolume>> Described(const std::string& format, const 
   const Result<WorldPlacement> placed = PlaceInWorld(header, path);
   if (!placed.ok()) return placed.status();
   if (placed->slant) return std::optional<LocatedVolume>();
-  Result<Payload> payload = PayloadOfVolume(path, located);
+  Result<Payload> payload = located.packed != nullptr ? located.payload : PayloadOfVolume(path, located);
   if (!payload.ok()) return payload.status();
   const std::vector<std::filesystem::path> beside = payload->FilesBeside(path);
   const bool in_order = payload->compressed() || !payload->more.empty();
@@ -110,11 +111,12 @@ Result<std::optional<LocatedVolume>> Described(const std::string& format, const 
     info.slices = SliceOrder{kAxes[along], placed->turn.flipped[along]};
   }
   const int component = header.components > 1 ? options.channel.value_or(0) : 0;
-  return std::optional(LocatedVolume{header, *std::move(payload), placed->turn, component, std::move(info)});
+  return std::optional(LocatedVolume{header, *std::move(payload), located.packed, placed->turn, component, std::move(info)});
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenDescribed(const std::string& path, LocatedVolume volume, const ReadOptions& options,
                                                     const SourceContext& context) {
+  if (volume.packed != nullptr) return OpenPacked(path, std::move(volume), context);
   if (volume.info.slices)
     return std::shared_ptr<VolumeSource>(std::make_shared<SliceStream>(path, std::move(volume), options.progress, context));
   Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume.header, volume.payload, volume.component);
@@ -129,7 +131,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const
                                                const SourceContext& context) {
   if (format.locate == nullptr || options.channel == kLuminance) return OpenDecoded(format, path, options);
   const Result<LocatedSamples> located = format.locate(path, options);
-  if (!located.ok() && format.read != nullptr) return OpenDecoded(format, path, options);
+  if (located.status().code() == StatusCode::kInvalidArgument && format.read != nullptr) return OpenDecoded(format, path, options);
   if (!located.ok()) return located.status();
   Result<std::optional<LocatedVolume>> found = Described(std::string(format.name), path, *located, options);
   if (!found.ok()) return found.status();

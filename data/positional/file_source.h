@@ -1,6 +1,7 @@
 // Volume files as sources, by what their formats say of them (data/volume_io/formats.h):
 //
 //   samples in one piece, uncompressed    any box is read by position (StoredSamples)
+//   the same in base64 or packed blocks   chunks of whole rows or slices are read and decoded (OpenPacked)
 //   compressed, or in several files       read in order (SliceStream)
 //   all others                            decoded as a whole (DecodedSource)
 //

@@ -1,6 +1,7 @@
 // LocatedVolume: what a volume file's header says, where the samples lie, and how they are turned: all but the samples.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace slabstream {
 
 struct LocatedVolume {
   RawHeader header;
-  Payload payload;  // the payload of this volume alone
+  Payload payload;                              // the payload of this volume alone
+  std::shared_ptr<const PackedSamples> packed;  // null: the payload is all
   AxisTurn turn;
   int component = 0;  // the component of a voxel that is read
   SourceInfo info;    // one level; samples as KeptTypeOf says

@@ -113,6 +113,14 @@ std::shared_ptr<ChunkedArray> MakeMappedArray(std::shared_ptr<ChunkedArray> arra
   std::uint64_t mappings = 1;
   for (std::size_t axis = 0; axis < meaning.mapped_axes; ++axis) mappings *= array->shape().size.at(axis);
   CHECK(meaning.mappings.size() == mappings);
+  if (array->shape().type == SampleType::kFloat32) {  // files state doubles for their floats
+    const auto round = [](double& number) {
+      number = std::abs(number) <= std::numeric_limits<float>::max() ? double(float(number)) : number;
+    };
+    std::ranges::for_each(meaning.missing, round);
+    round(meaning.least);
+    round(meaning.most);
+  }
   return std::make_shared<MappedArray>(std::move(array), std::move(meaning));
 }
 

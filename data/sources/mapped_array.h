@@ -26,7 +26,7 @@ struct ElementMeaning {
   bool linear() const;
 };
 
-// `meaning.mappings` has as many as the array has indices there.
+// `meaning.mappings` has as many as the array has indices there. Of an array of float32, limits and missing elements are rounded to that.
 std::shared_ptr<ChunkedArray> MakeMappedArray(std::shared_ptr<ChunkedArray> array, ElementMeaning meaning);
 
 }  // namespace slabstream

@@ -39,6 +39,9 @@ struct SourceLevel {
   // Voxels along each axis of what one read of the source brings at least. Such blocks lie at multiples of it. Whoever cuts boxes there
   // reads no voxel twice.
   Index3 block;
+  // Of an adaptive mesh: where the level has voxels of its own. The others are interpolated between those of the next coarser level. Null:
+  // it has all of them.
+  std::shared_ptr<const std::vector<Box>> refined = {};
 };
 
 // The order of slices in which a stream gives its voxels.

@@ -34,8 +34,8 @@ VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& FileFormats() {
   static const std::vector<VolumeFormat> formats = {
-      Nifti(),          Mgh(), Nrrd(), MetaImage(), Tiff(),     Dicom(), Mrc(), UnstructuredGrid(), VtkLegacy(), VtkImage(),
-      VtkRectilinear(), Npy(), Png(),  Jpeg(),      Jpeg2000(), Bmp(),   Bov(), Raw()};
+      Nifti(), Mgh(), Nrrd(), MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(), VtkLegacy(), VtkImage(), VtkRectilinear(),
+      Npy(),   Png(), Jpeg(), Jpeg2000(),  Bmp(),  Bov(),   Raw()};
   return formats;
 }
 
@@ -45,6 +45,9 @@ bool EndsInOneOf(const std::string& path, const std::vector<std::string_view>& e
   const std::string lower = ToLower(path);
   return std::ranges::any_of(endings, [&](std::string_view ending) { return lower.ends_with(ending); });
 }
+
+constexpr std::string_view kWhyNotOpenFoam =
+    "a case of OpenFOAM, which is not read; foamToVTK writes its grids as .vtm or .vtk, ParaView's Save Data as .vtm";
 
 std::string Joined(const std::vector<std::string_view>& texts) { return fmt::format("{}", fmt::join(texts, ", ")); }
 
@@ -77,12 +80,15 @@ std::string_view WhyUnread(const std::string& path) {
     std::string_view why;
   };
   static const std::vector<Unread> files = {
-      {{".pvtu", ".pvts", ".pvtp", ".pvtk", ".vtm", ".vtmb"},
+      {{".pvtp", ".pvtk"},
        "a list of VTK files, which is not read; ParaView writes what it holds into one .vti, .vtr or .vtu, or open a file of the list"},
-      {{".vts"},
-       "a curvilinear grid of VTK (StructuredGrid), which is not read; ParaView's filter Resample To Image makes an image of it, and "
-       "Tetrahedralize an unstructured grid"},
-      {{".vtp"}, "a surface of VTK (PolyData), which holds no volume"}};
+      {{".vtp"}, "a surface of VTK (PolyData), which holds no volume"},
+      {{".e", ".exo", ".ex2", ".g"}, kWhyNotExodus},
+      {{".cgns"}, kWhyNotCgns},
+      {{".foam"}, kWhyNotOpenFoam},
+      {{".case", ".encas"}, "an EnSight file, which is not read; ParaView's Save Data writes its grid as .vtm"}};
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::path(path) / "system" / "controlDict", error)) return kWhyNotOpenFoam;
   const auto found = std::ranges::find_if(files, [&](const Unread& unread) { return EndsInOneOf(path, unread.endings); });
   return found == files.end() ? "" : found->why;
 }

@@ -69,8 +69,12 @@ const VolumeFormat* FindWritableFormat(const std::string& path);
 bool LooksLikeVolumeFile(const std::string& path);
 // "must end in .nii, .nii.gz, ... or be a folder of ..."
 std::string ReadableText(const std::vector<VolumeFormat>& formats);
-// What a file is that users may bring and that no format reads, and what helps; "": nothing is known of its ending.
+// What a file or folder is that users may bring and that no format reads, and what helps; "": nothing is known of it.
 std::string_view WhyUnread(const std::string& path);
+// The same of grids that may lie in an HDF5 file.
+inline constexpr std::string_view kWhyNotExodus =
+    "an Exodus file, which is not read; ParaView's Save Data writes its grid as .vtm or .vtpc, or meshio convert as .vtu";
+inline constexpr std::string_view kWhyNotCgns = "a CGNS file, which is not read; ParaView's Save Data writes its grid as .vtm or .vtpc";
 // ".nrrd, .mha, ..."
 std::string WritableEndings();
 

@@ -11,134 +11,169 @@
 
 namespace slabstream {
 
-MeshBuilder::MeshBuilder(std::string path, std::string format) : path_(std::move(path)) { result_.info.format = std::move(format); }
+void MeshPiece::Mark(const GhostMark& mark, const WholeNumbers& numbers) {
+  std::vector<bool>& out = mark.at == ValuesAt::kPoints ? points_out : cells_out;
+  out.resize(numbers.size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = out[i] || (numbers[i] & mark.bits) != 0;
+}
 
-Result<std::size_t> MeshBuilder::SetArrays(std::vector<GridArray> arrays, const MeshOptions& options) {
+Result<std::size_t> MeshBuilder::SetArrays(const std::string& path, std::vector<GridArray> arrays, const MeshOptions& options) {
   MeshFileInfo& info = result_.info;
   info.arrays = std::move(arrays);
-  const Result<std::size_t> chosen = ChooseArray(path_, info.arrays, options.array);
+  const Result<std::size_t> chosen = ChooseArray(path, info.arrays, options.array);
   if (!chosen.ok()) return chosen.status();
   info.array = *chosen;
   info.channel = options.channel;
-  if (Status status = CheckChannel(path_, RawHeader{.components = info.arrays[*chosen].components}, {.channel = options.channel});
+  result_.mesh.at = info.arrays[*chosen].at;
+  if (Status status = CheckChannel(path, RawHeader{.components = info.arrays[*chosen].components}, {.channel = options.channel});
       !status.ok())
     return status;
   return *chosen;
 }
 
-Status MeshBuilder::SetPoints(const AlignedVector<double>& places) {
-  AlignedVector<Vector3<float>>& points = result_.mesh.points;
-  const auto place = [&](std::size_t i) { return Vec3{places[3 * i], places[3 * i + 1], places[3 * i + 2]}; };
-  points.resize(places.size() / 3);
-  result_.info.points = std::int64_t(points.size());
-  auto& [low, high] = result_.bounds;
-  low = high = place(0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = place(i);
-    if (!(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z))) return Wrong(fmt::format("point {} is not finite", i));
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], p[axis]);
-      high[axis] = std::max(high[axis], p[axis]);
+float MeshBuilder::ValueOf(std::size_t element) const {
+  const MeshFileInfo& info = result_.info;
+  return TakenComponent(piece_.values.data() + element * std::size_t(info.arrays[info.array].components), info.channel);
+}
+
+Status MeshBuilder::BeginPiece(const std::string& where, MeshPiece piece) {
+  where_ = where;
+  piece_ = std::move(piece);
+  next_ = 0;
+  const std::size_t count = piece_.places.size() / 3;
+  if (const auto all = std::int64_t(points_.all().size() + count); all > kMaxMeshPoints) {
+    return Status::ResourceExhausted(fmt::format("{}: with it the grid has {} points, must be at most {}", where, all, kMaxMeshPoints));
+  }
+  const auto bytes = std::int64_t(count * (kBytesPerMeshPoint + sizeof(PointNumber)));
+  if (Status status = CheckFitsMemory(bytes, where + ": its points"); !status.ok()) return status;
+  points_.BeginPiece(count);
+  numbers_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* const place = piece_.places.data() + 3 * i;
+    if (!(std::isfinite(place[0]) && std::isfinite(place[1]) && std::isfinite(place[2]))) {
+      return Status::InvalidArgument(fmt::format("{}: point {} is not finite", where, i));
     }
+    numbers_[i] = points_.Add({place[0], place[1], place[2], result_.mesh.at == ValuesAt::kPoints ? double(ValueOf(i)) : 0});
   }
-  const Vec3 extent = high - low;
-  for (const Axis axis : kAxes) {
-    if (extent[axis] >= kLeastExtent && extent[axis] <= kMostExtent) continue;
-    return Wrong(
-        fmt::format("its points reach over {} along {}, must be in [{}, {}]", extent[axis], Letter(axis), kLeastExtent, kMostExtent));
-  }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 p = place(i) - low;
-    points[i] = {float(p.x), float(p.y), float(p.z)};
-  }
+  piece_.places = {};
   return Status::Ok();
 }
 
-Status MeshBuilder::SetCells(const AlignedVector<std::int64_t>& kinds, const AlignedVector<std::int64_t>& ends) {
+Result<std::int64_t> MeshBuilder::CheckCells(const WholeNumbers& kinds, const WholeNumbers& ends) {
   std::vector<std::int64_t> counts(CellKinds().size());
   std::int64_t end = 0;
   for (std::size_t cell = 0; cell < kinds.size(); ++cell) {
     const std::int64_t type = kinds[cell];
     const CellKind* const kind = type >= 0 && type < 256 ? FindCellKind(int(type)) : nullptr;
     if (kind == nullptr) {
-      return Wrong(fmt::format(
-          "cell {} has VTK's type {}; supported: tetrahedra (10), voxels (11), hexahedra (12), wedges (13) and pyramids (14). ParaView's "
-          "filter Tetrahedralize makes tetrahedra of others",
-          cell, type));
+      return Status::InvalidArgument(
+          fmt::format("{}: cell {} has VTK's type {}; supported: tetrahedra (10), voxels (11), hexahedra (12), wedges (13) and pyramids "
+                      "(14). ParaView's "
+                      "filter Tetrahedralize makes tetrahedra of others",
+                      where_, cell, type));
     }
     end += kind->points;
     if (ends[cell] != end) {
       return Damaged(fmt::format("the points of cell {}, a {}, end at {}, must end at {}", cell, kind->name, ends[cell], end));
     }
     ++counts[std::size_t(kind - CellKinds().data())];
-    kinds_.push_back(kind);
   }
-  MeshFileInfo& info = result_.info;
-  info.cells = std::int64_t(kinds.size());
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] > 0) info.kinds.push_back({&CellKinds()[i], counts[i]});
+    if (Status status = Reserve(CellKinds()[i], counts[i]); !status.ok()) return status;
   }
-  return ReserveTetrahedra();
+  return end;
 }
 
-Status MeshBuilder::ReserveTetrahedra() {
-  std::int64_t count = 0;
-  for (const MeshFileInfo::CellCount& cells : result_.info.kinds) {
-    std::vector<PointNumber> points(std::size_t(cells.kind->points));
-    std::iota(points.begin(), points.end(), 0U);
-    std::vector<Tetrahedron> parts;
-    SplitCell(*cells.kind, points, parts);
-    count += cells.count * std::int64_t(parts.size());
+Status MeshBuilder::Reserve(const CellKind& kind, std::int64_t cells) {
+  std::vector<PointNumber> points(std::size_t(kind.points));
+  std::iota(points.begin(), points.end(), 0U);
+  std::vector<Tetrahedron> parts;
+  SplitCell(kind, points, parts);
+  Mesh& mesh = result_.mesh;
+  reserved_ += cells * std::int64_t(parts.size());
+  if (reserved_ > kMaxTetrahedra) {
+    return Status::ResourceExhausted(
+        fmt::format("{}: with its cells the grid has {} tetrahedra, must be at most {}", where_, reserved_, kMaxTetrahedra));
   }
-  if (count > kMaxTetrahedra) {
-    return Status::ResourceExhausted(fmt::format("{}: its cells make {} tetrahedra, must be at most {}", path_, count, kMaxTetrahedra));
-  }
-  const auto bytes = std::int64_t(sizeof(Tetrahedron) + sizeof(std::uint32_t) + sizeof(float));
-  if (Status status = CheckFitsMemory(count * bytes, path_ + ": tetrahedra of its cells"); !status.ok()) return status;
-  result_.mesh.tetrahedra.reserve(std::size_t(count));
-  cells_.reserve(std::size_t(count));
+  if (std::size_t(reserved_) <= mesh.tetrahedra.capacity()) return Status::Ok();
+  // More than is needed, if pieces follow each other.
+  const std::size_t count = std::max(std::size_t(reserved_), mesh.tetrahedra.size() * 3 / 2);
+  const Status status = CheckFitsMemory(std::int64_t(count * (sizeof(Tetrahedron) + sizeof(float))), where_ + ": tetrahedra of its cells");
+  if (!status.ok()) return status;
+  mesh.tetrahedra.reserve(count);
+  if (mesh.at == ValuesAt::kCells) mesh.values.reserve(count);
   return Status::Ok();
 }
 
-Status MeshBuilder::AddCorners(const AlignedVector<std::int64_t>& corners, std::int64_t first, std::int64_t points) {
-  std::vector<Tetrahedron>& tetrahedra = result_.mesh.tetrahedra;
+Status MeshBuilder::AddCells(const WholeNumbers& kinds, const WholeNumbers& corners) {
+  Mesh& mesh = result_.mesh;
+  std::vector<Tetrahedron>& tetrahedra = mesh.tetrahedra;
   std::vector<PointNumber> of_cell;
-  for (const std::int64_t* corner = corners.data(); corner != corners.data() + corners.size(); ++next_) {
+  const std::int64_t* corner = corners.data();
+  for (const std::int64_t type : kinds) {
+    const std::size_t cell = next_++, begin = tetrahedra.size();
+    const CellKind& kind = *FindCellKind(int(type));
+    bool left_out = !piece_.cells_out.empty() && piece_.cells_out[cell];
     of_cell.clear();
-    for (const std::int64_t* const end = corner + kinds_[next_]->points; corner != end; ++corner) {
-      if (*corner < 0 || *corner >= points) {
-        return Damaged(fmt::format("cell {} has point {}, must be in [0, {})", next_, *corner, points));
+    for (const std::int64_t* const end = corner + kind.points; corner != end; ++corner) {
+      if (*corner < 0 || *corner >= std::int64_t(numbers_.size())) {
+        return Damaged(fmt::format("cell {} has point {}, must be in [0, {})", cell, *corner, numbers_.size()));
       }
-      of_cell.push_back(PointNumber(first + *corner));
+      left_out = left_out || (!piece_.points_out.empty() && piece_.points_out[std::size_t(*corner)]);
+      of_cell.push_back(numbers_[std::size_t(*corner)]);
     }
-    const std::size_t begin = tetrahedra.size();
-    SplitCell(*kinds_[next_], of_cell, tetrahedra);
+    if (left_out) {
+      ++left_out_;
+      continue;
+    }
+    ++counts_[std::size_t(&kind - CellKinds().data())];
+    SplitCell(kind, of_cell, tetrahedra);
     // A cell with a point twice, as some grids have at their poles, makes parts without a volume.
     const auto flat = [](const Tetrahedron& t) {
       return t[0] == t[1] || t[0] == t[2] || t[0] == t[3] || t[1] == t[2] || t[1] == t[3] || t[2] == t[3];
     };
     tetrahedra.erase(std::remove_if(tetrahedra.begin() + std::ptrdiff_t(begin), tetrahedra.end(), flat), tetrahedra.end());
-    cells_.resize(tetrahedra.size(), std::uint32_t(next_));
+    if (mesh.at == ValuesAt::kCells) mesh.values.resize(tetrahedra.size(), ValueOf(cell));
   }
   return Status::Ok();
 }
 
-Status MeshBuilder::SetValues(const AlignedVector<float>& values) {
-  Mesh& mesh = result_.mesh;
-  if (mesh.tetrahedra.empty()) return Wrong("has no cells with a volume");
-  const GridArray& array = result_.info.arrays[result_.info.array];
-  const auto value = [&](std::size_t element) {
-    return TakenComponent(values.data() + element * std::size_t(array.components), result_.info.channel);
-  };
-  mesh.at = array.at;
-  if (mesh.at == ValuesAt::kPoints) {
-    mesh.values.resize(mesh.points.size());
-    for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.values[i] = value(i);
-  } else {
-    mesh.values.resize(mesh.tetrahedra.size());
-    std::ranges::transform(cells_, mesh.values.begin(), value);
+Result<LoadedMesh> MeshBuilder::Finish(const std::string& path) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
+  auto& [info, bounds, mesh] = result_;
+  const std::string left_out = fmt::format("{} cells are left out, which the file calls ghosts, refined or hidden", left_out_);
+  if (left_out_ > 0) info.notes.push_back(left_out);
+  if (mesh.tetrahedra.empty()) return wrong("has no cells with a volume" + (left_out_ > 0 ? "; " + left_out : ""));
+  piece_ = {};
+  numbers_ = {};
+  const AlignedVector<MeshPoint>& points = points_.all();
+  info.points = std::int64_t(points.size());
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    info.cells += counts_[i];
+    if (counts_[i] > 0) info.kinds.push_back({&CellKinds()[i], counts_[i]});
   }
-  return Status::Ok();
+  bounds.low = bounds.high = {points[0][0], points[0][1], points[0][2]};
+  for (const MeshPoint& point : points) {
+    for (int axis = 0; axis < 3; ++axis) {
+      bounds.low[axis] = std::min(bounds.low[axis], point[std::size_t(axis)]);
+      bounds.high[axis] = std::max(bounds.high[axis], point[std::size_t(axis)]);
+    }
+  }
+  const Vec3 extent = bounds.high - bounds.low;
+  for (const Axis axis : kAxes) {
+    if (extent[axis] >= kLeastExtent && extent[axis] <= kMostExtent) continue;
+    return wrong(
+        fmt::format("its points reach over {} along {}, must be in [{}, {}]", extent[axis], Letter(axis), kLeastExtent, kMostExtent));
+  }
+  const auto bytes = std::int64_t(points.size() * (sizeof(mesh.points[0]) + sizeof(float)));
+  if (Status status = CheckFitsMemory(bytes, path + ": its points"); !status.ok()) return status;
+  mesh.points.reserve(points.size());
+  if (mesh.at == ValuesAt::kPoints) mesh.values.reserve(points.size());
+  for (const auto& [x, y, z, value] : points) {
+    mesh.points.push_back({float(x - bounds.low.x), float(y - bounds.low.y), float(z - bounds.low.z)});
+    if (mesh.at == ValuesAt::kPoints) mesh.values.push_back(float(value));
+  }
+  return std::move(result_);
 }
 
 }  // namespace slabstream

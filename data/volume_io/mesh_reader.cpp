@@ -1,5 +1,7 @@
 #include "data/volume_io/mesh_reader.h"
 
+#include <algorithm>
+
 #include "data/volume_io/mesh_formats.h"
 #include "data/volume_io/text_header.h"
 #include "data/volume_io/vtk_legacy_file.h"
@@ -8,7 +10,9 @@ namespace slabstream {
 
 bool LooksLikeMesh(const std::string& path) {
   const std::string name = ToLower(path);
-  return name.ends_with(".vtu") || (name.ends_with(".vtk") && VtkLegacyFile::KindOf(path) == "UNSTRUCTURED_GRID");
+  if (!name.ends_with(".vtk")) return std::ranges::any_of(kXmlGridEndings, [&](std::string_view ending) { return name.ends_with(ending); });
+  const std::optional<std::string> kind = VtkLegacyFile::KindOf(path);
+  return kind == "UNSTRUCTURED_GRID" || kind == "STRUCTURED_GRID";
 }
 
 Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options) {

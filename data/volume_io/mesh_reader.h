@@ -1,14 +1,18 @@
-// Files of unstructured grids to meshes: VTK's XML files (.vtu), whose pieces follow each other, in any encoding (vtk_xml.h); legacy VTK
-// files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells without a volume are
-// counted and left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in each part, not
-// trilinear in the cell.
+// Files of unstructured and curvilinear grids to meshes: VTK's XML files (.vtu, .vts) in any encoding (vtk_xml.h), and lists of them
+// (.pvtu, .pvts, .vtm; vtk_list.h), whose pieces become one grid; legacy VTK files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra,
+// hexahedra, voxels, wedges and pyramids are read; cells without a volume are counted and left out, those that VTK marks as ghosts
+// (mesh_builder.h) are left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in each part,
+// not trilinear in the cell.
 //
 // All functions may be called from any thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -20,16 +24,18 @@
 namespace slabstream {
 
 struct MeshFileInfo {
-  std::string format;  // "VTK unstructured grid", "VTK unstructured grid, legacy"
+  std::string format;  // "VTK unstructured grid, legacy", "VTK PUnstructuredGrid, 4 files"
   std::int64_t points = 0, cells = 0;
   struct CellCount {
     const CellKind* kind = nullptr;
     std::int64_t count = 0;
   };
-  std::vector<CellCount> kinds;   // the kinds that occur, in the order of CellKinds()
-  std::vector<GridArray> arrays;  // in the file's order
-  std::size_t array = 0;          // the one that is read, of `arrays`
-  std::optional<int> channel{};   // the component that is read: that of MeshOptions
+  std::vector<CellCount> kinds;                         // the kinds that occur, in the order of CellKinds()
+  std::vector<GridArray> arrays;                        // in the file's order
+  std::size_t array = 0;                                // the one that is read, of `arrays`
+  std::optional<int> channel{};                         // the component that is read: that of MeshOptions
+  std::vector<std::string> notes = {};                  // a sentence each of what was left out: SourceInfo
+  std::vector<std::filesystem::path> other_files = {};  // that were read beside the path
 };
 
 struct LoadedMesh {
@@ -46,6 +52,8 @@ struct MeshOptions {
   // Checks what can be checked without points, cells and values; the mesh has none then, and no bounds.
   bool headers_only = false;
 };
+
+inline constexpr std::array<std::string_view, 8> kXmlGridEndings = {".vtu", ".pvtu", ".vts", ".pvts", ".vtm", ".vtmb", ".vtpd", ".vtpc"};
 
 // By its ending; a legacy VTK file by what it says of its dataset.
 bool LooksLikeMesh(const std::string& path);

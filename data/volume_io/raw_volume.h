@@ -60,10 +60,14 @@ struct RawHeader {
   }
 };
 
+struct PackedSamples;
+
 // What a header says: the volume, and where its samples lie.
 struct LocatedSamples {
   RawHeader header;
   Payload payload;  // the samples of all volumes
+  // Where they lie if that is not how they are stored; then the payload does not matter.
+  std::shared_ptr<const PackedSamples> packed = {};
 };
 
 struct RawVolume {

@@ -1,4 +1,5 @@
-// Volume files with a text header, NRRD, MetaImage and BOV: lines "key: value" or "key = value", then the samples, or the name of their file.
+// Volume files with a text header, NRRD, MetaImage and BOV: lines "key: value" or "key = value", then the samples, or the name of their
+// file.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Unstructured grids as volumes: their values on a lattice, and their cells beside them.
+// Unstructured and curvilinear grids as volumes: their values on a lattice, and their cells beside them.
 #include <optional>
 #include <utility>
 
@@ -15,14 +15,17 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   Result<LoadedMesh> loaded =
       ReadMesh(path, {.array = options.array, .time = options.time, .channel = channel, .headers_only = options.headers_only});
   if (!loaded.ok()) return loaded.status();
-  if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}, .size_unknown = true};
+  RawVolume raw = {.other_files = loaded->info.other_files};
+  raw.header.type = SampleType::kFloat32;
+  raw.header.notes = loaded->info.notes;
+  raw.size_unknown = options.headers_only;
+  raw.header.size = {1, 1, 1};
+  if (options.headers_only) return raw;
   const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
-  RawVolume raw;
   raw.header.size = lattice.size;
   raw.header.world = lattice.orientation.world;
   raw.header.steps = StepsOf(lattice.spacing);
   raw.header.origin = lattice.orientation.origin;
-  raw.header.type = SampleType::kFloat32;
   const auto bytes = std::int64_t(loaded->mesh.bytes()) + raw.header.sample_bytes();
   if (Status status = CheckFitsMemory(bytes, path + ": its cells in order, and their lattice"); !status.ok()) return status;
   MoveToLattice(lattice, loaded->mesh);
@@ -35,8 +38,10 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 }  // namespace
 
 VolumeFormat UnstructuredGrid() {
+  std::vector<std::string_view> endings(kXmlGridEndings.begin(), kXmlGridEndings.end());
+  endings.emplace_back(".vtk");
   return {.name = "VTK unstructured grid",
-          .endings = {".vtu", ".vtk"},
+          .endings = std::move(endings),
           .claims = LooksLikeMesh,
           .options = {"time", "channel", "array", "lattice"},
           .read = Read};

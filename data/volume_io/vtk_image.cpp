@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -16,6 +15,7 @@
 #include "data/volume_io/output.h"
 #include "data/volume_io/structured_grid.h"
 #include "data/volume_io/text_header.h"
+#include "data/volume_io/vtk_extent.h"
 #include "data/volume_io/vtk_image.h"
 #include "data/volume_io/vtk_xml.h"
 
@@ -26,29 +26,7 @@ constexpr std::string_view kImage = "ImageData", kRectilinear = "RectilinearGrid
 // Of the formats.
 constexpr std::string_view kImageName = "VTK image", kRectilinearName = "VTK rectilinear grid";
 
-// Points of a grid, from `begin` to `end` along each axis, both included.
-struct Extent {
-  std::array<std::int64_t, 3> begin{}, end{};
-
-  bool empty() const { return end[0] < begin[0] || end[1] < begin[1] || end[2] < begin[2]; }
-  std::int64_t Points(std::size_t axis) const { return end[axis] - begin[axis] + 1; }
-  friend bool operator==(const Extent&, const Extent&) = default;
-};
-
-Result<Extent> ExtentOf(const VtkXmlFile& file, const XmlTag& tag, const std::string& key) {
-  const Result<std::vector<double>> numbers = file.Numbers(tag, key, 6, {});
-  if (!numbers.ok()) return numbers.status();
-  Extent extent;
-  for (std::size_t i = 0; i < 6; ++i) {
-    constexpr double kMost = 1 << 30;
-    const double number = (*numbers)[i];
-    if (!(std::abs(number) <= kMost) || number != std::floor(number)) {
-      return file.Wrong(fmt::format("{} of {} is '{}', must be 6 whole numbers", key, tag.name, tag.Attribute(key)));
-    }
-    (i % 2 == 0 ? extent.begin : extent.end)[i / 2] = std::int64_t(number);
-  }
-  return extent;
-}
+using Extent = PointExtent;
 
 struct Piece {
   std::size_t number = 0;  // in the file
@@ -237,9 +215,9 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   if (!image.ok()) return image.status();
   const auto& [file, pieces, bounds, array, arrays, at, header] = **image;
   if (pieces.size() > 1 || file.times().count > 1) return file.Wrong("its samples lie in several pieces, or are of several times");
-  const auto plain = file.FindPlainSamples(*arrays[0], header.type, (*image)->Samples(pieces[0]));
-  if (!plain.ok()) return plain.status();
-  return LocatedSamples{header, {.file = path, .offset = plain->begin, .big_endian = plain->big_endian}};
+  Result<LocatedSamples> located = file.Locate(*arrays[0], header.type, (*image)->Samples(pieces[0]));
+  if (located.ok()) located->header = header;
+  return located;
 }
 
 // Samples of any encoding, also those that `Locate` finds.

@@ -81,8 +81,8 @@ Result<VtkLegacyFile> VtkLegacyFile::Open(const std::string& path, const std::ve
   if (!file.cursor_.is_open()) return Status::NotFound(path + ": cannot be opened for reading");
   if (Status status = file.ReadStart(); !status.ok()) return status;
   if (std::ranges::find(kinds, file.kind_) == kinds.end()) {
-    return file.Wrong(
-        fmt::format("a VTK dataset of type {}, must be STRUCTURED_POINTS, RECTILINEAR_GRID or UNSTRUCTURED_GRID", file.kind_));
+    return file.Wrong(fmt::format(
+        "a VTK dataset of type {}, must be STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID or UNSTRUCTURED_GRID", file.kind_));
   }
   if (Status status = file.ReadKeywords(); !status.ok()) return status;
   return file;

@@ -1,45 +1,39 @@
-// Unstructured grids in legacy VTK files (vtk_legacy_file.h).
+// Unstructured and curvilinear grids in legacy VTK files (vtk_legacy_file.h).
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 
 #include "data/volume_io/mesh_builder.h"
 #include "data/volume_io/mesh_formats.h"
+#include "data/volume_io/structured_cells.h"
 #include "data/volume_io/vtk_legacy_file.h"
 
 namespace slabstream {
 namespace {
-
-using WholeNumbers = AlignedVector<std::int64_t>;
 
 // Where the points of each cell end among those of all, and these.
 struct CellPoints {
   WholeNumbers ends, corners;
 };
 
+constexpr std::string_view kCurvilinear = "STRUCTURED_GRID";
 constexpr std::int64_t kMostCorners = std::int64_t{1} << 40;
 
 class LegacyGridReader {
  public:
-  LegacyGridReader(const std::string& path, VtkLegacyFile file)
-      : path_(path), file_(std::move(file)), builder_(path, "VTK unstructured grid, legacy") {}
+  LegacyGridReader(const std::string& path, VtkLegacyFile file) : path_(path), file_(std::move(file)) {}
 
   Result<LoadedMesh> Read(const MeshOptions& options) {
     const OfferedArrays offered = file_.Offered();
-    const Result<std::size_t> chosen = builder_.SetArrays(offered.arrays, options);
+    const Result<std::size_t> chosen = builder_.SetArrays(path_, offered.arrays, options);
     if (!chosen.ok()) return chosen.status();
-    if (options.headers_only) return builder_.Take();
-    const VtkLegacyArray& array = file_.arrays()[offered.numbers[*chosen]];
-    if (Status status = ReadPoints(); !status.ok()) return status;
-    if (Status status = ReadCells(); !status.ok()) return status;
-    const bool of_points = array.section == "POINT_DATA";
-    if (const std::int64_t elements = of_points ? file_.Own("POINTS")->tuples : file_.cells(); array.tuples != elements) {
-      return file_.Damaged(fmt::format("{} has {} elements, the grid has {}", array.section, array.tuples, elements));
-    }
-    const Result<AlignedVector<float>> values = file_.ReadNumbers<float>(array);
-    if (!values.ok()) return values.status();
-    if (Status status = builder_.SetValues(*values); !status.ok()) return status;
-    return builder_.Take();
+    if (options.headers_only) return builder_.TakeHeaders();
+    if (Status status = ReadPoints(file_.arrays()[offered.numbers[*chosen]]); !status.ok()) return status;
+    if (Status status = file_.kind() == kCurvilinear ? AddStructuredCells(grid_, builder_) : ReadCells(); !status.ok()) return status;
+    Result<LoadedMesh> loaded = builder_.Finish(path_);
+    if (loaded.ok()) loaded->info.format = fmt::format("VTK {}, legacy", file_.kind());
+    return loaded;
   }
 
  private:
@@ -52,13 +46,15 @@ class LegacyGridReader {
     return array;
   }
 
+  Result<WholeNumbers> Whole(const VtkLegacyArray& array) {
+    const bool whole = array.supported && array.type != SampleType::kFloat32 && array.type != SampleType::kFloat64;
+    if (whole && array.components == 1) return file_.ReadNumbers<std::int64_t>(array);
+    return file_.Wrong(fmt::format("{} has no whole numbers", array.name));
+  }
+
   Result<WholeNumbers> OfCells(const std::string& name, std::int64_t most) {
     const Result<VtkLegacyArray> array = Own(name, most);
-    if (!array.ok()) return array.status();
-    if (array->type == SampleType::kFloat32 || array->type == SampleType::kFloat64) {
-      return file_.Wrong(fmt::format("{} has no whole numbers", name));
-    }
-    return file_.ReadNumbers<std::int64_t>(*array);
+    return array.ok() ? Whole(*array) : array.status();
   }
 
   Result<CellPoints> ReadCountedCells() {
@@ -87,11 +83,56 @@ class LegacyGridReader {
     return CellPoints{*std::move(offsets), *std::move(corners)};
   }
 
-  Status ReadPoints() {
-    const Result<VtkLegacyArray> array = Own("POINTS", kMaxMeshPoints);
-    if (!array.ok()) return array.status();
-    const Result<AlignedVector<double>> places = file_.ReadNumbers<double>(*array);
-    return places.ok() ? builder_.SetPoints(*places) : places.status();
+  // With their values, or those of the cells.
+  Status ReadPoints(const VtkLegacyArray& values) {
+    const Result<VtkLegacyArray> places = Own("POINTS", kMaxMeshPoints);
+    if (!places.ok()) return places.status();
+    if (file_.kind() == kCurvilinear) {
+      if (Status status = FindGrid(places->tuples); !status.ok()) return status;
+    }
+    const std::int64_t cells = file_.kind() == kCurvilinear ? (grid_[0] - 1) * (grid_[1] - 1) * (grid_[2] - 1) : file_.cells();
+    const auto suits = [&](const VtkLegacyArray& array) {
+      const std::int64_t elements = array.section == "POINT_DATA" ? places->tuples : cells;
+      if (array.tuples == elements) return Status::Ok();
+      return file_.Damaged(fmt::format("{} has {} elements, the grid has {}", array.section, array.tuples, elements));
+    };
+    if (Status status = suits(values); !status.ok()) return status;
+    MeshPiece piece;
+    auto read_places = file_.ReadNumbers<double>(*places);
+    if (!read_places.ok()) return read_places.status();
+    piece.places = *std::move(read_places);
+    auto read_values = file_.ReadNumbers<float>(values);
+    if (!read_values.ok()) return read_values.status();
+    piece.values = *std::move(read_values);
+    for (const GhostMark& mark : kGhostMarks) {
+      const std::string_view section = mark.at == ValuesAt::kPoints ? "POINT_DATA" : "CELL_DATA";
+      for (const VtkLegacyArray& array : file_.arrays()) {
+        if (array.section != section || array.name != mark.name) continue;
+        if (Status status = suits(array); !status.ok()) return status;
+        const Result<WholeNumbers> numbers = Whole(array);
+        if (!numbers.ok()) return numbers.status();
+        piece.Mark(mark, *numbers);
+      }
+    }
+    return builder_.BeginPiece(path_, std::move(piece));
+  }
+
+  // The sizes of a curvilinear grid, which has so many points.
+  Status FindGrid(std::int64_t points) {
+    const Vec3 sizes = file_.Three("DIMENSIONS", {});
+    for (const Axis axis : kAxes) {
+      const double size = sizes[axis];
+      if (!(size >= 1 && size <= double(kMaxMeshPoints) && size == std::floor(size))) {
+        return file_.Wrong(
+            fmt::format("DIMENSIONS has {} along {}, must be a whole number in [1, {}]", size, Letter(axis), kMaxMeshPoints));
+      }
+      grid_[std::size_t(Number(axis))] = std::int64_t(size);
+    }
+    if (Status status = CheckPointCount(path_, grid_); !status.ok()) return status;
+    if (grid_[0] * grid_[1] * grid_[2] != points) {
+      return file_.Damaged(fmt::format("has {} POINTS, its DIMENSIONS state {}", points, ToText(grid_)));
+    }
+    return HasVolume(grid_) ? Status::Ok() : file_.Wrong(fmt::format("is flat, {}, and so has no volume", ToText(grid_)));
   }
 
   Status ReadCells() {
@@ -103,22 +144,24 @@ class LegacyGridReader {
       return file_.Damaged(fmt::format("CELLS states {} cells and has {}, CELL_TYPES has {}, must be one number", file_.cells(),
                                        points->ends.size(), kinds->size()));
     }
-    if (Status status = builder_.SetCells(*kinds, points->ends); !status.ok()) return status;
-    if (points->ends.back() != std::int64_t(points->corners.size())) {
-      return file_.Damaged(fmt::format("CONNECTIVITY has {} points of cells, must have {}", points->corners.size(), points->ends.back()));
+    const Result<std::int64_t> count = builder_.CheckCells(*kinds, points->ends);
+    if (!count.ok()) return count.status();
+    if (*count != std::int64_t(points->corners.size())) {
+      return file_.Damaged(fmt::format("CONNECTIVITY has {} points of cells, must have {}", points->corners.size(), *count));
     }
-    return builder_.AddCorners(points->corners, 0, file_.Own("POINTS")->tuples);
+    return builder_.AddCells(*kinds, points->corners);
   }
 
   const std::string& path_;
   VtkLegacyFile file_;
   MeshBuilder builder_;
+  GridPoints grid_ = {};  // of a curvilinear grid
 };
 
 }  // namespace
 
 Result<LoadedMesh> ReadVtkLegacyGrid(const std::string& path, const MeshOptions& options) {
-  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, {"UNSTRUCTURED_GRID"});
+  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, {"UNSTRUCTURED_GRID", kCurvilinear});
   if (!file.ok()) return file.status();
   return LegacyGridReader(path, *std::move(file)).Read(options);
 }

@@ -14,29 +14,30 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/text/base64.h"
 #include "common/text/parse_number.h"
 #include "common/text/trimmed.h"
+#include "common/volume/memory_budget.h"
 #include "data/codecs/codecs.h"
-#include "data/volume_io/payload.h"
+#include "data/volume_io/packed_samples.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/stated_field.h"
 #include "data/volume_io/text_cursor.h"
 
 namespace slabstream {
+namespace {
 
-struct VtkCompressor {
+struct Compressor {
   std::string_view name;
   SharedCodec codec;
   std::int64_t most_ratio = 1;  // of the bytes of a block to those that are stored, at most
 };
 
-namespace {
-
-const std::vector<VtkCompressor>& Compressors() {
+const std::vector<Compressor>& Compressors() {
   // LZ4: a byte of a length stands for 255. xz packs zeros about 7000:1.
-  static const std::vector<VtkCompressor> compressors = {{"vtkZLibDataCompressor", ZlibCodec(), kMaxDeflateRatio},
-                                                         {"vtkLZ4DataCompressor", Lz4BlockCodec(), 256},
-                                                         {"vtkLZMADataCompressor", XzCodec(), 16384}};
+  static const std::vector<Compressor> compressors = {{"vtkZLibDataCompressor", ZlibCodec(), kMaxDeflateRatio},
+                                                      {"vtkLZ4DataCompressor", Lz4BlockCodec(), 256},
+                                                      {"vtkLZMADataCompressor", XzCodec(), 16384}};
   return compressors;
 }
 
@@ -54,7 +55,18 @@ constexpr std::array<std::pair<std::string_view, SampleType>, 10> kTypes = {{{"I
 // The bytes of the file [begin, end), decoded or not.
 class ByteSource {
  public:
-  ByteSource(const std::string& path, std::int64_t begin, std::int64_t end, bool base64) : cursor_(path, begin, end), base64_(base64) {}
+  ByteSource(const std::string& path, std::int64_t begin, std::int64_t end, bool base64)
+      : cursor_(path, begin, end), end_(end), base64_(base64) {}
+
+  std::int64_t left() const { return std::max<std::int64_t>(end_ - cursor_.offset(), 0); }  // bytes of the file, at most
+  // Says where the bytes that are read next lie: in base64, if there are no blanks among the letters. How far back that is.
+  std::int64_t SetPlace(PackedSamples& samples) const {
+    const std::int64_t back = group_.empty() ? 0 : kGroup;
+    samples.base64 = base64_;
+    samples.begin = std::uint64_t(cursor_.offset() - back);
+    samples.before = group_.empty() ? 0 : decoded_.size() - group_.size();
+    return back;
+  }
 
   // How many bytes there were, at most out.size().
   std::size_t Read(std::span<std::byte> out) {
@@ -70,23 +82,17 @@ class ByteSource {
   }
 
  private:
-  static int Digit(char c) {
-    if (c >= 'A' && c <= 'Z') return c - 'A';
-    if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-    if (c >= '0' && c <= '9') return c - '0' + 52;
-    return c == '+' ? 62 : c == '/' ? 63 : -1;
-  }
-
   // Four letters stand for three bytes. Each = at the end of the four stands for one byte less. A header is encoded by itself, so such an
   // end may come before more letters.
   bool NextGroup() {
     unsigned bits = 0;
-    std::size_t letters = 0, padding = 0;
-    while (letters < 4) {
+    std::size_t padding = 0;
+    std::int64_t letters = 0;
+    while (letters < kGroup) {
       const std::optional<char> c = cursor_.Next();
       if (!c) return false;
       if (*c == ' ' || *c == '\n' || *c == '\r' || *c == '\t') continue;
-      const int digit = *c == '=' ? 0 : Digit(*c);
+      const int digit = *c == '=' ? 0 : Base64Digit(*c);
       if (digit < 0) return false;
       padding += *c == '=' ? 1 : 0;
       bits = bits << 6 | unsigned(digit);
@@ -98,7 +104,10 @@ class ByteSource {
     return true;
   }
 
+  static constexpr std::int64_t kGroup = 4;  // letters
+
   TextCursor cursor_;
+  std::int64_t end_;
   bool base64_;
   std::array<std::byte, 3> decoded_{};
   std::span<std::byte> group_;
@@ -124,22 +133,8 @@ Result<std::uint64_t> ReadCount(ByteSource& source, const HeaderFormat& header) 
   return std::bit_cast<std::uint64_t>(bytes);
 }
 
-// Of samples that are not compressed: they must have that many bytes.
-Status CheckCount(ByteSource& source, const HeaderFormat& header, std::uint64_t wanted) {
-  const Result<std::uint64_t> bytes = ReadCount(source, header);
-  if (!bytes.ok()) return bytes.status();
-  return *bytes == wanted ? Status::Ok() : Status::DataLoss(fmt::format("has {} bytes, must have {}", *bytes, wanted));
-}
-
-Status ReadPlain(ByteSource& source, const HeaderFormat& header, std::span<std::byte> out) {
-  if (Status status = CheckCount(source, header, out.size()); !status.ok()) return status;
-  const std::size_t found = source.Read(out);
-  return found == out.size() ? Status::Ok() : Status::DataLoss(fmt::format("truncated: has {} of {} bytes", found, out.size()));
-}
-
 // The number of blocks, the size of all but the last, the size of the last if it is less (else 0), and the size of each when compressed.
-Status ReadBlocks(ByteSource& source, const HeaderFormat& format, const ChunkCodec& codec, std::int64_t file_bytes,
-                  std::span<std::byte> out) {
+Status ReadBlockSizes(ByteSource& source, const HeaderFormat& format, PackedSamples& samples) {
   std::array<std::uint64_t, 3> header{};
   for (std::uint64_t& number : header) {
     const Result<std::uint64_t> read = ReadCount(source, format);
@@ -147,7 +142,7 @@ Status ReadBlocks(ByteSource& source, const HeaderFormat& format, const ChunkCod
     number = *read;
   }
   const auto [blocks, block_bytes, last_bytes] = header;
-  const std::uint64_t wanted = out.size(), full = last_bytes == 0 ? blocks : blocks - 1;
+  const std::uint64_t wanted = samples.bytes, full = last_bytes == 0 ? blocks : blocks - 1;
   // Compare without multiplying what may be huge.
   const bool fits = blocks > 0 && block_bytes > 0 && last_bytes <= block_bytes && full <= wanted / block_bytes &&
                     full * block_bytes + last_bytes == wanted;
@@ -155,24 +150,77 @@ Status ReadBlocks(ByteSource& source, const HeaderFormat& format, const ChunkCod
     return Status::DataLoss(
         fmt::format("has {} blocks of {} bytes and {} in the last one, must have {} in all", blocks, block_bytes, last_bytes, wanted));
   }
-  std::vector<std::uint64_t> packed_bytes;
-  for (std::uint64_t i = 0; i < blocks; ++i) {  // no more than the samples have bytes
+  if (const auto most = std::uint64_t(source.left() / format.bytes()); blocks > most) {
+    return Status::DataLoss(fmt::format("truncated: speaks of {} blocks, has the sizes of {} at most", blocks, most));
+  }
+  if (Status status = CheckFitsMemory(std::int64_t(blocks * sizeof(std::uint64_t)), "the sizes of its blocks"); !status.ok()) return status;
+  samples.block_bytes = std::min(block_bytes, wanted);
+  samples.block_ends.reserve(blocks);
+  std::uint64_t end = 0;
+  for (std::uint64_t i = 0; i < blocks; ++i) {
+    constexpr std::uint64_t kFrame = 256;  // compressors add checksums and headers to what does not shrink
     const Result<std::uint64_t> bytes = ReadCount(source, format);
     if (!bytes.ok()) return bytes.status();
-    if (*bytes > std::uint64_t(file_bytes))
-      return Status::DataLoss(fmt::format("block {} has {} bytes, the file {}", i, *bytes, file_bytes));
-    packed_bytes.push_back(*bytes);
-  }
-  for (std::uint64_t i = 0; i < blocks; ++i) {
-    std::vector<std::byte> packed(packed_bytes[i]);
-    const std::size_t bytes = std::min<std::size_t>(block_bytes, out.size());
-    if (source.Read(packed) != packed.size()) return Status::DataLoss(fmt::format("block {} is truncated", i));
-    const Result<Bytes> unpacked = codec.Decode(Bytes(std::move(packed)), bytes);
-    if (!unpacked.ok() || unpacked->size() != bytes) return Status::DataLoss(fmt::format("block {} is damaged", i));
-    std::ranges::copy(unpacked->span(), out.begin());
-    out = out.subspan(bytes);
+    const std::uint64_t most = 2 * std::min(samples.block_bytes, wanted - i * samples.block_bytes) + kFrame;
+    if (*bytes > most) return Status::DataLoss(fmt::format("block {} has {} compressed bytes, must have at most {}", i, *bytes, most));
+    samples.block_ends.push_back(end += *bytes);
   }
   return Status::Ok();
+}
+
+// Reads the header in front of `bytes` of samples. `codec`: null if they are not compressed.
+Result<PackedSamples> ReadHeader(ByteSource& source, const HeaderFormat& format, SharedCodec codec, std::uint64_t bytes) {
+  PackedSamples samples{.bytes = bytes, .codec = std::move(codec), .big_endian = format.big_endian};
+  if (samples.codec != nullptr) {
+    if (Status status = ReadBlockSizes(source, format, samples); !status.ok()) return status;
+  } else {
+    const Result<std::uint64_t> stated = ReadCount(source, format);
+    if (!stated.ok()) return stated.status();
+    if (*stated != bytes) return Status::DataLoss(fmt::format("has {} bytes, must have {}", *stated, bytes));
+  }
+  const std::int64_t left = source.left() + source.SetPlace(samples);
+  if (const std::uint64_t needed = samples.Stored({0, bytes}).bytes; needed > std::uint64_t(left)) {
+    return Status::DataLoss(fmt::format("truncated: needs {} bytes of the file, has {}", needed, left));
+  }
+  return samples;
+}
+
+Status ReadBytes(ByteSource& source, const PackedSamples& samples, std::span<std::byte> out) {
+  if (samples.codec == nullptr) {
+    const std::size_t found = source.Read(out);
+    return found == out.size() ? Status::Ok() : Status::DataLoss(fmt::format("truncated: has {} of {} bytes", found, out.size()));
+  }
+  for (std::size_t i = 0; i < samples.block_ends.size(); ++i) {
+    std::vector<std::byte> packed(samples.PlaceOf(i).bytes);
+    if (source.Read(packed) != packed.size()) return Status::DataLoss(fmt::format("block {} is truncated", i));
+    const Result<Bytes> block = samples.DecodeBlock(i, Bytes(std::move(packed)));
+    if (!block.ok()) return block.status();
+    std::ranges::copy(block->span(), out.begin());
+    out = out.subspan(block->size());
+  }
+  return Status::Ok();
+}
+
+// That the samples can be read in parts: blocks are neither so large that one is a burden, nor so small that most of what is read may be
+// frames, and letters of base64 follow each other, as far as their ends tell. `end`: where the samples must end in the file; none: not
+// known.
+Status CheckParts(const PackedSamples& samples, const std::string& path, std::optional<std::int64_t> end) {
+  constexpr std::uint64_t kLeastBlock = 64, kMostBlock = std::uint64_t{64} << 20, kLetters = 4096;
+  if (samples.block_bytes > kMostBlock || samples.block_ends.size() > samples.bytes / kLeastBlock + 1) {
+    return Status::InvalidArgument(
+        fmt::format("has blocks of {} bytes, must have {} to {} to be read in parts", samples.block_bytes, kLeastBlock, kMostBlock));
+  }
+  if (!samples.base64) return Status::Ok();
+  const auto [begin, bytes] = samples.Stored({0, samples.bytes});
+  std::vector<std::byte> letters(std::min(bytes, kLetters)), decoded(letters.size());
+  bool follow = true;
+  for (const std::uint64_t from : {begin, begin + bytes - letters.size()}) {
+    TextCursor cursor(path, std::int64_t(from));
+    follow = follow && cursor.Read(letters) == letters.size() && DecodeBase64(letters, decoded);
+  }
+  // Blanks anywhere would move the last letters behind their place.
+  if (end) follow = follow && Base64Digit(TextCursor(path, std::int64_t(begin + bytes), *end).Next().value_or(' ')) < 0;
+  return follow ? Status::Ok() : Status::InvalidArgument("has letters of base64 with blanks among them");
 }
 
 }  // namespace
@@ -345,12 +393,14 @@ Result<VtkArrayType> VtkXmlFile::TypeOf(const VtkArray& array, int most_componen
 Result<VtkXmlFile::Place> VtkXmlFile::PlaceOf(const VtkArray& array) const {
   const std::string name = array.name(), format = array.tag.Attribute("format"), compressor = file_.Attribute("compressor");
   const bool appended = format == "appended";
-  Place place = {.text = format == "ascii", .begin = array.begin, .end = array.end};
+  Place place = {.text = format == "ascii", .appended = appended, .begin = array.begin, .end = array.end};
   if (!place.text && !compressor.empty()) {
-    place.compressor = FindNamed(Compressors(), compressor);
-    if (place.compressor == nullptr) {
+    const auto* const found = FindNamed(Compressors(), compressor);
+    if (found == nullptr) {
       return Wrong(fmt::format("compressor {} is not supported; supported: {}", compressor, NamesOf(Compressors())));
     }
+    place.codec = found->codec;
+    place.most_ratio = found->most_ratio;
   }
   if (!place.text && !appended && format != "binary") {
     return Wrong(fmt::format("array {}: format '{}', must be ascii, binary or appended", name, format));
@@ -359,15 +409,15 @@ Result<VtkXmlFile::Place> VtkXmlFile::PlaceOf(const VtkArray& array) const {
   if (appended && place.base64 && appended_encoding_ != "base64" && !appended_encoding_.empty()) {
     return Wrong(fmt::format("its appended samples have encoding '{}', must be raw or base64", appended_encoding_));
   }
-  std::error_code error;
-  place.file_bytes = std::int64_t(std::filesystem::file_size(path_, error));
-  if (error) return Status::NotFound(path_ + ": cannot be opened for reading");
   if (!appended) return place;
+  std::error_code error;
+  const auto file_bytes = std::int64_t(std::filesystem::file_size(path_, error));
+  if (error) return Status::NotFound(path_ + ": cannot be opened for reading");
   const std::string offset = array.tag.Attribute("offset");
   const std::optional<std::int64_t> bytes = ParseNumber<std::int64_t>(offset);
   if (!bytes || *bytes < 0 || appended_ == 0) return Wrong(fmt::format("array {}: offset '{}' of appended samples", name, offset));
-  place.begin = std::min(*bytes, place.file_bytes) + appended_;
-  place.end = std::max(place.begin, place.file_bytes);
+  place.begin = std::min(*bytes, file_bytes) + appended_;
+  place.end = std::max(place.begin, file_bytes);
   return place;
 }
 
@@ -376,7 +426,7 @@ Status VtkXmlFile::CheckHolds(const VtkArray& array, SampleType type, std::int64
   if (!place.ok()) return place.status();
   // A text has a digit and a blank for each sample, at least.
   const std::int64_t bytes = samples * std::int64_t(BytesPerSample(type));
-  const std::int64_t least = place->text ? 2 * samples - 1 : place->compressor != nullptr ? bytes / place->compressor->most_ratio : bytes;
+  const std::int64_t least = place->text ? 2 * samples - 1 : bytes / place->most_ratio;
   if (place->end - place->begin >= least) return Status::Ok();
   return Damaged(fmt::format("truncated: array {} has {} bytes, its {} samples need at least {}", array.name(),
                              std::max<std::int64_t>(place->end - place->begin, 0), samples, least));
@@ -386,18 +436,21 @@ Status VtkXmlFile::InArray(const VtkArray& array, const Status& status) const {
   return status.ok() ? status : Status(status.code(), fmt::format("{}: array {}: {}", path_, array.name(), status.message()));
 }
 
-Result<VtkXmlFile::PlainSamples> VtkXmlFile::FindPlainSamples(const VtkArray& array, SampleType type, std::int64_t samples) const {
+Result<LocatedSamples> VtkXmlFile::Locate(const VtkArray& array, SampleType type, std::int64_t samples) const {
   if (Status status = CheckHolds(array, type, samples); !status.ok()) return status;
   const Result<Place> place = PlaceOf(array);
   if (!place.ok()) return place.status();
-  if (place->text || place->base64 || place->compressor != nullptr) {
-    return Wrong(fmt::format("array {}: its samples are text, base64 or compressed", array.name()));
-  }
-  ByteSource source(path_, place->begin, place->end, false);
-  const HeaderFormat header = HeaderOf(file_);
-  const std::uint64_t bytes = std::uint64_t(samples) * BytesPerSample(type);
-  if (Status status = InArray(array, CheckCount(source, header, bytes)); !status.ok()) return status;
-  return PlainSamples{place->begin + header.bytes(), header.big_endian};
+  if (place->text) return Wrong(fmt::format("array {}: its samples are text", array.name()));
+  ByteSource source(path_, place->begin, place->end, place->base64);
+  Result<PackedSamples> found = ReadHeader(source, HeaderOf(file_), place->codec, std::uint64_t(samples) * BytesPerSample(type));
+  if (!found.ok()) return InArray(array, found.status());
+  LocatedSamples located{{}, {.file = path_, .offset = std::int64_t(found->begin), .big_endian = found->big_endian}};
+  if (!place->base64 && place->codec == nullptr) return located;
+  if (Status status = InArray(array, CheckParts(*found, path_, place->appended ? std::nullopt : std::optional(place->end))); !status.ok())
+    return status;
+  found->name = fmt::format("{}: array {}", path_, array.name());
+  located.packed = std::make_shared<const PackedSamples>(*std::move(found));
+  return located;
 }
 
 Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVector<std::byte>& out) const {
@@ -409,10 +462,9 @@ Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVe
     status = ReadTextSamples(cursor, type, out);
   } else {
     ByteSource source(path_, place->begin, place->end, place->base64);
-    const HeaderFormat header = HeaderOf(file_);
-    status = place->compressor != nullptr ? ReadBlocks(source, header, *place->compressor->codec, place->file_bytes, out)
-                                          : ReadPlain(source, header, out);
-    if (header.big_endian) SwapByteOrder(type, out);
+    const Result<PackedSamples> found = ReadHeader(source, HeaderOf(file_), place->codec, out.size());
+    status = found.ok() ? ReadBytes(source, *found, out) : found.status();
+    if (status.ok() && found->big_endian) SwapByteOrder(type, out);
   }
   return InArray(array, status);
 }

@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/converted_samples.h"
 #include "data/volume_io/grid_arrays.h"
+#include "data/volume_io/raw_volume.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
 #include "data/volume_io/xml_events.h"
@@ -42,7 +44,7 @@ struct VtkArrayType {
   friend bool operator==(const VtkArrayType&, const VtkArrayType&) = default;
 };
 
-struct VtkCompressor;
+class ChunkCodec;
 
 class VtkXmlFile {
  public:
@@ -76,13 +78,10 @@ class VtkXmlFile {
   // Whether the file can hold that many samples, before memory is taken for them. InvalidArgument: an encoding that is not supported.
   // DataLoss: it is too short.
   Status CheckHolds(const VtkArray& array, SampleType type, std::int64_t samples) const;
-  // The byte of the file at which that many samples begin, and whether they are big endian. InvalidArgument: they are text, base64 or
-  // compressed. DataLoss: the file has another number of bytes for them, or is too short.
-  struct PlainSamples {
-    std::int64_t begin = 0;
-    bool big_endian = false;
-  };
-  Result<PlainSamples> FindPlainSamples(const VtkArray& array, SampleType type, std::int64_t samples) const;
+  // Where that many samples lie, for which their header is read. InvalidArgument: they cannot be read in parts, since they are text, in
+  // blocks of less than 64 bytes or more than 64 MiB, or in base64 with blanks. DataLoss: the file has another number of bytes for them, or
+  // is too short.
+  Result<LocatedSamples> Locate(const VtkArray& array, SampleType type, std::int64_t samples) const;
   // Fills `out`, whole samples in this machine's byte order. The array was checked for as many (CheckHolds). DataLoss: truncated, damaged.
   Status ReadSamples(const VtkArray& array, SampleType type, AlignedVector<std::byte>& out) const;
 
@@ -96,9 +95,10 @@ class VtkXmlFile {
  private:
   // How and where the samples of an array lie.
   struct Place {
-    bool text = false, base64 = false;
-    const VtkCompressor* compressor = nullptr;  // null: not compressed
-    std::int64_t begin = 0, end = 0, file_bytes = 0;
+    bool text = false, base64 = false, appended = false;
+    std::shared_ptr<const ChunkCodec> codec;  // of a block; null: not compressed
+    std::int64_t most_ratio = 1;              // of the bytes of samples to those that are stored, at most
+    std::int64_t begin = 0, end = 0;
   };
 
   explicit VtkXmlFile(std::string path) : path_(std::move(path)) {}

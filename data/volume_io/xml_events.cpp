@@ -54,12 +54,15 @@ void OnEnd(void* data, const char* name) {
   });
 }
 
-// Definitions of entities can grow without bounds.
-void OnDocumentType(void* data, const char*, const char*, const char*, int) {
-  State& state = *static_cast<State*>(data);
-  state.wrong = "it has a document type definition";
+// Entities can grow without bounds, and so can attributes that elements have by default.
+void OnDeclaration(State& state) {
+  state.wrong = "its document type definition declares entities or attributes";
   state.Stop();
 }
+void OnEntity(void* data, const char*, int, const char*, int, const char*, const char*, const char*, const char*) {
+  OnDeclaration(*static_cast<State*>(data));
+}
+void OnAttribute(void* data, const char*, const char*, const char*, const char*, int) { OnDeclaration(*static_cast<State*>(data)); }
 
 }  // namespace
 
@@ -69,7 +72,8 @@ Status ReadXml(const std::function<std::size_t(std::span<char>)>& read, const Xm
   State state{parser.get(), events, false, {}};
   XML_SetUserData(parser.get(), &state);
   XML_SetElementHandler(parser.get(), OnStart, OnEnd);
-  XML_SetStartDoctypeDeclHandler(parser.get(), OnDocumentType);
+  XML_SetEntityDeclHandler(parser.get(), OnEntity);
+  XML_SetAttlistDeclHandler(parser.get(), OnAttribute);
   constexpr int kBlock = 1 << 16;
   std::int64_t fed = 0;
   for (bool last = false; !last;) {

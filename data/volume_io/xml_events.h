@@ -31,7 +31,8 @@ struct XmlEvents {
 };
 
 // `read` fills the buffer and returns how many bytes it has got, 0 at the end. Takes memory for one tag, at most 1 MiB. InvalidArgument,
-// with the line: no well-formed XML, a tag that is longer, or a document type definition, which no volume has.
+// with the line: no well-formed XML, a tag that is longer, or a document type definition that declares entities or attributes, which no
+// volume has. A definition in another file is not read.
 Status ReadXml(const std::function<std::size_t(std::span<char>)>& read, const XmlEvents& events);
 
 }  // namespace slabstream

@@ -4,17 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <future>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "common/base/printable.h"
+#include "common/text/base64.h"
 #include "common/volume/volume.h"
 #include "data/sources/mapped_array.h"
 #include "data/volume_io/even_steps.h"
@@ -124,7 +126,8 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
     const std::optional<EvenSteps> even = EvenStepsOf((*coordinates)->values);
     if (!even) {
       if ((*coordinates)->values.size() > 1)
-        pyramid.info.notes.push_back(Printable(fmt::format("the coordinates of {} are not evenly spaced, so its spacing is 1", name)));
+        pyramid.info.notes.push_back(Printable(
+            fmt::format("the coordinates of {} are not evenly spaced ({}), so its spacing is 1", name, WhyUneven((*coordinates)->values))));
       continue;
     }
     level.mirrored[std::size_t(axis)] = even->step < 0;
@@ -153,18 +156,13 @@ std::optional<double> NumberOf(const Field& field) {
 
 // xarray writes _FillValue of floats as the bytes of a double in base64 into Zarr 3.
 std::optional<double> MissingValueOf(const Field& field) {
-  constexpr std::size_t kBytes = 8, kTextBytes = 12;
+  constexpr std::size_t kTextBytes = 12;
   if (!field.is_text() || field.value().text().size() != kTextBytes) return NumberOf(field);
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::uint64_t bits = 0, low = 0;
   const std::string text = *field.Text();
-  for (std::size_t i = 0; i < kTextBytes - 1; ++i) {
-    const std::size_t digit = kDigits.find(text[i]);
-    if (digit == std::string_view::npos) return std::nullopt;
-    bits = i < kTextBytes - 2 ? bits << 6 | digit : bits << 4 | digit >> 2;
-  }
-  for (std::size_t i = 0; i < kBytes; ++i) low |= (bits >> (8 * (kBytes - 1 - i)) & 0xff) << (8 * i);  // stored lowest byte first
-  const auto value = std::bit_cast<double>(low);
+  std::array<std::byte, kTextBytes / 4 * 3> bytes{};
+  double value = 0;
+  if (DecodeBase64(std::as_bytes(std::span(text)), bytes) != sizeof value) return std::nullopt;
+  std::memcpy(&value, bytes.data(), sizeof value);  // stored lowest byte first
   return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 

@@ -18,7 +18,6 @@
 #include "common/base/printable.h"
 #include "common/text/url.h"
 #include "data/metadata/open_store_for.h"
-#include "data/stores/watched_object.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/stated_field.h"
@@ -140,12 +139,6 @@ Status PlaceInWorld(const Field& own, Pyramid& pyramid) {
   return Status::Ok();
 }
 
-// Behind an address the shape of the finest array tells that times have come.
-void Follow(const std::shared_ptr<Store>& store, const std::string& array_key, const ReadOptions& options, Pyramid& pyramid) {
-  if (options.time || pyramid.levels.front().time_axis < 0 || !IsUrl(store->name())) return;
-  pyramid.info.growth = WatchObject(store, array_key);
-}
-
 Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options, std::set<std::string>& keys) {
   const std::string name = NameOf(*context.store, node.path);
   const Result<OmeImage> image = ParseOmeImage(node.attributes_field());
@@ -193,7 +186,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
     const auto axis = std::size_t(time - kinds.begin());
     info.times = StatedTimes(choice.times, image->levels.front().place.scale[axis], image->axes[axis].time_unit);
   }
-  Follow(context.store, finest_key, options, pyramid);
+  FollowTimes(context.store, finest_key, options, pyramid);
   return pyramid;
 }
 
@@ -217,7 +210,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& opened, const ReadOpti
   Result<Pyramid> pyramid =
       found->node.array ? PyramidOfArray(arrays, found->node, options) : PyramidOfImage(arrays, found->node, options, found->keys);
   if (pyramid.ok()) {
-    if (found->node.array) Follow(store, found->node.keys.front(), options, *pyramid);
+    if (found->node.array) FollowTimes(store, found->node.keys.front(), options, *pyramid);
     pyramid->info.files = FilesOf(*store, found->keys);
     pyramid->info.folder = store->name();
   }

@@ -69,7 +69,8 @@ class Sample:
     value: float | int | None      # None: it is not finite; int: a whole number that float rounds
     label: int | None = None       # as in the file; 0: none; None: the dataset has no labels
     label_name: str = ""
-    overlay: float | None = None   # None: there is none here
+    # The name and the value of each field that was asked for, or that the picture shows. None: there is no value here.
+    fields: tuple[tuple[str, float | None], ...] = ()
     depth: float | None = None     # of a point that was picked: as depths of the picture's pixels
 
 
@@ -130,6 +131,6 @@ def sample_of(message: Any, depth: float | None = None) -> Sample | None:
         value=None if not message.HasField("value") else int(message.value) + message.rest if message.rest else message.value,
         label=message.label.value if labelled else None,
         label_name=message.label.name if labelled else "",
-        overlay=message.overlay if message.HasField("overlay") else None,
+        fields=tuple((each.name, each.value if each.HasField("value") else None) for each in message.fields),
         depth=depth,
     )

@@ -187,11 +187,13 @@ class Service(contextlib.AbstractContextManager["Service"]):
         query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box, **_of(field, time))
         return probe.label_statistics_of(self._connection.ask("statistics_query", query, timeout))
 
-    def value(self, dataset: str, at: Any, *, field: int | str | None = None, time: int | str | None = None,
+    def value(self, dataset: str, at: Any, *, field: int | str | Sequence[int | str] | None = None, time: int | str | None = None,
               timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume. `field`, `time`: as of
-        histogram()."""
-        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], **_of(field, time))
+        histogram(), but there may be several fields; None: the first one that shows, and the overlay."""
+        named = field if isinstance(field, (list, tuple)) else [] if field is None else [field]
+        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], channels=[_of(each, None)["field"] for each in named],
+                                   **_of(None, time))
         return probe.sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
 
     @takes_options_of("render")

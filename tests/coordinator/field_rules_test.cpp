@@ -189,7 +189,7 @@ TEST_F(FieldRules, AnotherTimeIsReadWithTheStatisticsOfTheDatasetsOwn) {
 
 // A question about another time comes first: a later picture of it is drawn by the same statistics all the same.
 TEST_F(FieldRules, AQuestionAboutAnotherTimeWaitsForTheStatistics) {
-  script.Client(kClient, SampleQuery{.nonce = 1, .dataset = "block", .points = {{1, 1, 1}}, .field = "2", .time = "3"});
+  script.Client(kClient, SampleQuery{.nonce = 1, .dataset = "block", .points = {{1, 1, 1}}, .channels = {"2"}, .time = "3"});
   NothingChanged(Loaded(LoadDataset(script.loads[0])));
   ASSERT_THAT(LoadedNames(1), ElementsAre(PartName("block", 2, 0)));
   LoadedAll(1);
@@ -197,6 +197,48 @@ TEST_F(FieldRules, AQuestionAboutAnotherTimeWaitsForTheStatistics) {
   ASSERT_NE(part, script.loads.end());
   EXPECT_NE(part->source.statistics, nullptr);
 }
+
+// ---- points
+
+TEST_F(FieldRules, APointHasTheFieldsThatTheQuestionNamesElseTheFirstAndTheOverlay) {
+  std::size_t loaded = 0;
+  const auto ask = [&](std::vector<std::string> channels) {
+    Actions actions = NothingChanged(
+        script.Client(kClient, SampleQuery{.nonce = 1, .dataset = "block", .points = {{1, 1, 1}}, .channels = std::move(channels)}));
+    while (loaded < script.loads.size()) CoordinatorScript::Append(actions, NothingChanged(Loaded(LoadDataset(script.loads[loaded++]))));
+    const auto asked = Of<AnswerQuestion>(actions);
+    EXPECT_THAT(asked, SizeIs(1));
+    std::vector<int> numbers;
+    if (asked.size() != 1) return numbers;
+    numbers.push_back(asked[0].fields.volume);
+    for (const FieldVolume& field : asked[0].fields.others) {
+      numbers.push_back(field.number);
+      const auto load = std::ranges::find(script.loads, PartName("block", field.number, 0), &LoadDataset::name);
+      EXPECT_EQ(field.levels.at(0).dataset, load->load);
+    }
+    return numbers;
+  };
+  EXPECT_THAT(ask({}), ElementsAre(0, 3));
+  EXPECT_THAT(ask({"overlay"}), ElementsAre(3));
+  EXPECT_THAT(ask({"GFP", "1"}), ElementsAre(1, 2));
+  EXPECT_THAT(ask({"0", "2", "overlay"}), ElementsAre(0, 2, 3));
+}
+
+TEST_F(FieldRules, APickHasTheFieldsThatItsPictureShows) {
+  PickQuery pick{.nonce = 1, .frame = Showing(1, {"0", "2"}).frame, .x = 1, .y = 1};
+  script.Client(kClient, pick);
+  const auto asked = Of<AnswerQuestion>(LoadedAll());
+  ASSERT_THAT(asked, SizeIs(1));
+  EXPECT_THAT(LoadedNames(), ElementsAre("block", PartName("block", 2, 0))) << "the overlay does not show";
+  ASSERT_THAT(asked[0].fields.others, SizeIs(1));
+  EXPECT_EQ(asked[0].fields.others[0].levels.at(0).dataset, script.loads[1].load);
+  pick.frame.channels = {"Nil"};
+  const auto refused = ToClients<OrderRefused>(NothingChanged(script.Client(kClient, pick)));
+  ASSERT_THAT(refused, SizeIs(1));
+  EXPECT_THAT(refused[0].message.status.message(), HasSubstr("has no field 'Nil'"));
+}
+
+// ---- times
 
 // What has a source of its own tells how many times it has when it is opened.
 TEST_F(FieldRules, AFieldWithASourceOfItsOwnHasOneTimeOrAsManyAsTheDataset) {

@@ -664,6 +664,31 @@ TEST_F(LevelRules, APickIsOfTheLevelThatThePictureShows) {
   EXPECT_THAT(refused[0].message.status.message(), HasSubstr("has levels 0 to 2"));
 }
 
+TEST_F(LevelRules, APickHasEachChannelAtTheLevelOfTheVolume) {
+  PickQuery pick{.nonce = 3, .frame = AtLevelFrame(1, "1").frame, .x = 20, .y = 30};
+  pick.frame.renderer = "raycast";
+  pick.frame.channels = {"0", "1"};
+  script.Client(kClient, pick);
+  const auto two = std::make_shared<const DatasetFields>(DatasetFields{.fields = {{.name = "a"}, {.name = "b"}}});
+  Actions actions;
+  for (std::size_t i = 0; i < script.loads.size(); ++i) {
+    const LoadDataset load = script.loads[i];
+    if (IsLevelName(load.name)) {
+      CoordinatorScript::Append(actions, Loaded(load));
+    } else {
+      std::vector<DataSource> sources(kLevels, DataSource(load.name, ""));
+      CoordinatorScript::Append(
+          actions, script.Step(DatasetOpened{load.name, load.load, Levels(), std::move(sources), stamp_, i == 0 ? two : nullptr}));
+    }
+  }
+  const auto asked = Of<AnswerQuestion>(NothingChanged(std::move(actions)));
+  ASSERT_THAT(asked, SizeIs(1));
+  EXPECT_EQ(asked[0].summary->description.geometry, GeometryOfLevel(1));
+  ASSERT_THAT(asked[0].fields.others, SizeIs(1));
+  EXPECT_EQ(asked[0].fields.others[0].levels.at(0).summary->description.geometry, GeometryOfLevel(1));
+  EXPECT_THAT(LoadedNames(), testing::Not(testing::Contains(LevelName(PartName("block", 1, 0), 0)))) << "no finer voxels than are seen";
+}
+
 TEST_F(LevelRules, AnAnswerOfALevelWaitsForALookToo) {
   Visit(AtLevelFrame(1, "0"));
   const std::size_t before = script.loads.size();

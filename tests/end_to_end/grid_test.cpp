@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "common/json/json.h"
@@ -88,6 +89,34 @@ TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
   MustRun({"render", "g", "-o", "lattice.png", "--renderer", "raycast", "--size", "32"});
   EXPECT_EQ(Json::Parse(MustRun({"value", "g", "--at", "0.5,0.5,0.5", "--json"}).out).value()[0]["inside"], true);
   MustRun({"down"});
+}
+
+// Two pieces, each with a layer of ghost cells of the other one, which must not be drawn.
+TEST_F(GridTest, PiecesAreDrawnAsOneGrid) {
+  const auto place = [](const Vec3& number) { return number; };
+  Write("whole.vtu", VtuFile(BoxOfHexahedra({}, {4, 2, 2}, place)));
+  for (const int low : {0, 1}) {
+    VtuSpec piece = BoxOfHexahedra({low, 0, 0}, {low + 3, 2, 2}, place);
+    std::vector<double> ghosts;
+    for (int cell = 0; cell < piece.cells; ++cell) ghosts.push_back(cell % 3 == (low == 0 ? 2 : 0) ? 1 : 0);
+    piece.arrays.insert(piece.arrays.begin() + 1, {"CellData", "vtkGhostType", SampleType::kUint8, 1, ghosts});
+    Write(low == 0 ? "a.vtu" : "b.vtu", VtuFile(piece));
+  }
+  Write("pieces.pvtu", VtkListFile("PUnstructuredGrid", {"a.vtu", "b.vtu"}));
+  VtuSpec curvilinear = BoxOfHexahedra({}, {4, 2, 2}, place);
+  curvilinear.extent = "0 4 0 2 0 2";
+  Write("whole.vts", VtuFile(curvilinear));
+  const std::vector<std::string> view = {"--local=2", "--elevation", "20", "--azimuth", "30"};
+  const PictureFile whole = Render("whole.vtu", "whole.exr", view);
+  EXPECT_GT(MeanAlpha(whole), 0.05);
+  EXPECT_LE(LargestDifference(whole, Render("pieces.pvtu", "pieces.exr", view)), 2e-5 + 1.0 / 1024);
+  EXPECT_EQ(LargestDifference(whole, Render("whole.vts", "curvilinear.exr", view)), 0);
+  const Json info = Json::Parse(MustRun({"info", "pieces.pvtu", "--json"}).out).value();
+  EXPECT_EQ(info["cells"], 16);
+  EXPECT_EQ(info["points"], 5 * 3 * 3);
+  EXPECT_THAT(MustRun({"info", "pieces.pvtu"}).out, HasSubstr("8 cells are left out"));
+  std::filesystem::remove(Path("b.vtu"));
+  ExpectEachRefused({"render", "-o", "x.png", "--local=1"}, {{{"pieces.pvtu"}, "b.vtu: cannot be opened for reading"}});
 }
 
 TEST_F(GridTest, ItsCellsAreDrawnUnlessARequestNamesARenderer) {

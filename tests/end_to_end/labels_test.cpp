@@ -163,8 +163,17 @@ TEST_F(LabelsAloneTest, WhatIsAboutValuesIsRefused) {
   };
   refused({"render", "--renderer", "splat"}, "has labels and no values, and renderer 'splat' shows no labels");
   refused({"render", "--transfer", "viridis"}, "has labels and no values, which transfer");
+  const std::string why = "dataset \"volume\" has labels and no values to measure";
+  ExpectRefused({"measure", "seg.nrrd?ids=yes", "--local=1", "--labels"}, why);
+  ExpectRefused({"measure", "seg.nrrd?ids=yes", "--local=1", "--box", ":,:,:"}, why);
   refused({"render", "--isovalue", "3"}, "has labels and no values, which transfer");
   refused({"slice"}, "--label-mode surface chooses one that does");
+  const std::string mode = "but dataset \"volume\" has labels and no values to colour, so it must be auto or surface";
+  refused({"render", "--label-mode", "tint"}, "label-mode is 'tint', " + mode);
+  refused({"render", "--label-mode", "highlight"}, "label-mode is 'highlight', " + mode);
+  refused({"slice", "--label-mode", "tint"}, "label-mode is 'tint', " + mode);
+  for (const std::string same : {"auto", "surface"})
+    EXPECT_EQ(LargestDifference(Shown("seg.nrrd?ids=yes", {"--label-mode", same}), Shown("seg.nrrd?ids=yes", {})), 0) << same;
   MustRun({"slice", "seg.nrrd?ids=yes", "--local=1", "--label-mode", "surface", "-o", Path("slice.png")});
 }
 

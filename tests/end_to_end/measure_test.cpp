@@ -87,7 +87,7 @@ TEST_F(MeasureTest, EachLabelHasItsVolumeAndValues) {
 TEST_F(MeasureTest, RefusesWhatIsNoMeasure) {
   ExpectEachRefused({"measure", "ramp.nrrd", "--local=1"},
                     {{{}, "--distance, --angle, --profile, --box or --labels must say what to measure"},
-                     {{"--labels"}, "--labels needs a FILE of labels with --local"},
+                     {{"--labels"}, "dataset \"volume\" has no labels to measure: --labels FILE"},
                      {{"--csv", "--box", ":,:,:"}, "--csv is the table of --labels"},
                      {{"--distance", "1,2,3"}, "--distance '1,2,3' is not X,Y,Z:X,Y,Z"},
                      {{"--angle", "1,2,3:1,2,3"}, "is not X,Y,Z:X,Y,Z:X,Y,Z"},

@@ -1,7 +1,8 @@
-// HDF5 files: their metadata, which libhdf5 reads, and chunks with their filters.
+// HDF5 files: their metadata, which libhdf5 reads, and chunks with their filters; classic netCDF files.
 //
 // input: u8: the ending of the file, and whether a dataset is asked for; the file
 #include "tests/data/hdf5/hdf5_files.h"
+#include "tests/data/hdf5/netcdf_writer.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/fuzz/read_source.h"
@@ -82,6 +83,15 @@ std::vector<FuzzBytes> Hdf5FileSeeds() {
     writer.Doubles("/minc-2.0/image/0/image-max", {6}, double_of(9, 6));
   }
   keep(0);
+  for (const int version : {1, 2, 5}) {
+    NetcdfWriter writer{.version = version, .streaming = version == 2, .records = 6, .dimensions = {{"z", 0}, {"lat", 7}, {"x", 8}}};
+    writer.variables.push_back({"lat", {1}, SampleType::kFloat32, {7, 6, 5, 4, 3, 2, 1}, {{"units", "degrees_north"}}});
+    writer.variables.push_back({"z", {0}, SampleType::kFloat64, {1, 2, 3, 4, 5, 6}, {{"bounds", "z_bounds"}}});
+    writer.variables.push_back(
+        {"data", {0, 1, 2}, SampleType::kInt16, {samples.begin(), samples.end()}, {{"_FillValue", "", {7}, SampleType::kInt16}}});
+    WriteFile(path, writer.Bytes());
+    keep(version == 5 ? 1 : 0);
+  }
   return seeds;
 }
 

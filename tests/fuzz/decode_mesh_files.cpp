@@ -43,6 +43,11 @@ std::vector<FuzzBytes> MeshFileSeeds() {
       seeds.push_back(FuzzSeed().Put(std::string_view(LegacyGridFile(SmallGrid(), {.binary = binary, .offsets = offsets}))).bytes());
     }
   }
+  VtuSpec curvilinear = BoxOfHexahedra({}, {2, 1, 1}, [](const Vec3& number) { return number; });
+  curvilinear.extent = "0 2 0 1 0 1";
+  curvilinear.arrays.insert(curvilinear.arrays.begin() + 1, {"CellData", "vtkGhostType", SampleType::kUint8, 1, {0, 32}});
+  seeds.push_back(FuzzSeed().Put(std::string_view(VtuFile(curvilinear))).bytes());
+  seeds.push_back(FuzzSeed().Put(std::string_view(LegacyGridFile(curvilinear, {.dimensions = "3 2 2"}))).bytes());
   return seeds;
 }
 

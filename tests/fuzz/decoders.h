@@ -47,6 +47,9 @@ std::vector<FuzzBytes> BrickIndexSeeds();
 bool DecodeHdf5File(std::span<const std::byte> input);
 std::vector<FuzzBytes> Hdf5FileSeeds();
 
+bool DecodeXdmfFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> XdmfFileSeeds();
+
 bool DecodeN5Container(std::span<const std::byte> input);
 std::vector<FuzzBytes> N5ContainerSeeds();
 

@@ -24,6 +24,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"mesh-files", "files of unstructured grids", DecodeMeshFile, MeshFileSeeds},
       {"hdf5-files", "HDF5 files and their chunks", DecodeHdf5File, Hdf5FileSeeds},
+      {"xdmf-files", "XDMF files", DecodeXdmfFile, XdmfFileSeeds},
       {"n5-containers", "attributes and blocks of N5", DecodeN5Container, N5ContainerSeeds},
       {"precomputed", "info files and chunks of precomputed volumes", DecodePrecomputed, PrecomputedSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},

@@ -479,6 +479,14 @@ class HttpTest(WithService):
         posted = self.gateway.json("/api/v1/pick", method="POST", body=json.dumps({"x": 50, "y": 50, **options}))
         self.assertEqual(posted, (200, hit))
         self.assertEqual(self.ask("pick", x=0, y=0, **options), {"hit": False})
+        self.assertEqual(hit["fields"], [{"name": "volume", "value": hit["value"]}])
+        # Of a picture of two channels a point has the values of both.
+        both = self.ask("pick", dataset="channels", x=50, y=50, size=100, renderer="mip", channel="0,1", azimuth=0, elevation=0)
+        at = ",".join(map(str, both["at"]))
+        self.assertEqual([field["name"] for field in both["fields"]], ["channel 0", "channel 1"])
+        for number, field in enumerate(both["fields"]):
+            self.assertEqual(self.ask("value", dataset="channels", at=at, field=number)["fields"], [field])
+        self.assertEqual(self.ask("value", dataset="channels", at=at, field="0,1")["fields"], both["fields"])
         # The other renderers see about the same surface.
         for renderer in ("raycast", "splat"):
             other = self.ask("pick", x=50, y=50, transfer="opaque", **(options | {"renderer": renderer}))
@@ -520,6 +528,7 @@ class HttpTest(WithService):
             ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
             ("pick", {"dataset": "a", "x": 33, "y": 1, "size": 32}, 400, "out of range"),
             ("pick", {"dataset": "a", "x": 3, "y": 1, "zoom": -1}, 400, "zoom"),
+            ("value", {"dataset": "a", "at": "0,0,0", "field": ",".join("0" * 17)}, 400, "channels"),
             ("transfer", {"dataset": "a", "transfer": "nothing"}, 400, "nothing"),
             ("transfer", {"dataset": "a", "azimuth": 3}, 400, "azimuth"),
         ]:

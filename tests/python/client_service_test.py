@@ -82,7 +82,10 @@ class AtAService(WithAService):
             z, y, x = (o + s * i for o, s, i in zip((-10, 5, 20), (2, 1.5, 1.25), index))
             there = self.service.value("head", at=(x + 0.3, y - 0.3, z))
             self.assertEqual((there.index, there.value, there.label), (index, values[index], labels[index]))
-            self.assertEqual(there.overlay is None, bool(np.isnan(overlay[index])))
+            expected = None if np.isnan(overlay[index]) else float(overlay[index])
+            self.assertEqual(there.fields, (("volume", values[index]), ("overlay", expected)))
+            self.assertEqual(self.service.value("head", (x, y, z), field=0).fields, there.fields[:1])
+            self.assertEqual(self.service.value("head", (x, y, z), field=(0, "overlay")).fields, there.fields)
         self.assertIsNone(self.service.value("head", at="0,0,1e6"))
         with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
             self.service.histogram("nothing")

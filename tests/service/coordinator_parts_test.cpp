@@ -55,6 +55,47 @@ TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
 }
 
+// Of a volume whose voxel (x, y, z) has the value x + 10 * y + 100 * z.
+std::shared_ptr<const Volume> MakeNumbered(const VolumeGeometry& geometry, ValueMapping mapping = {}) {
+  Volume volume{.description = {.geometry = geometry, .type = ScalarType::kFloat32, .mapping = mapping},
+                .block = MakeVoxelBlock(geometry.bounds(), ScalarType::kFloat32)};
+  for (std::int32_t z = 0; z < geometry.size.z; ++z) {
+    for (std::int32_t y = 0; y < geometry.size.y; ++y) {
+      for (std::int32_t x = 0; x < geometry.size.x; ++x)
+        volume.block.samples<float>()[volume.block.Offset({x, y, z})] = float(x + 10 * y + 100 * z);
+    }
+  }
+  return std::make_shared<const Volume>(std::move(volume));
+}
+
+TEST(AnswerTo, APointHasTheValueOfEachFieldByItsName) {
+  const VolumeGeometry grid{{6, 6, 6}, {1, 1, 1}};
+  VolumeGeometry half{{3, 3, 3}, {2, 2, 2}};  // the first voxel's centre lies at (2, 0, 0)
+  half.orientation.origin = {2, 0, 0};
+  const std::shared_ptr<const Volume> volumes[] = {MakeNumbered(grid), MakeNumbered(grid, {2, -1}), MakeNumbered(half)};
+  AnswerQuestion asked{.question = SampleQuery{.dataset = "d", .points = {{3.2, 1, 4.4}, {0, 2, 2}, {9, 9, 9}}}, .dataset = 5};
+  asked.summary = std::make_shared<const VolumeSummary>(Summarize(*volumes[0]));
+  asked.fields.dataset = std::make_shared<const DatasetFields>(
+      DatasetFields{.fields = {{.name = "DAPI"}, {}, {.name = "overlay", .channel = false, .shown = false}}});
+  for (const int number : {1, 2}) {
+    const auto summary = std::make_shared<const VolumeSummary>(Summarize(*volumes[number]));
+    asked.fields.others.push_back({.number = number, .levels = {{DatasetId(6 + number), summary}}, .of_volume = {0}});
+  }
+  const auto samples =
+      std::get<SampleReply>(AnswerTo(asked, {.volume = volumes[0]}, {{.volume = volumes[1]}, {.volume = volumes[2]}}).value()).samples;
+  ASSERT_EQ(samples.size(), 3U);
+  using Fields = std::vector<FieldSample>;
+  // Voxel (3, 1, 4) is the point (0.5, 0.5, 2) of the overlay.
+  EXPECT_EQ(samples[0].fields, (Fields{{"DAPI", 413}, {"channel 1", 2 * 413 - 1}, {"overlay", 0.5 + 5 + 200}}));
+  EXPECT_EQ(samples[1].fields, (Fields{{"DAPI", 220}, {"channel 1", 2 * 220 - 1}, {"overlay"}})) << "the overlay begins at x = 1";
+  EXPECT_EQ(samples[2].fields, Fields()) << "outside of the volume";
+  const Status gone = AnswerTo(asked, {.volume = volumes[0]}, {{}, {.volume = volumes[2]}}).status();
+  EXPECT_EQ(gone.code(), StatusCode::kUnavailable) << gone.message();
+  asked.fields.volume_shows = false;
+  asked.fields.others.clear();
+  EXPECT_EQ(std::get<SampleReply>(AnswerTo(asked, {.volume = volumes[0]}).value()).samples[0].fields, Fields());
+}
+
 TEST(AnswerTo, ViewsOfAPathAreThoseOfItsCameras) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   ViewQuery query{

@@ -1374,9 +1374,11 @@ class PageTest(unittest.TestCase):
 
     def test_the_pointer_tells_position_value_and_label(self):
         asked = []
-        answer = {"hit": True, "at": [1.5, -2, 3], "depth": 9, "voxel": [10, 11, 9], "value": 140, "label": {"value": 2, "name": "middle"}}
+        answer = {"hit": True, "at": [1.5, -2, 3], "depth": 9, "voxel": [10, 11, 9], "value": 140, "fields": [{"name": "volume", "value": 140}],
+                  "label": {"value": 2, "name": "middle"}}
         answers = {"/api/v1/pick": lambda fields, body: asked.append(body) or answer,
-                   "/api/v1/value": lambda fields, body: {"at": [float(n) for n in fields["at"].split(",")], "voxel": [1, 2, 3], "inside": True, "value": 99}}
+                   "/api/v1/value": lambda fields, body: {"at": [float(n) for n in fields["at"].split(",")], "voxel": [1, 2, 3], "inside": True, "value": 99,
+                                                          "fields": [{"name": "volume", "value": 99}]}}
         viewer = self.viewer(self.proxy(answers=answers).port, layout="quad")
         viewer.settled()
         viewer.until("document.querySelectorAll('.pane').length === 4")

@@ -91,6 +91,12 @@ export function channelOptions(state: State, own: Options, several: boolean): Op
   return { ...which, ...(says ? { ...own, ...overlaid } : looksOf(state, [...shown, ...over])) };
 }
 
+// The fields that show, as requests name them.
+export const shownKeys = (state: State): readonly string[] => {
+  const shown = channels()?.length ? shownChannels(state).map(({ key }) => key) : ["0"];
+  return state.overlay && hasOverlay(shownDataset()) ? [...shown, OVERLAY.key] : shown;
+};
+
 // What questions are about: a channel, or the first one that shows.
 export function sourceOf(state: State, channel: Channel | undefined = shownChannels(state)[0]): Source {
   return { dataset: state.dataset, ...(channel && { [NAMES.field]: channel.key }), ...timeOptions(state) };

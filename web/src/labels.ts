@@ -3,6 +3,7 @@ import type { LegendEntry } from "./annotations";
 import type { LabelName } from "./api";
 import type { Context } from "./context";
 import { can } from "./offers";
+import { labelMode } from "./options";
 
 // Whether * (any characters, also none) and ? (one) in the pattern can stand for what the name has there.
 function matches(name: string, pattern: string): boolean {
@@ -68,8 +69,8 @@ export class Labels {
 
   // The legend of the picture, if it is wanted.
   legend(): readonly LegendEntry[] {
-    const { legend, labels, renderer } = this.context.store.state;
-    if (!legend || labels === "off" || !can("labels", renderer)) return [];
+    const { state } = this.context.store;
+    if (!state.legend || labelMode(state) === "off" || !can("labels", state.renderer)) return [];
     return this.names.filter(label => this.shows(label)).map(label => ({ name: labelText(label), color: label.color ?? "" }));
   }
 

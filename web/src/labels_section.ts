@@ -4,7 +4,8 @@ import { type Context, follow } from "./context";
 import { row, section, segmented, slider, textField, toggle } from "./controls";
 import { h } from "./dom";
 import { isListed, type Labels, labelText, listOf } from "./labels";
-import { can, titlesThatCan, turnTo } from "./offers";
+import { can, hasLabelsAlone, titlesThatCan, turnTo } from "./offers";
+import { labelMode } from "./options";
 import { LOOK } from "./state";
 import { rounded } from "./vec";
 
@@ -56,15 +57,16 @@ export function labelsSection(context: Context, labels: Labels): HTMLElement {
   const hint = h("p", { class: "hint" });
   const element = section("Labels", false, row("Shown as", mode.element), tint.element, smooth.element, which.element, legend.element, hint, list.element);
   const update = (): void => {
-    const { state } = store, on = state.labels !== "off";
+    const { state } = store, shownAs = labelMode(state), on = shownAs !== "off";
     element.hidden = !context.volume()?.labels;
-    mode.set(state.labels);
+    mode.set(shownAs);
+    for (const other of ["off", "tint", "highlight"]) mode.enable(other, !hasLabelsAlone());
     tint.set(state.labelTint);
     smooth.set(state.labelSurface === "smooth");
     which.set(state.labelsShown);
     legend.set(state.legend);
-    tint.element.hidden = state.labels !== "tint" && state.labels !== "highlight";
-    smooth.element.hidden = state.labels !== "surface";
+    tint.element.hidden = shownAs !== "tint" && shownAs !== "highlight";
+    smooth.element.hidden = shownAs !== "surface";
     which.element.hidden = list.element.hidden = legend.element.hidden = !on;
     hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
     hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : "Point at a label in the picture to list it here.";

@@ -57,6 +57,8 @@ export function noteDataset(dataset: Dataset | undefined, cautious: boolean): vo
 }
 export const shownDataset = (): Dataset | null => shown;
 export const hasLabels = (): boolean => shown === null || Number(shown.layers?.labels ?? 0) > 0;
+// Whether it has no values, so that its labels always show, as surfaces.
+export const hasLabelsAlone = (): boolean => shown?.fields?.some(field => field.labels && field.shown) ?? false;
 
 // The renderer, or the automatic one if it draws cells and the dataset has none.
 export function fitting(renderer: string): string {

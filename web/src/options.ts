@@ -2,7 +2,7 @@
 import type { Options } from "./api";
 import { channelOptions } from "./channels";
 import { boxText, slopeText } from "./link";
-import { can, fitting, hasLabels, hasRegions, parametersOf } from "./offers";
+import { can, fitting, hasLabels, hasLabelsAlone, hasRegions, parametersOf } from "./offers";
 import type { State } from "./state";
 import { timeOptions } from "./times";
 import { toParaView } from "./transfer";
@@ -22,9 +22,12 @@ function transferOptions(state: State): Options {
   return options;
 }
 
+export const labelMode = (state: State): State["labels"] => (!hasLabels() ? "off" : hasLabelsAlone() ? "surface" : state.labels);
+
 function labelOptions(state: State, opacities: boolean): Options {
-  const options: Options = { "label-mode": state.labels };
-  if (state.labels !== "surface") options["label-tint"] = state.labelTint;
+  const mode = labelMode(state), options: Options = { "label-mode": mode };
+  if (mode === "off") return {};
+  if (mode !== "surface") options["label-tint"] = state.labelTint;
   else if (state.labelSurface === "smooth" && can("smooth-labels", state.renderer)) options["label-surface"] = "smooth";
   if (state.labelsShown) options["labels-shown"] = state.labelsShown;
   const each = Object.entries(state.labelOpacities);
@@ -58,13 +61,12 @@ export function renderOptions(state: State): Options {
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
-  if (state.labels !== "off" && hasLabels() && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
+  if (can("labels", renderer)) Object.assign(options, labelOptions(state, true));
   return options;
 }
 
 export function sliceOptions(state: State, plane: string, at: Vec3): Options {
   const window: Options = state.window !== null && state.level !== null ? { window: state.window, level: state.level } : {};
   const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background, ...channelOptions(state, window, true), ...timeOptions(state) };
-  if (state.labels !== "off" && hasLabels()) Object.assign(options, labelOptions(state, false));
-  return options;
+  return Object.assign(options, labelOptions(state, false));
 }

@@ -1,6 +1,6 @@
-// What lies below the pointer: position, value and label, asked for once the pointer rests.
-import { ApiError, type LabelName, type Value } from "./api";
-import { shownChannels, sourceOf } from "./channels";
+// What lies below the pointer: position, values of what shows, and label, asked for once the pointer rests.
+import { ApiError, type LabelName, NAMES, type Value } from "./api";
+import { shownKeys, sourceOf } from "./channels";
 import type { Context } from "./context";
 import { h, shown } from "./dom";
 import { renderOptions } from "./options";
@@ -22,7 +22,8 @@ export class Pointed {
     this.cancel();
     if (!at) return this.say("");
     this.say(this.position(at));
-    this.later(signal => this.context.api.value(sourceOf(this.context.store.state), at, signal));
+    const { state } = this.context.store;
+    this.later(signal => this.context.api.value({ ...sourceOf(state), [NAMES.field]: shownKeys(state).join(",") }, at, signal));
   }
 
   // In the 3-D picture it is picked, at a point of the page's pixels.
@@ -62,7 +63,8 @@ export class Pointed {
     if (value.hit === false || !value.at) return this.say("");
     const label = value.label ?? null;
     if (label && label.value > 0) this.onLabel(label);
-    this.say(this.position(value.at), typeof value.value !== "number" || value.inside === false ? "" : `${shownChannels(this.context.store.state)[0]?.name ?? "value"} ${shown(value.value)}`, label && label.value > 0 ? label.name || `label ${label.value}` : "");
+    const fields = (value.fields ?? []).map(field => (field.value === null ? "" : `${field.name === "volume" ? "value" : field.name} ${shown(field.value)}`));
+    this.say(this.position(value.at), ...fields, label && label.value > 0 ? label.name || `label ${label.value}` : "");
   }
 
   private position(at: Vec3): string {

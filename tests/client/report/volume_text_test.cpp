@@ -46,6 +46,14 @@ TEST(VolumeText, TellsEveryDigitOfAValueAndOfAPoint) {
   EXPECT_THAT(told(1), StartsWith("2000000003 3e+22 -0.5  voxel"));
 }
 
+TEST(VolumeText, TellsTheValueOfEachFieldByItsName) {
+  const VolumeSample sample{.inside = true, .value = 12, .fields = {{"DAPI", 12}, {"Actin", 0.5}, {"overlay"}}};
+  EXPECT_THAT(SampleText(sample), EndsWith("  value 12  Actin 0.5  overlay none"));
+  EXPECT_EQ(SampleJson(sample)["fields"].dump(),
+            R"([{"name":"DAPI","value":12},{"name":"Actin","value":0.5},{"name":"overlay","value":null}])");
+  EXPECT_FALSE(SampleJson({.inside = false}).contains("fields")) << "nothing is there";
+}
+
 StatisticsReply TwoLabels(const Orientation& orientation) {
   const Label left{3, {1, 0.5F, 0}, "left, \"upper\""}, gone{7, {}, ""};
   const VolumeDescription description{.geometry = {{4, 4, 4}, {2, 2, 0.5}, orientation}};

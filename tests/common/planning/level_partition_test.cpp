@@ -26,7 +26,7 @@ LevelMap RandomMap(Random& random, const Index3& size) {
   return map;
 }
 
-TEST(LevelPartition, BoxesTileTheVolumeAndKeepToZonesOfOneLevel) {
+TEST(LevelPartition, BoxesTileTheVolumeAndKeepToZonesOfOneLevelUnlessThereAreVeryMany) {
   Random random(71);
   SCOPED_TRACE(random.trace());
   for (int round = 0; round < 200; ++round) {
@@ -42,18 +42,21 @@ TEST(LevelPartition, BoxesTileTheVolumeAndKeepToZonesOfOneLevel) {
     const auto [partition, levels] = DivideByLevels(request);  // checks that boxes tile the bounds
     ASSERT_EQ(partition.bounds(), (Box{{0, 0, 0}, size}));
     ASSERT_EQ(levels.size(), partition.boxes().size());
-    int shown = 0;
+    int shown = 0, mixed = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {
       const Box& box = partition.boxes()[i];
       std::set<std::uint8_t> met;
       for (const Index3& zone : IndicesIn(map.counts)) {
         if (!Intersection(map.BoxOf(zone, size), box).empty()) met.insert(map.Of(zone));
       }
-      ASSERT_EQ(met, (std::set{levels[i]}));
+      // Of very many small parts some boxes hold several levels, and have the finest of them.
+      ASSERT_EQ(*met.begin(), levels[i]);
+      mixed += met.size() > 1 ? 1 : 0;
       if (levels[i] == LevelMap::kOutside) continue;
       ++shown;
       ASSERT_LE(request.bytes_of({box, levels[i]}), request.most_bytes);
     }
+    EXPECT_TRUE(mixed == 0 || levels.size() >= 512);
     const bool any = std::ranges::any_of(map.of_zone, [](std::uint8_t level) { return level != LevelMap::kOutside; });
     EXPECT_GE(shown, any ? 1 : 0);
     const auto again = DivideByLevels(request);

@@ -289,6 +289,57 @@ TEST(LevelOfTest, AxesThatKeepTheirSpacingDoNotCount) {
   EXPECT_EQ(LevelOf(request, levels), 0);
 }
 
+// An adaptive mesh: whatever the view, the zones of a box that is refined are drawn from its level, unless a pixel shows no more than the
+// coarser one, and the others from coarser levels, next to each other.
+TEST(LevelOfTest, AnAdaptiveMeshIsDrawnFromLevelsThatHaveVoxelsThere) {
+  Random random(327);
+  SCOPED_TRACE(random.trace());
+  const VolumeGeometry finest{{512, 512, 512}};
+  VolumeLevels levels = HalvedLevels(finest, 3);
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    for (int round = 0; round < 20; ++round) {
+      levels.refined = {nullptr, nullptr, nullptr};
+      for (const std::size_t level : {0U, 1U}) {
+        auto boxes = std::make_shared<std::vector<Box>>();
+        const std::int32_t side = levels.levels[level].geometry.size.x;
+        for (int i = 0; i < 2; ++i) {
+          const Index3 begin = {random.Integer(0, side - 32), random.Integer(0, side - 32), random.Integer(0, side - 32)};
+          boxes->push_back({begin, begin + Uniform(random.Integer(1, 32))});
+        }
+        levels.refined[level] = std::move(boxes);
+      }
+      FrameRequest request = SomeRequest();
+      request.renderer = "raycast";
+      request.view.projection = projection;
+      request.detail = 0.01;
+      const Result<LevelMap> map = LevelsOf(request, levels);
+      ASSERT_TRUE(map.ok()) << map.status().message();
+      ASSERT_THAT(map->levels, testing::ElementsAre(0, 1, 2));
+      int at_finest = 0;
+      for (const Index3& zone : IndicesIn(map->counts)) {
+        const Box box = map->BoxOf(zone, finest.size);
+        std::uint8_t needed = 2, beside = 2;  // by what lies in the zone, or in one beside it
+        for (const std::size_t level : {1U, 0U}) {
+          for (const Box& refined : *levels.refined[level]) {
+            const std::int32_t step = 1 << level;
+            const Box there = {refined.begin * Uniform(step), refined.end * Uniform(step)};
+            if (!Intersection(box, there).empty()) needed = std::uint8_t(level);
+            if (!Intersection(Grown(box, 2 * map->side.x, finest.bounds()), there).empty()) beside = std::uint8_t(level);
+          }
+        }
+        ASSERT_LE(map->Of(zone), needed);
+        if (beside == 2) {
+          ASSERT_EQ(map->Of(zone), 2);
+        }
+        at_finest += map->Of(zone) == 0 ? 1 : 0;
+      }
+      EXPECT_LE(at_finest, 2 * 8 * 8) << "two boxes of 32 voxels, and their neighbours";
+      request.detail = 1000;
+      EXPECT_EQ(LevelOf(request, levels), 2);
+    }
+  }
+}
+
 TEST(LevelOfTest, ANamedLevelIsTakenOrRefused) {
   const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);
   FrameRequest request = SomeRequest();

@@ -565,13 +565,18 @@ std::vector<SummaryReply> SamplesOf() {
 
 template <>
 std::vector<SampleQuery> SamplesOf() {
-  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(50, {1e300, -1, 0})}};
+  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(50, {1e300, -1, 0}), {kUmlaut, "2"}}};
 }
 
 template <>
 std::vector<SampleReply> SamplesOf() {
-  const VolumeSample full{{-1e9, 0, 1}, true,  {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMax64, std::string(kMaxLabelNameBytes, 'n')},
-                          -2.5,         1e-300};
+  const VolumeSample full{{-1e9, 0, 1},
+                          true,
+                          {kMaxVolumeSide, 0, 1},
+                          1e300,
+                          LabelAt{kMax64, std::string(kMaxLabelNameBytes, 'n')},
+                          {{kUmlaut, -2.5}, {kLongName}},
+                          1e-300};
   return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .value = 0x1p60, .label = LabelAt{}, .rest = -1}}}};
 }
 

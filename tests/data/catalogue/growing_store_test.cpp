@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
+#include <functional>
 #include <string>
 
 #include "data/catalogue/catalogue.h"
@@ -10,6 +12,7 @@
 #include "tests/data/stores/scripted_server.h"
 #include "tests/data/zarr/zarr_files.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -34,6 +37,21 @@ class GrowingStoreTest : public testing::Test {
               {{"zarr_consolidated_format", 1},
                {"metadata", {{".zattrs", attributes}, {".zgroup", {{"zarr_format", 2}}}, {"0/.zarray", MetadataOf(spec)}}}});
   }
+  // N5 counts x first, and blocks are big endian.
+  void WriteN5(std::uint64_t times) const {
+    WriteJson(folder_ / "a.n5/attributes.json", {{"n5", "2.5.1"}});
+    WriteJson(folder_ / "a.n5/s0/attributes.json", {{"dimensions", {kSide, kSide, kSide, times}},
+                                                    {"blockSize", {kSide, kSide, kSide, 1}},
+                                                    {"dataType", "uint16"},
+                                                    {"compression", {{"type", "raw"}}},
+                                                    {"axes", {"x", "y", "z", "t"}}});
+    for (std::uint64_t time = 0; time < times; ++time) {
+      std::string block = {0, 0, 0, 4};
+      for (const std::uint64_t along : {kSide, kSide, kSide, std::uint64_t{1}}) block += {0, 0, 0, char(along)};
+      for (std::uint64_t voxel = 0; voxel < kSide * kSide * kSide; ++voxel) block += {0, char(10 + time)};
+      WriteFile(folder_ / ("a.n5/s0/0/0/0/" + std::to_string(time)), block);
+    }
+  }
   static LoadedSource Read(const std::string& source) {
     const Result<ReadableSource> read = ReadSource(DataSource(source, ""), 1U << 30);
     EXPECT_TRUE(read.ok()) << read.status().message();
@@ -56,10 +74,22 @@ TEST_F(GrowingStoreTest, TimesThatComeToAFolderAreSeen) {
 }
 
 TEST_F(GrowingStoreTest, BehindAnAddressItIsLookedAtFromTimeToTime) {
+  struct Case {
+    std::string store, object;  // whose change tells of growth
+    std::function<void(std::uint64_t times)> write;
+  };
+  const auto zarr = [this](int version, bool consolidated) {
+    return [=, this](std::uint64_t times) { Write(version, times, consolidated); };
+  };
+  const Case cases[] = {{"/a.zarr", "/0/.zarray", zarr(2, false)},
+                        {"/a.zarr", "/.zmetadata", zarr(2, true)},
+                        {"/a.zarr", "/0/zarr.json", zarr(3, false)},
+                        {"/a.n5", "/s0/attributes.json", [this](std::uint64_t times) { WriteN5(times); }}};
   const ScriptedServer server(ServesFolder(folder_.path()));
-  for (const auto& [version, consolidated] : {std::pair(2, false), {2, true}, {3, false}}) {
-    Write(version, 2, consolidated);
-    const LoadedSource two = Read(server.url() + "/a.zarr");
+  for (const auto& [store, object, write] : cases) {
+    SCOPED_TRACE(store + object);
+    write(2);
+    const LoadedSource two = Read(server.url() + store);
     EXPECT_EQ(two.file.times.count, 2);
     const Time opened = MonotonicNow();
     std::size_t requests = server.requests().size();
@@ -67,18 +97,16 @@ TEST_F(GrowingStoreTest, BehindAnAddressItIsLookedAtFromTimeToTime) {
     EXPECT_EQ(server.requests().size(), requests) << "it was read just now";
     EXPECT_EQ(HaveChanged(*two.stamp, opened + kLookAgain).value(), false);
     ASSERT_EQ(server.requests().size(), ++requests);
-    EXPECT_EQ(server.requests().back().target, consolidated   ? "/a.zarr/.zmetadata"
-                                               : version == 2 ? "/a.zarr/0/.zarray"
-                                                              : "/a.zarr/0/zarr.json");
+    EXPECT_EQ(server.requests().back().target, store + object);
     EXPECT_NE(server.requests().back().header("if-none-match"), "");
-    Write(version, 3, consolidated);
+    write(3);
     EXPECT_EQ(HaveChanged(*two.stamp, opened + kLookAgain).value(), false);
     EXPECT_EQ(server.requests().size(), requests) << "it was looked at just now";
     EXPECT_EQ(HaveChanged(*two.stamp, opened + 2 * kLookAgain).value(), true);
-    const LoadedSource three = Read(server.url() + "/a.zarr");
+    const LoadedSource three = Read(server.url() + store);
     EXPECT_EQ(three.file.times.count, 3);
     EXPECT_NE(three.file.version, two.file.version) << "a chunk that was not there may be there now";
-    std::filesystem::remove_all(folder_ / "a.zarr");
+    std::filesystem::remove_all(folder_.path() + store);
   }
 }
 

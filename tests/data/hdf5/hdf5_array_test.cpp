@@ -1,5 +1,6 @@
 // Datasets as libhdf5 writes them: every layout, type, byte order, filter and index of chunks. libhdf5's own reading is the oracle.
 #include "data/hdf5/hdf5_array.h"
+#include "data/sources/file_array.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -126,7 +127,7 @@ TEST_F(Hdf5ArrayTest, SlicesWhatLiesInOnePiece) {
   Hdf5Writer(path).Write("/data", {.size = {7, 1000, 300}}, samples.data());
   const auto array = Open(path);
   ASSERT_TRUE(array.ok()) << array.status().message();
-  EXPECT_LE((*array)->shape().chunk_bytes(), kHdf5SliceBytes);
+  EXPECT_LE((*array)->shape().chunk_bytes(), kFileSliceBytes);
   EXPECT_EQ((*array)->shape().chunk, (std::vector<std::uint64_t>{1, 1000, 300}));
   const Result<std::vector<std::byte>> elements = ReadArray(**array);
   ASSERT_TRUE(elements.ok()) << elements.status().message();
@@ -193,11 +194,11 @@ TEST_F(Hdf5ArrayTest, NoticesDamage) {
   std::ofstream(path, std::ios::binary) << damaged;
   const Status flipped = ReadChunkNow(**array, first).status();
   EXPECT_EQ(flipped.code(), StatusCode::kDataLoss);
-  EXPECT_THAT(flipped.message(), HasSubstr("damaged.h5: chunk 0 of dataset '/data': damaged: its checksum is"));
+  EXPECT_THAT(flipped.message(), HasSubstr("damaged.h5: dataset '/data': chunk 0: damaged: its checksum is"));
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes.substr(0, at + 100);
   const Status cut = ReadChunkNow(**array, first).status();
   EXPECT_EQ(cut.code(), StatusCode::kDataLoss);
-  EXPECT_THAT(cut.message(), HasSubstr("chunk 0 of dataset '/data': the file ends before it does"));
+  EXPECT_THAT(cut.message(), HasSubstr("dataset '/data': chunk 0: the file ends before it does"));
   std::filesystem::remove(path);
   const Status gone = ReadChunkNow(**array, first).status();
   EXPECT_EQ(gone.code(), StatusCode::kUnavailable) << "a file that is gone is no chunk that was never written";

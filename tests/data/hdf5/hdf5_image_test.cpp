@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"
@@ -247,6 +248,30 @@ TEST_F(Hdf5ImageTest, MeshesOfOpenPmdLieOnTheirGridAtTheirIteration) {
   ExpectRefused("has geometry 'thetaMode', which is not supported; supported: cartesian", {.describe = true});
 }
 
+// Arrays of grids are no images. Whoever names one gets it.
+TEST_F(Hdf5ImageTest, GridsOfOtherProgramsAreNamed) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  const Hdf5Writer::Layout cube = {.size = {2, 3, 4}, .type = SampleType::kInt16};
+  Hdf5Writer(path_).Write("/Base/Zone/GridCoordinates/CoordinateX/ data", cube, samples.data());
+  ASSERT_NE(Open(), nullptr);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/Base/Zone/GridCoordinates/CoordinateX/ data", cube, samples.data());
+    writer.Doubles("/CGNSLibraryVersion/ data", {1}, {4.2});
+  }
+  ExpectRefused("image.h5: a CGNS file, which is not read; ParaView");
+  EXPECT_NE(Open({.dataset = "/Base/Zone/GridCoordinates/CoordinateX/ data"}), nullptr);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/vals_nod_var1", cube, samples.data());
+    writer.Numbers("/", "floating_point_word_size", {8});
+  }
+  ExpectRefused("image.h5: an Exodus file, which is not read; ParaView");
+  path_ = directory_ / "grid.cgns";
+  Hdf5Writer(path_).Write("/Base/Zone/GridCoordinates/CoordinateX/ data", cube, samples.data());
+  ExpectRefused("grid.cgns: a CGNS file, which is not read; ParaView");
+}
+
 // As netCDF-4 writes them.
 TEST_F(Hdf5ImageTest, CoordinatesPlaceTheAxesAndCfScalesTheValues) {
   std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
@@ -295,6 +320,7 @@ TEST_F(Hdf5ImageTest, TimesHaveAStep) {
   };
   EXPECT_EQ(netcdf({6, 12}, "hours since 1900-01-01 00:00:00"), (TimeAxis{2, 6, "h"}));
   EXPECT_EQ(netcdf({6, 12}, "beats"), (TimeAxis{2, 6, ""}));
+  EXPECT_EQ(netcdf({6, 6}, "hours since 1900-01-01"), (TimeAxis{2})) << "no step, so no unit either";
   EXPECT_EQ(netcdf({12, 6}, "hours since 1900-01-01"), (TimeAxis{2}));
   EXPECT_EQ(netcdf({6, NAN}, ""), (TimeAxis{2}));
   {
@@ -347,7 +373,66 @@ TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOne) {
     writer.Doubles("/x", {2}, {0, 5});
     writer.Scales("/data", {"/lev", "/y", "/x"});
   }
-  EXPECT_EQ(Open()->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
+  testing::internal::CaptureStderr();
+  const auto source = Open();
+  const std::string why = "coordinates lev are not evenly spaced: number 1 is 500, an even one would be 550";
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr(why));
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr(why)));
+  EXPECT_EQ(source->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
+}
+
+// Latitudes of a Gaussian grid: zeros of a Legendre polynomial, a little off even ones.
+TEST_F(Hdf5ImageTest, GaussianLatitudesAreEven) {
+  constexpr int kLatitudes = 96;
+  std::vector<double> latitudes;
+  for (int i = 0; i < kLatitudes; ++i) {
+    double x = std::cos(M_PI * (i + 0.75) / (kLatitudes + 0.5)), step = 1;
+    while (std::abs(step) > 1e-14) {  // Newton's method
+      double before = 1, value = x;
+      for (int n = 2; n <= kLatitudes; ++n) before = std::exchange(value, ((2 * n - 1) * x * value - (n - 1) * before) / n);
+      step = value * (x * x - 1) / (kLatitudes * (x * value - before));
+      x -= step;
+    }
+    latitudes.push_back(std::asin(x) * 180 / M_PI);
+  }
+  ASSERT_NEAR(latitudes[0], 88.572, 0.001) << "of the grid N48";
+  const std::vector<std::int16_t> samples = Ascending(2 * kLatitudes);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {kLatitudes, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/lat", {kLatitudes}, latitudes);
+    writer.Scales("/data", {"/lat", ""});
+  }
+  EXPECT_NEAR(Open()->info().levels[0].description.geometry.spacing.y, 2 * latitudes[0] / (kLatitudes - 1), 1e-9);
+}
+
+TEST_F(Hdf5ImageTest, AMissingValueThatIsADoubleIsOneOfFloats) {
+  const std::vector<float> samples = {1, 2, 1e20F, 4, 5, 6, 7, -9.99e8F};
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 2, 2}, .type = SampleType::kFloat32}, samples.data());
+    writer.Numbers("/data", "_FillValue", {1e20});
+    writer.Numbers("/data", "missing_value", {-9.99e8});
+  }
+  const auto source = Open();
+  EXPECT_TRUE(std::isnan(ValueAt(*source, {0, 1, 0})));
+  EXPECT_TRUE(std::isnan(ValueAt(*source, {1, 1, 1})));
+  EXPECT_EQ(ValueAt(*source, {0, 1, 1}), 7);
+}
+
+TEST_F(Hdf5ImageTest, BoundsAndCoordinatesOfSeveralAxesAreNoImages) {
+  const std::vector<std::int16_t> samples = Ascending(24);
+  {
+    Hdf5Writer writer(path_);
+    for (const char* const name : {"/so", "/corners", "/heights"}) {
+      writer.Write(name, {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    }
+    writer.Doubles("/lat", {3, 4}, std::vector<double>(12));
+    writer.Text("/lat", "bounds", "corners");
+    writer.Text("/so", "coordinates", "lat heights");
+  }
+  EXPECT_EQ(ValueAt(*Open(), {3, 2, 1}), 23);
+  EXPECT_EQ(ValueAt(*Open({.dataset = "corners"}), {3, 2, 1}), 23) << "unless they are asked for";
 }
 
 TEST_F(Hdf5ImageTest, DimensionsOfNetcdfWithoutAVariablePlaceNothing) {

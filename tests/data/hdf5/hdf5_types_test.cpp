@@ -157,12 +157,6 @@ TEST_F(Hdf5TypesTest, TheHeapOfATextMayBeLongerThanTheText) {
   EXPECT_FALSE((*Hdf5File::Open(path_))->Text("/data", "axistags"));
 }
 
-TEST_F(Hdf5TypesTest, AClassicNetcdfFileIsNamed) {
-  path_ = directory_ / "old.nc";
-  ASSERT_TRUE(WriteTextFile(path_, std::string("CDF\x01\0\0\0\0", 8)).ok());
-  ExpectRefused("old.nc: is a classic netCDF file");
-}
-
 // A chunk that is packed already. The library asks for code of the filter, which it does not call.
 TEST_F(Hdf5TypesTest, FiltersOfLibrariesThatAreNotThere) {
   std::string bytes;

@@ -255,6 +255,18 @@ TEST_F(N5Test, GroupsOfLevels) {
   ExpectRefused({.dataset = "/raw"}, "dataset is no option of N5");
 }
 
+// A writer that appends may write the levels of a time one after the other.
+TEST_F(N5Test, TheFinestLevelTellsTheTimes) {
+  Random random(12);
+  SCOPED_TRACE(random.trace());
+  WriteDataset(root_ + "/s0", {.size = {4, 4, 4, 3}, .block = {4, 4, 4, 1}}, random);
+  WriteDataset(root_ + "/s1", {.size = {2, 2, 2, 2}, .block = {2, 2, 2, 1}}, random);
+  const auto source = Open({.time = TimeRange{1, 1}});
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  EXPECT_EQ((*source)->info().times.count, 3);
+  ExpectRefused({.time = TimeRange{2, 2}}, "scan.n5/s1: time is 2, must be in [0, 1]");
+}
+
 // COSEM's lists are in the order of `axes`, whatever that is.
 TEST_F(N5Test, TransformsSayWhereLevelsLie) {
   Random random(9);

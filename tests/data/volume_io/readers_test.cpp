@@ -236,7 +236,7 @@ TEST_F(ReadersTest, VtkFilesSayWhatTheyAreNot) {
 
   const FileBytes legacy = VtkFile({}, samples, true);
   const std::pair<FileBytes, const char*> files[] = {
-      {with(legacy, "STRUCTURED_POINTS", "POLYDATA"), "type POLYDATA, must be STRUCTURED_POINTS, RECTILINEAR_GRID or"},
+      {with(legacy, "STRUCTURED_POINTS", "POLYDATA"), "type POLYDATA, must be STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID or"},
       {with(legacy, "POINT_DATA", "CELL_DATA"), "CELL_DATA has 24 elements, the grid of its DIMENSIONS 6"},
       {with(legacy, "SCALARS", "TRIANGLES"), "has 'TRIANGLES', must have a VTK keyword that is supported"},
       {with(legacy.substr(0, legacy.size() - 22), "unsigned_char", "bit"), "array density: type 'bit' is not supported"},

@@ -172,7 +172,7 @@ TEST_F(VtkTest, PiecesOfUnstructuredGridsFollowEachOther) {
   for (const PointNumber point : loaded->mesh.tetrahedra[1]) EXPECT_GE(point, 4U);
   // Points of another piece are none of its own.
   WriteFile(directory_ / "g.vtu", XmlFile("UnstructuredGrid", "", piece(0, 1) + Replaced(piece(5, 2), "0\n1\n2\n3\n", "0\n1\n2\n4\n")));
-  EXPECT_THAT(ReadMesh(directory_ / "g.vtu").status().message(), HasSubstr("cell 1 has point 4, must be in [0, 4)"));
+  EXPECT_THAT(ReadMesh(directory_ / "g.vtu").status().message(), HasSubstr("g.vtu: piece 1: cell 0 has point 4, must be in [0, 4)"));
 }
 
 TEST_F(VtkTest, ATimeIsTakenWithItsArrays) {
@@ -261,7 +261,13 @@ TEST_F(VtkTest, ScalarsOfBytesMayBeColors) {
 
 TEST_F(VtkTest, FilesOfVtkThatAreNotReadAreNamed) {
   EXPECT_THAT(WhyNot("v.pvtk", "<VTKFile/>"), HasSubstr("v.pvtk: a list of VTK files, which is not read; ParaView writes"));
-  EXPECT_THAT(WhyNot("V.VTS", "<VTKFile/>"), HasSubstr("a curvilinear grid of VTK (StructuredGrid), which is not read"));
+  EXPECT_THAT(WhyNot("v.ex2", "exodus"), HasSubstr("v.ex2: an Exodus file, which is not read; ParaView's Save Data writes"));
+  EXPECT_THAT(WhyNot("v.cgns", "ADF"), HasSubstr("v.cgns: a CGNS file, which is not read; ParaView"));
+  EXPECT_THAT(WhyNot("v.case", "FORMAT"), HasSubstr("v.case: an EnSight file, which is not read; ParaView"));
+  EXPECT_THAT(WhyNot("v.foam", ""), HasSubstr("v.foam: a case of OpenFOAM, which is not read; foamToVTK writes"));
+  std::filesystem::create_directories(directory_ / "cavity/system");
+  WriteFile(directory_ / "cavity/system/controlDict", "FoamFile {}");
+  EXPECT_THAT(ReadVolume(directory_ / "cavity").status().message(), HasSubstr("cavity: a case of OpenFOAM, which is not read"));
   EXPECT_THAT(WhyNot("v.vtp", "<VTKFile/>"), HasSubstr("a surface of VTK (PolyData), which holds no volume"));
   EXPECT_THAT(WhyNot("v.vtx", "<VTKFile/>"), HasSubstr("not a volume, which must end in ."));
 }

@@ -2,20 +2,26 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstddef>
 
 namespace slabstream {
 
 FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
   constexpr const char* kTypes[] = {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64"};
+  const bool curvilinear = !spec.extent.empty();
+  const std::string type = curvilinear ? "StructuredGrid" : "UnstructuredGrid";
+  const std::string piece = curvilinear ? fmt::format("Extent=\"{}\"", spec.extent)
+                                        : fmt::format("NumberOfPoints=\"{}\" NumberOfCells=\"{}\"", spec.points, spec.cells);
   FileBytes text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n"
-      "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-      spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
-      options.block > 0 ? " compressor=\"vtk" + options.compressor + "DataCompressor\"" : "", spec.points, spec.cells);
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"{0}\" version=\"1.0\" byte_order=\"{1}\" header_type=\"{2}\"{3}>\n"
+      "<{0}>\n<Piece {4}>\n",
+      type, spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
+      options.block > 0 ? " compressor=\"vtk" + options.compressor + "DataCompressor\"" : "", piece);
   const bool appended = options.format == "appended";
   FileBytes samples;
   for (const char* section : {"PointData", "CellData", "Points", "Cells"}) {
+    if (curvilinear && section == std::string("Cells")) continue;
     const std::string& scalars = section == std::string("PointData") ? spec.point_scalars : spec.cell_scalars;
     const bool has_scalars = std::string(section).ends_with("Data") && !scalars.empty();
     text += fmt::format("<{}{}>\n", section, has_scalars ? " Scalars=\"" + scalars + "\"" : "");
@@ -36,7 +42,7 @@ FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
     }
     text += fmt::format("</{}>\n", section);
   }
-  text += "</Piece>\n</UnstructuredGrid>\n";
+  text += "</Piece>\n</" + type + ">\n";
   if (appended) text += "<AppendedData encoding=\"" + options.encoding + "\">\n  _" + samples + "\n</AppendedData>\n";
   return text + "</VTKFile>\n";
 }
@@ -46,8 +52,10 @@ namespace {
 class LegacyWriter {
  public:
   explicit LegacyWriter(const LegacyOptions& options) : options_(options) {
-    text_ = fmt::format("# vtk DataFile Version {}\nwritten by a test\n{}\nDATASET UNSTRUCTURED_GRID\n", options.offsets ? "5.1" : "3.0",
-                        options.binary ? "BINARY" : "ASCII");
+    const bool curvilinear = !options.dimensions.empty();
+    text_ = fmt::format("# vtk DataFile Version {}\nwritten by a test\n{}\nDATASET {}\n", options.offsets ? "5.1" : "3.0",
+                        options.binary ? "BINARY" : "ASCII", curvilinear ? "STRUCTURED_GRID" : "UNSTRUCTURED_GRID");
+    if (curvilinear) Line("DIMENSIONS " + options.dimensions);
   }
 
   void Line(const std::string& line) { text_ += line + "\n"; }
@@ -130,7 +138,7 @@ FileBytes LegacyGridFile(const VtuSpec& spec, const LegacyOptions& options) {
     writer.Numbers(array.type, array.values);
     writer.Metadata();
   }
-  writer.Cells(spec);
+  if (options.dimensions.empty()) writer.Cells(spec);
   writer.Data(spec, false);
   writer.Data(spec, true);
   return writer.text();
@@ -155,6 +163,41 @@ VtuSpec GridSpec(const std::vector<Vec3>& points, const std::vector<int>& types,
           .cells = int(types.size()),
           .arrays = {values, numbers, places, corners, ends, kinds},
           .point_scalars = "height"};
+}
+
+VtuSpec BoxOfHexahedra(const Index3& begin, const Index3& end, PlacePoint place) {
+  std::vector<Vec3> points;
+  std::vector<std::vector<int>> corners;
+  const int row = end.x - begin.x + 1, layer = row * (end.y - begin.y + 1);
+  for (int z = begin.z; z <= end.z; ++z) {
+    for (int y = begin.y; y <= end.y; ++y) {
+      for (int x = begin.x; x <= end.x; ++x) {
+        const int n = int(points.size());
+        points.push_back(place({double(x), double(y), double(z)}));
+        if (x == end.x || y == end.y || z == end.z) continue;
+        corners.push_back({n, n + 1, n + row + 1, n + row, n + layer, n + layer + 1, n + layer + row + 1, n + layer + row});
+      }
+    }
+  }
+  return GridSpec(points, std::vector<int>(corners.size(), 12), corners);
+}
+
+FileBytes VtkListFile(const std::string& type, const std::vector<std::string>& files) {
+  const bool pieces = type.starts_with('P');
+  FileBytes text =
+      fmt::format("<?xml version=\"1.0\"?>\n<VTKFile type=\"{0}\" version=\"1.0\" byte_order=\"LittleEndian\">\n<{0}>\n", type);
+  for (const std::string& file : files)
+    text += fmt::format("<{} {}=\"{}\"/>\n", pieces ? "Piece" : "DataSet", pieces ? "Source" : "file", file);
+  return text + fmt::format("</{}>\n</VTKFile>\n", type);
+}
+
+double VolumeOf(const Mesh& mesh) {
+  double volume = 0;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    const auto place = [&](std::size_t i) { return Vec3{mesh.points[t[i]].x, mesh.points[t[i]].y, mesh.points[t[i]].z}; };
+    volume += std::abs(Dot(place(1) - place(0), Cross(place(2) - place(0), place(3) - place(0)))) / 6;
+  }
+  return volume;
 }
 
 VtuSpec SmallGrid() {

@@ -98,9 +98,8 @@ def check_values(program, case, random):
         for channel in range(case.voxels.shape[1]):
             voxels = case.voxels[number, channel]
             at = np.unique(random.integers(0, voxels.shape, (20, 3)), axis=0)
-            # Of a file, `value` takes a number for that of a channel, also if one has it for a name.
-            name = str(channel) if case.names[channel].isdigit() else called(random, case, channel)
-            options = ["--channel", name, "--time", time_of(random, case, number)]
+            name = called(random, case, channel)
+            options = ["--channel", in_a_list(name), "--time", time_of(random, case, number)]
             for sample, voxel in zip(program.values(case.path, at[:, ::-1] * case.spacing, *options), at):
                 agree(f"{shlex.join(options)}: the value at {voxel.tolist()} (z, y, x)", sample["value"], voxels[tuple(voxel)], 1e-6)
 
@@ -175,7 +174,7 @@ def check_overlay(program, case, random):
     for sample, index, value, far in zip(program.values(case.path, places * LPS, "--overlay", case.overlay_path), indices, expected, beyond):
         agree(f"the volume's value at {index.tolist()}", sample["value"], image.GetPixel(index.tolist()), 1e-5)
         if abs(far) > NEAR:
-            agree(f"the overlay's value at {index.tolist()}", sample.get("overlay"), value if far < 0 else None, 2e-3)
+            agree(f"the overlay's value at {index.tolist()}", sample["fields"][1]["value"], value if far < 0 else None, 2e-3)
     if image.GetDirection() == (1, 0, 0, 0, 1, 0, 0, 0, 1):
         check_covered_slice(program, case, random)
 

@@ -1,9 +1,11 @@
-"""HDF5 files that state their geometry: MINC 2 of nibabel's tests, netCDF-4 by h5py's dimension scales, ilastik's axes."""
+"""HDF5 and netCDF files that state their geometry: MINC of nibabel's tests, netCDF by h5py's dimension scales and by Unidata's library,
+ilastik's axes."""
 import glob
 import json
 import os
 
 import h5py
+import netCDF4
 import nibabel
 import numpy as np
 
@@ -15,9 +17,9 @@ def minc():
     for path in sorted(glob.glob(data + "/*.mnc")):
         try:
             image = nibabel.load(path)
-        except Exception:  # MINC 1 that is no HDF5
+        except Exception:
             continue
-        if isinstance(image, nibabel.minc2.Minc2Image) and len(image.shape) == 3:
+        if isinstance(image, nibabel.minc1.Minc1Image) and len(image.shape) == 3:  # so are those of MINC 2
             yield Case(os.path.basename(path), path, np.asarray(image.dataobj), image.affine)
 
 
@@ -50,8 +52,42 @@ def netcdf(random, folder, number):
     return Case(f"netCDF {number}", path, stored.transpose(2, 1, 0) * 0.25 + 3.0, scaled(spacing, origin), "dataset=/density")
 
 
+def unidata(random, folder, number):
+    """As the netCDF library writes and reads it: packed, with missing values, records beside those of other variables, axes either way."""
+    kind = ["NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT_DATA", "NETCDF4"][number % 4]
+    types = ["i1", "i2", "f4", "f8"] + ["u1", "u2"] * (number % 4 > 1)
+    dtype = np.dtype(types[random.integers(len(types))])
+    path = os.path.join(folder, f"u{number}.nc")
+    sizes = {"time": int(random.integers(1, 4)), "depth": 4, "lat": 5, "lon": int(random.integers(2, 8))}
+    step, first = random.uniform(0.5, 3, 3) * random.choice([-1, 1], 3), random.normal(scale=10, size=3)
+    at = int(random.integers(sizes["time"]))
+    with netCDF4.Dataset(path, "w", format=kind) as file:
+        for name, size in sizes.items():
+            file.createDimension(name, None if name == "time" and random.random() < 0.7 else size)
+        time = file.createVariable("time", "f8", ("time",))
+        time.units = "hours since 1900-01-01"
+        time[:] = 6.0 * np.arange(sizes["time"])
+        for axis, name in enumerate(["lon", "lat", "depth"]):
+            file.createVariable(name, "f8", (name,))[:] = first[axis] + step[axis] * np.arange(sizes[name])
+        file["lat"].units, file["lon"].units, file["depth"].axis = "degrees_north", "degrees_east", "Z"
+        data = file.createVariable("v", dtype, tuple(sizes), fill_value=dtype.type(7))
+        if random.random() < 0.5:
+            data.scale_factor, data.add_offset = 0.25, -3.0
+        if random.random() < 0.7:
+            file.createVariable("mask", "i1", ("time", "lon"))[:] = np.zeros((sizes["time"], sizes["lon"]))
+        stored = samples(random, tuple(sizes.values()), dtype)
+        stored[random.random(stored.shape) < 0.1] = 7
+        data.set_auto_maskandscale(False)
+        data[:] = stored
+    with netCDF4.Dataset(path) as file:
+        voxels = np.ma.filled(file["v"][at].astype(np.float64), np.nan)
+    affine = scaled(step, first)
+    return Case(f"{kind} {number} {dtype}", path, voxels.transpose(2, 1, 0), affine, f"dataset=v,time={at}")
+
+
 def cases(random, folder, count, skipped):
     yield from minc()
     for number in range(count):
         yield ilastik(random, folder, number)
         yield netcdf(random, folder, number)
+        yield unidata(random, folder, number)

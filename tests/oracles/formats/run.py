@@ -18,7 +18,7 @@ import numpy as np
 
 from case import Refused
 
-FAMILIES = ["nifti", "dicom", "itk", "nrrd", "mrc", "tiff", "vtk", "hdf5"]
+FAMILIES = ["nifti", "dicom", "itk", "nrrd", "mrc", "tiff", "vtk", "hdf5", "xdmf"]
 POINTS = 60
 
 

@@ -1,4 +1,4 @@
-"""VTK: images and rectilinear grids that VTK writes in every mode, byte order and compressor."""
+"""VTK: images and rectilinear grids that VTK writes in every mode, byte order and compressor; grids of cells in one piece and in several."""
 import itertools
 import os
 
@@ -22,6 +22,47 @@ def grid_of(random, cells):
     return image, voxels, scaled(spacing, origin + (spacing / 2 if cells else 0))
 
 
+def grids(random, folder):
+    """Curvilinear and unstructured grids of cubes, with a linear field. The lattice has a voxel for each cell."""
+    cells = random.integers(4, 9, 3)
+    source, points, field, unstructured = vtk.vtkRTAnalyticSource(), vtk.vtkImageDataToPointSet(), vtk.vtkElevationFilter(), vtk.vtkAppendFilter()
+    source.SetWholeExtent(0, cells[0], 0, cells[1], 0, cells[2])
+    points.SetInputConnection(source.GetOutputPort())
+    high = random.uniform(1, 2, 3) * cells
+    field.SetHighPoint(high)  # from 0 at the origin to 1 there, which lies outside
+    field.SetInputConnection(points.GetOutputPort())
+    unstructured.SetInputConnection(field.GetOutputPort())
+    centres = np.moveaxis(np.indices(cells), 0, -1) + 0.5
+    voxels = (centres @ high / (high @ high)).astype(np.float32)
+    blocks, block = vtk.vtkMultiBlockDataSet(), vtk.vtkUnstructuredGrid()
+    unstructured.Update()
+    block.DeepCopy(unstructured.GetOutput())  # which the writers of pieces make anew
+    blocks.SetBlock(0, block)
+    for mode, (end, writer, port) in itertools.product(MODES + [None], (
+            (".vts", vtk.vtkXMLStructuredGridWriter, field), (".pvts", vtk.vtkXMLPStructuredGridWriter, field),
+            (".vtu", vtk.vtkXMLUnstructuredGridWriter, unstructured), (".pvtu", vtk.vtkXMLPUnstructuredGridWriter, unstructured),
+            (".vtm", vtk.vtkXMLMultiBlockDataWriter, None), (".vtk", vtk.vtkStructuredGridWriter, field),
+            (".vtk", vtk.vtkUnstructuredGridWriter, unstructured))):
+        writer, legacy = writer(), end == ".vtk"
+        if legacy != (mode is None):
+            continue
+        path = os.path.join(folder, f"{writer.GetClassName()}{mode or ''}{end}")
+        writer.SetFileName(path)
+        if port:
+            writer.SetInputConnection(port.GetOutputPort())
+        else:
+            writer.SetInputData(blocks)
+        if not legacy:
+            getattr(writer, mode)()
+        if end.startswith(".p"):
+            writer.SetNumberOfPieces(4)
+            writer.SetStartPiece(0)
+            writer.SetEndPiece(3)
+            writer.SetGhostLevel(1)
+        writer.Write()
+        yield Case(os.path.basename(path), path, voxels, scaled((1, 1, 1), (0.5, 0.5, 0.5)), f"lattice={max(cells)},array=Elevation", tolerance=2e-5)
+
+
 def cases(random, folder, count, skipped):
     for number, (mode, compressor, order) in enumerate(itertools.product(MODES, COMPRESSORS, ORDERS)):
         image, voxels, affine = grid_of(random, bool(random.integers(2)))
@@ -40,3 +81,4 @@ def cases(random, folder, count, skipped):
         path = os.path.join(folder, f"legacy{number}.vtk")
         image.save(path, binary=bool(random.integers(2)))
         yield Case(f"legacy {number}", path, voxels, affine, tolerance=1e-5)  # six digits, where it is text
+    yield from grids(random, folder)

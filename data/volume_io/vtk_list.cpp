@@ -1,0 +1,59 @@
+#include "data/volume_io/vtk_list.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <span>
+
+#include "common/text/trimmed.h"
+#include "data/volume_io/xml_events.h"
+
+namespace slabstream {
+namespace {
+
+// "PUnstructuredGrid", not "PolyData".
+bool IsOfPieces(const std::string& type) {
+  return type.size() > 1 && type[0] == 'P' && std::isupper(static_cast<unsigned char>(type[1])) != 0;
+}
+
+}  // namespace
+
+Result<VtkList> ReadVtkList(const std::string& path) {
+  namespace fs = std::filesystem;
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
+  std::error_code error;
+  // To open a pipe would wait for its writer.
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) return wrong("not a file that can be read");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Status::NotFound(path + ": cannot be opened for reading");
+  VtkList list;
+  std::size_t files = 0;
+  bool unnamed = false;
+  const auto on_start = [&](const XmlTag& tag) {
+    if (tag.name == "VTKFile") list.type = Trimmed(tag.Attribute("type"));
+    const bool of_pieces = IsOfPieces(list.type);
+    if (tag.name != (of_pieces ? "Piece" : "DataSet")) return of_pieces || list.OfBlocks() || list.type.empty();
+    const std::string source(Trimmed(tag.Attribute(of_pieces ? "Source" : "file"))), name(Trimmed(tag.Attribute("name")));
+    unnamed = unnamed || (of_pieces && source.empty());  // while a block without a file is an empty one
+    if (!source.empty() && ++files <= kMostListedFiles) {
+      list.entries.push_back({(fs::path(path).parent_path() / source).string(), name.empty() ? source : name});
+    }
+    return true;
+  };
+  const auto read = [&](std::span<char> out) {
+    file.read(out.data(), std::streamsize(out.size()));
+    return std::size_t(file.gcount());
+  };
+  const Status status = ReadXml(read, {on_start, [](const XmlTag&) {}});
+  if (!status.ok()) return Status(status.code(), fmt::format("{}: not a VTK file: {}", path, status.message()));
+  if (list.type.empty()) return wrong("not a VTK file: has no element VTKFile with a type");
+  if (unnamed) return wrong("a Piece of it has no Source");
+  if ((IsOfPieces(list.type) || list.OfBlocks()) && (files == 0 || files > kMostListedFiles)) {
+    return wrong(fmt::format("names {} files, must name 1 to {}", files, kMostListedFiles));
+  }
+  return list;
+}
+
+}  // namespace slabstream
