@@ -328,7 +328,11 @@ GridArray VtkXmlFile::Described(const VtkArray& array) const {
 Result<std::string> VtkXmlFile::SourceOf(std::size_t piece) const {
   const std::string source = pieces_[piece].Attribute("Source");
   if (source.empty()) return Wrong(fmt::format("piece {} names no file: Source is missing", piece));
-  return (std::filesystem::path(path_).parent_path() / source).string();
+  const std::filesystem::path file = std::filesystem::path(path_).parent_path() / source;
+  std::error_code error;
+  // To open a pipe would wait for its writer.
+  if (!std::filesystem::exists(file, error) || std::filesystem::is_regular_file(file, error)) return file.string();
+  return Wrong(fmt::format("piece {} names {}, which is not a file that can be read", piece, source));
 }
 
 OfferedArrays VtkXmlFile::Offered() const {

@@ -61,7 +61,7 @@ class VtkXmlFile {
   const std::string& ActiveScalars(std::string_view section) const { return section == "PointData" ? point_scalars_ : cell_scalars_; }
   const std::vector<VtkArray>& arrays() const { return arrays_; }
   bool parallel() const { return file_.Attribute("type").starts_with('P'); }
-  // The file of a piece of a parallel file. InvalidArgument: it names none.
+  // The file of a piece of a parallel file. InvalidArgument: it names none, or what is no file.
   Result<std::string> SourceOf(std::size_t piece) const;
   // Those of points and cells in the first piece (of a parallel file: in each), and their numbers in arrays().
   OfferedArrays Offered() const;

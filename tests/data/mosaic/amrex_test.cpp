@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <string>
@@ -134,6 +135,10 @@ TEST_F(AmrexTest, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(with("Level_1/Cell_D_00000", ")) 2\n", ")) 0\n"), HasSubstr("are 0 variables"));
   EXPECT_THAT(with("Level_1/Cell_D_00000", "((-12,", "((-11,"), HasSubstr("lies another box than Cell_H says"));
   EXPECT_THAT(with("Level_0/Cell_H", "((-8,0,4) (7,7,7)", "((-8,0,4) (7,6,7)"), HasSubstr("plt: its parts hold 960 of the 1024 voxels"));
+  ASSERT_EQ(::mkfifo((directory_ / "plt/Level_1/pipe").c_str(), 0600), 0);
+  EXPECT_THAT(with("Level_1/Cell_H", "FabOnDisk: Cell_D_00000", "FabOnDisk: pipe"), HasSubstr("pipe: not a file that can be read"));
+  ASSERT_EQ(::mkfifo((directory_ / "plt/Level_1/pipe_H").c_str(), 0600), 0);
+  EXPECT_THAT(with("Header", "Level_1/Cell", "Level_1/pipe"), HasSubstr("pipe_H: not a file that can be read"));
   Write();
   const std::string data = ReadFile(directory_ / "plt/Level_1/Cell_D_00000");
   EXPECT_THAT(with("Level_1/Cell_D_00000", data.substr(data.size() - 1500), ""), HasSubstr("truncated"));

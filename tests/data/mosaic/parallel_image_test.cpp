@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <random>
 #include <string>
@@ -142,6 +143,8 @@ TEST_F(ParallelImage, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(with("parts/piece 5.vti", "whole.pvti"), HasSubstr("whole.pvti: a VTK file of type 'PImageData', must be ImageData"));
   EXPECT_THAT(with("parts/piece 5.vti", "parts/piece 4.vti"),
               ContainsRegex("whole.pvti: .*/piece 4.vti has 7 x 9 x 7 voxels, must have 5 x 9 x 7"));
+  ASSERT_EQ(::mkfifo((directory_ / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(with("parts/piece 5.vti", "pipe"), HasSubstr("piece 5 names pipe, which is not a file that can be read"));
   EXPECT_THAT(with("Source=\"parts/piece 0.vti\"", ""), HasSubstr("piece 0 names no file: Source is missing"));
   EXPECT_THAT(with("type=\"Int16\" Name=\"p\"", "type=\"Int32\" Name=\"p\""),
               HasSubstr("piece 0.vti has samples of int16 from 0 and scale 1, must have int32"));
