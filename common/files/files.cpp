@@ -147,6 +147,12 @@ Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes)
   return text;
 }
 
+Status CheckIsFile(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(path, error) || fs::is_regular_file(path, error)) return Status::Ok();
+  return Status::InvalidArgument(path + ": not a file that can be read");
+}
+
 Status CheckCanWrite(const std::string& option, const std::string& path) {
   const fs::path parent = fs::path(path).parent_path();
   std::error_code error;

@@ -61,6 +61,10 @@ Result<std::string> ReadTextFile(const std::string& path, std::size_t max_bytes)
 // The same for a secret. InvalidArgument: others can read the file.
 Result<std::string> ReadPrivateTextFile(const std::string& path, std::size_t max_bytes);
 
+// For paths that other files name: to open a pipe would wait for its writer. InvalidArgument, naming the path: it is there, and no regular
+// file.
+Status CheckIsFile(const std::string& path);
+
 // Checks, before long work begins, that a file can be created as `path`; leaves nothing behind. Else InvalidArgument or NotFound with the
 // reason; the message begins with `option`.
 Status CheckCanWrite(const std::string& option, const std::string& path);

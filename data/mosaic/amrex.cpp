@@ -92,13 +92,6 @@ struct Plotfile {
 
 Status Wrong(const std::string& file, const std::string& why) { return Status::InvalidArgument(file + ": " + why); }
 
-// To open a pipe would wait for its writer.
-Status CheckIsFile(const std::string& file) {
-  std::error_code error;
-  if (!fs::exists(file, error) || fs::is_regular_file(file, error)) return Status::Ok();
-  return Wrong(file, "not a file that can be read");
-}
-
 Result<Level> ReadLevel(const std::string& path, const std::string& name, const Box& domain, std::vector<std::string>& files) {
   const std::string file = (fs::path(path) / (name + "_H")).string(), folder = fs::path(file).parent_path().string();
   if (Status status = CheckIsFile(file); !status.ok()) return status;

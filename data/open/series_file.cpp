@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-#include <span>
 
 #include "common/files/files.h"
 #include "common/json/json.h"
@@ -21,12 +19,6 @@ namespace {
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 Result<std::vector<TimeFile>> ReadCollection(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Status::NotFound(path + ": cannot be opened for reading");
-  const auto read = [&](std::span<char> out) {
-    file.read(out.data(), std::streamsize(out.size()));
-    return std::size_t(file.gcount());
-  };
   bool is_collection = false;
   std::vector<TimeFile> files;
   const auto on_start = [&](const XmlTag& tag) {
@@ -38,8 +30,7 @@ Result<std::vector<TimeFile>> ReadCollection(const std::string& path) {
     }
     return true;
   };
-  if (Status status = ReadXml(read, {on_start, [](const XmlTag&) {}}); !status.ok())
-    return Status(status.code(), path + ": " + status.message());
+  if (Status status = ReadXmlFile(path, "", {on_start, [](const XmlTag&) {}}); !status.ok()) return status;
   return is_collection ? Result(std::move(files)) : Status::InvalidArgument(path + ": not a VTK file of type Collection");
 }
 

@@ -10,7 +10,6 @@
 #include <functional>
 #include <initializer_list>
 #include <map>
-#include <span>
 
 #include "common/base/log.h"
 #include "common/files/files.h"
@@ -65,13 +64,7 @@ Status ForEachElement(const std::string& xml, const std::function<bool(const std
     text_begins.pop_back();
     end(open, tag.name, Trimmed(std::string_view(xml).substr(std::size_t(begin), std::size_t(size))));
   };
-  std::size_t at = 0;
-  const auto read = [&](std::span<char> buffer) {
-    const std::size_t count = xml.copy(buffer.data(), buffer.size(), at);
-    at += count;
-    return count;
-  };
-  return ReadXml(read, {on_start, on_end});
+  return ReadXml(xml, {on_start, on_end});
 }
 
 }  // namespace

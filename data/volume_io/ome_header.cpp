@@ -26,13 +26,7 @@ class OmeReader {
                              return true;
                            },
                            [this](const XmlTag& tag) { OnEnd(tag); }};
-    std::size_t at = 0;
-    const auto read = [&](std::span<char> out) {
-      const std::size_t count = description_.copy(out.data(), out.size(), at);
-      at += count;
-      return count;
-    };
-    Status status = ReadXml(read, events);
+    Status status = ReadXml(description_, events);
     if (status.ok() && !wrong_.empty()) status = Status::InvalidArgument(wrong_);
     if (!status.ok()) return Status::InvalidArgument(path + ": its OME description: " + status.message());
     return std::move(ome_);

@@ -4,8 +4,6 @@
 
 #include <cctype>
 #include <filesystem>
-#include <fstream>
-#include <span>
 
 #include "common/text/trimmed.h"
 #include "data/volume_io/xml_events.h"
@@ -23,11 +21,6 @@ bool IsOfPieces(const std::string& type) {
 Result<VtkList> ReadVtkList(const std::string& path) {
   namespace fs = std::filesystem;
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
-  std::error_code error;
-  // To open a pipe would wait for its writer.
-  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) return wrong("not a file that can be read");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Status::NotFound(path + ": cannot be opened for reading");
   VtkList list;
   std::size_t files = 0;
   bool unnamed = false;
@@ -42,12 +35,7 @@ Result<VtkList> ReadVtkList(const std::string& path) {
     }
     return true;
   };
-  const auto read = [&](std::span<char> out) {
-    file.read(out.data(), std::streamsize(out.size()));
-    return std::size_t(file.gcount());
-  };
-  const Status status = ReadXml(read, {on_start, [](const XmlTag&) {}});
-  if (!status.ok()) return Status(status.code(), fmt::format("{}: not a VTK file: {}", path, status.message()));
+  if (Status status = ReadXmlFile(path, "not a VTK file: ", {on_start, [](const XmlTag&) {}}); !status.ok()) return status;
   if (list.type.empty()) return wrong("not a VTK file: has no element VTKFile with a type");
   if (unnamed) return wrong("a Piece of it has no Source");
   if ((IsOfPieces(list.type) || list.OfBlocks()) && (files == 0 || files > kMostListedFiles)) {

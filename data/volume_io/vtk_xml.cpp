@@ -5,7 +5,6 @@
 #include <bit>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -14,6 +13,7 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/files/files.h"
 #include "common/text/base64.h"
 #include "common/text/parse_number.h"
 #include "common/text/trimmed.h"
@@ -268,20 +268,12 @@ void VtkXmlFile::OnEnd(const XmlTag& tag) {
 }
 
 Status VtkXmlFile::ReadElements(std::string_view type) {
-  std::ifstream file(path_, std::ios::binary);
-  if (!file) return Status::NotFound(path_ + ": cannot be opened for reading");
-  const auto read = [&](std::span<char> out) {
-    file.read(out.data(), std::streamsize(out.size()));
-    return std::size_t(file.gcount());
-  };
   const auto on_start = [&](XmlTag tag) {
     for (auto& [name, value] : tag.attributes) value = std::string(Trimmed(value));
     return OnStart(tag, type);
   };
   const XmlEvents events{on_start, [&](const XmlTag& tag) { OnEnd(tag); }};
-  if (Status status = ReadXml(read, events); !status.ok()) {
-    return Status(status.code(), fmt::format("{}: not a VTK file of type {}: {}", path_, type, status.message()));
-  }
+  if (Status status = ReadXmlFile(path_, fmt::format("not a VTK file of type {}: ", type), events); !status.ok()) return status;
   if (file_.Attribute("type") != type || dataset_.name.empty()) {
     return Wrong(fmt::format("a VTK file of type '{}', must be {}", file_.Attribute("type"), type));
   }
@@ -329,9 +321,7 @@ Result<std::string> VtkXmlFile::SourceOf(std::size_t piece) const {
   const std::string source = pieces_[piece].Attribute("Source");
   if (source.empty()) return Wrong(fmt::format("piece {} names no file: Source is missing", piece));
   const std::filesystem::path file = std::filesystem::path(path_).parent_path() / source;
-  std::error_code error;
-  // To open a pipe would wait for its writer.
-  if (!std::filesystem::exists(file, error) || std::filesystem::is_regular_file(file, error)) return file.string();
+  if (CheckIsFile(file.string()).ok()) return file.string();
   return Wrong(fmt::format("piece {} names {}, which is not a file that can be read", piece, source));
 }
 

@@ -3,9 +3,12 @@
 #include <expat.h>
 #include <fmt/format.h>
 
+#include <fstream>
 #include <memory>
 #include <new>
 #include <type_traits>
+
+#include "common/files/files.h"
 
 namespace slabstream {
 namespace {
@@ -92,6 +95,28 @@ Status ReadXml(const std::function<std::size_t(std::span<char>)>& read, const Xm
         fmt::format("its XML cannot be read in line {}: {}", XML_GetCurrentLineNumber(parser.get()), state.wrong));
   }
   return Status::Ok();
+}
+
+Status ReadXml(std::string_view text, const XmlEvents& events) {
+  std::size_t at = 0;
+  const auto read = [&](std::span<char> out) {
+    const std::size_t count = text.copy(out.data(), out.size(), at);
+    at += count;
+    return count;
+  };
+  return ReadXml(read, events);
+}
+
+Status ReadXmlFile(const std::string& path, std::string_view wrong, const XmlEvents& events) {
+  if (Status status = CheckIsFile(path); !status.ok()) return status;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Status::NotFound(path + ": cannot be opened for reading");
+  const auto read = [&](std::span<char> out) {
+    file.read(out.data(), std::streamsize(out.size()));
+    return std::size_t(file.gcount());
+  };
+  const Status status = ReadXml(read, events);
+  return status.ok() ? status : Status(status.code(), fmt::format("{}: {}{}", path, wrong, status.message()));
 }
 
 }  // namespace slabstream

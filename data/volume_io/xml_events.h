@@ -8,6 +8,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "common/base/status.h"
 
@@ -34,5 +35,9 @@ struct XmlEvents {
 // with the line: no well-formed XML, a tag that is longer, or a document type definition that declares entities or attributes, which no
 // volume has. A definition in another file is not read.
 Status ReadXml(const std::function<std::size_t(std::span<char>)>& read, const XmlEvents& events);
+Status ReadXml(std::string_view text, const XmlEvents& events);
+// The same of a file. Messages begin with its path, and those of ReadXml then with `wrong`, such as "not a VTK file: ". NotFound; errors of
+// CheckIsFile (common/files/files.h).
+Status ReadXmlFile(const std::string& path, std::string_view wrong, const XmlEvents& events);
 
 }  // namespace slabstream

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <span>
 
 #include "common/base/printable.h"
 #include "common/files/files.h"
@@ -131,13 +130,7 @@ Status XdmfDocument::Parse() {
     open.pop_back();
     text_begins.pop_back();
   };
-  std::size_t at = 0;
-  const auto read = [&](std::span<char> buffer) {
-    const std::size_t count = text_.copy(buffer.data(), buffer.size(), at);
-    at += count;
-    return count;
-  };
-  if (const Status status = ReadXml(read, {start, end}); !status.ok()) return Status(status.code(), path_ + ": " + status.message());
+  if (const Status status = ReadXml(text_, {start, end}); !status.ok()) return Status(status.code(), path_ + ": " + status.message());
   return wrong;
 }
 
