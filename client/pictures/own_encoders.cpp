@@ -7,7 +7,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>  // jpeglib.h needs FILE
-#include <cstdlib>
 #include <cstring>
 #include <new>
 #include <vector>
@@ -93,27 +92,54 @@ std::optional<std::string> EncodePng(const EncodedFormat& format, const PictureR
 
 // ---- JPEG
 
-// libjpeg ends the process on errors unless told otherwise. Encoding to memory fails only for want of it.
+// libjpeg ends the process on errors unless told otherwise. Write reports none to it: only memory can be lacking.
 [[noreturn]] void OutOfMemory(j_common_ptr) { throw std::bad_alloc(); }
 
-struct JpegWriter {
-  JpegWriter() {
-    info.err = jpeg_std_error(&errors);
-    errors.error_exit = OutOfMemory;
+// A destination of our own: that of jpeg_mem_dest knows the memory that it took only once the picture is complete, and pictures are given
+// up halfway.
+class JpegWriter {
+ public:
+  explicit JpegWriter(const WriteBytes& write) : write_(write) {
+    info.err = jpeg_std_error(&errors_);
+    errors_.error_exit = OutOfMemory;
     jpeg_create_compress(&info);
-    jpeg_mem_dest(&info, &bytes, &size);
+    info.client_data = this;
+    info.dest = &destination_;
+    destination_.init_destination = [](j_compress_ptr of) { Of(of).Reuse(); };
+    destination_.empty_output_buffer = [](j_compress_ptr of) -> boolean {
+      Of(of).Write(kBufferBytes);  // all of it: free_in_buffer tells the bytes before the last row
+      return TRUE;
+    };
+    destination_.term_destination = [](j_compress_ptr of) { Of(of).Write(kBufferBytes - Of(of).destination_.free_in_buffer); };
   }
-  ~JpegWriter() {
-    jpeg_destroy_compress(&info);
-    std::free(bytes);  // NOLINT: libjpeg took it from malloc
-  }
+  ~JpegWriter() { jpeg_destroy_compress(&info); }
   JpegWriter(const JpegWriter&) = delete;
   JpegWriter& operator=(const JpegWriter&) = delete;
 
+  bool ok() const { return ok_; }
+
   jpeg_compress_struct info{};
-  jpeg_error_mgr errors{};
-  unsigned char* bytes = nullptr;
-  unsigned long size = 0;  // NOLINT(google-runtime-int): libjpeg's type
+
+ private:
+  static constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
+
+  static JpegWriter& Of(j_compress_ptr info) { return *static_cast<JpegWriter*>(info->client_data); }
+  void Reuse() {
+    destination_.next_output_byte = buffer_.data();
+    destination_.free_in_buffer = buffer_.size();
+  }
+  void Write(std::size_t size) {
+    ok_ = ok_ && write_(offset_, std::as_bytes(std::span(buffer_).first(size)));
+    offset_ += std::int64_t(size);
+    Reuse();
+  }
+
+  const WriteBytes& write_;
+  jpeg_error_mgr errors_{};
+  jpeg_destination_mgr destination_{};
+  std::vector<JOCTET> buffer_ = std::vector<JOCTET>(kBufferBytes);
+  std::int64_t offset_ = 0;
+  bool ok_ = true;
 };
 
 // In whole pixels an inch; the other block (Exif) states fractions, too.
@@ -134,7 +160,7 @@ void AddExif(EncodedFormat format, jpeg_compress_struct& info) {
 
 std::optional<std::string> EncodeJpeg(const EncodedFormat& format, const PictureRows& rows, const WriteBytes& write) {
   constexpr int kFullColorFrom = 85;
-  JpegWriter writer;
+  JpegWriter writer(write);
   jpeg_compress_struct& info = writer.info;
   info.image_width = JDIMENSION(format.width);
   info.image_height = JDIMENSION(format.height);
@@ -149,12 +175,11 @@ std::optional<std::string> EncodeJpeg(const EncodedFormat& format, const Picture
   const bool complete = rows([&](int, const void* row) {
     auto* samples = const_cast<JSAMPROW>(static_cast<const JSAMPLE*>(row));  // libjpeg reads them only
     jpeg_write_scanlines(&info, &samples, 1);
-    return true;
+    return writer.ok();
   });
-  if (!complete) return kBytesNotTaken;
-  jpeg_finish_compress(&info);
-  if (!write(0, {reinterpret_cast<const std::byte*>(writer.bytes), writer.size})) return kBytesNotTaken;
-  return std::nullopt;
+  if (complete) jpeg_finish_compress(&info);
+  if (complete && writer.ok()) return std::nullopt;
+  return kBytesNotTaken;
 }
 
 // ---- WebP

@@ -87,9 +87,18 @@ class Programs:
         return child, gateway
 
     def close(self):
+        """Fails if a program ended before anybody asked it to, and tells its last words."""
+        ended = []
         for child in reversed(list(self.children)):
-            self.end(child)
+            early = child.poll()
+            if early is None:
+                child.send_signal(signal.SIGTERM)
+            _, errors = child.communicate(timeout=TIMEOUT)
+            if early is not None:
+                ended.append(f"{child.args} ended by itself with {early}: {errors[-4000:]}")
+        self.children.clear()
         shutil.rmtree(self.folder)
+        assert not ended, "\n".join(ended)
 
 
 def write_labels(folder):

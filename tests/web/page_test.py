@@ -1172,7 +1172,8 @@ class PageTest(unittest.TestCase):
     def test_a_link_shows_channels_and_times_as_the_command_line_does(self):
         looks = {"channel_color": "0=#ff8000,1=#0040ff", "channel_range": "0=80:200,1=10:120", "channel_gamma": "1=0.7", "channel_opacity": "0=0.6"}
         viewer = self.viewer(dataset="dyes", channel="0,1", blend="over", time="2", **looks)
-        asked = " && ".join(f"o['{name.replace('_', '-')}'] === '{value}'" for name, value in looks.items())
+        lower = "d.header.size[1] < 592"  # the pane is, once the player is below it
+        asked = " && ".join([lower, *(f"o['{name.replace('_', '-')}'] === '{value}'" for name, value in looks.items())])
         self.assertFinal(viewer, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
         other = self.at_the_same_address(viewer)
         self.assertFinal(other, f"o.channel === '0,1' && o.blend === 'over' && o.time === '2' && {asked}")
@@ -1180,13 +1181,12 @@ class PageTest(unittest.TestCase):
         points = "mine,1|20,0,0,1;200,1,1,0|20,0;200,0.5"
         viewer = self.viewer(dataset="dyes", channel="0,1", channel_transfer=f"0=viridis,1={urllib.parse.quote(points)}", channel_gamma="0=2")
         function = "JSON.parse(/,1=(.*)$/.exec(o['channel-transfer'])[1])[0]"
-        viewer.until("!document.querySelector('.player').hidden")  # the pane is smaller then
-        shows = f"o['look-at'] && d.header.size[1] < 592 && o['channel-transfer']?.startsWith('0=viridis,1=') && {function}.RGBPoints.join() === '20,0,0,1,200,1,1,0' && o['channel-gamma'] === undefined"
+        shows = f"o['look-at'] && {lower} && o['channel-transfer']?.startsWith('0=viridis,1=') && {function}.RGBPoints.join() === '20,0,0,1,200,1,1,0' && o['channel-gamma'] === undefined"
         drawn = viewer.final(shows)
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         self.assertFinal(self.at_the_same_address(viewer), shows)
         viewer = self.viewer(dataset="dyes", channel="1", time="last")
-        self.assertFinal(viewer, "o.channel === '1' && o.time === '2'")
+        self.assertFinal(viewer, f"o.channel === '1' && o.time === '2' && {lower}")
 
     def test_one_channel_alone_may_have_a_transfer_function(self):
         viewer = self.viewer(**self.more(fields=CHANNELS), channel_color="1=#123456")

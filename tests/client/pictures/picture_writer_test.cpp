@@ -1,5 +1,6 @@
 // Files are read back with OpenImageIO, unconverted, and compared with what the format promises.
 #include "client/pictures/picture_writer.h"
+#include "client/pictures/picture_encoder.h"
 #include "common/image/sample_codes.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/temporary_directory.h"
@@ -403,6 +404,28 @@ TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
     }
   }
   EXPECT_EQ(FileCount(), 7U);
+}
+
+TEST(PictureEncoderTest, APictureIsGivenUpAtAnyRow) {
+  constexpr int kSide = 256;
+  std::vector<std::uint8_t> row(std::size_t{4} * kSide);
+  for (std::size_t i = 0; i < row.size(); ++i) row[i] = std::uint8_t(i * i * 31 >> 3);  // hard to pack: many buffers are filled
+  for (const PictureFileType type : {PictureFileType::kPng, PictureFileType::kJpeg, PictureFileType::kWebp}) {
+    const EncodedFormat format{.type = type, .width = kSide, .height = kSide, .quality = 100};
+    const auto encode = [&](int row_count, int write_count) {
+      const auto rows = [&](const WriteRow& write) {
+        for (int y = 0; y < row_count; ++y) {
+          std::ranges::rotate(row, row.begin() + 4 * (y % 7));
+          if (!write(y, row.data())) return false;
+        }
+        return row_count == kSide;
+      };
+      return OwnPictureEncoder(type)(format, rows, [&](std::int64_t, std::span<const std::byte>) { return write_count-- > 0; });
+    };
+    for (int rows = 0; rows < kSide; rows += 5) EXPECT_EQ(encode(rows, 1 << 20), kBytesNotTaken) << int(type) << ' ' << rows;
+    EXPECT_EQ(encode(kSide, 0), kBytesNotTaken) << int(type);
+    EXPECT_EQ(encode(kSide, 1 << 20), std::nullopt) << int(type);
+  }
 }
 
 TEST_F(ImageWriterTest, AFrameOfAMovieLiesOverItsBackgroundAndThatOverBlack) {
