@@ -7,6 +7,7 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
@@ -324,6 +325,14 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
  private:
   PlainStream& Lowest() { return stream_.next_layer(); }
 
+  // For the application. It may let go of it on any thread, and last of all: the connection ends on the io thread even then.
+  std::shared_ptr<HttpConnection> Lent() {
+    return {this, [self = shared_from_this()](HttpConnection*) mutable {
+              const auto executor = self->stream_.get_executor();
+              asio::post(executor, [self = std::move(self)] {});
+            }};
+  }
+
   // The other end has so long for its part.
   void WaitAtMost(Duration time) {
     waits_since_ = MonotonicNow();
@@ -360,7 +369,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     HttpRequest request = RequestOf(message_);
     if (websocket::is_upgrade(message_)) return Upgrade(request);
     gone_ = request.gone;
-    shared_->application.Handle(std::move(request), [self = shared_from_this()](HttpReply reply) {
+    shared_->application.Handle(std::move(request), [self = Lent()](HttpReply reply) {
       self->gone_.reset();
       self->watch_.cancel();
       self->Write(std::move(reply), self->message_.keep_alive());
@@ -452,7 +461,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     Work();
     gone_ = std::make_shared<std::function<void()>>([] {});  // CloseNow tells the stream
     Watch();
-    rest_->Read([self = shared_from_this()](Result<std::string> part) {
+    rest_->Read([self = Lent()](Result<std::string> part) {
       self->gone_.reset();
       self->watch_.cancel();
       if (!part.ok()) return self->CloseNow();

@@ -3,6 +3,7 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import concurrent.futures
 import csv
 import gzip
 import http.client
@@ -11,9 +12,12 @@ import json
 import os
 import random
 import re
+import select
 import shutil
 import signal
+import socket
 import ssl
+import struct
 import subprocess
 import sys
 import tempfile
@@ -1046,6 +1050,44 @@ class CrowdTest(WithService):
         self.assertTrue(self.answers(first))
         self.assertTrue(all(self.answers(connection) for connection in crowd))
         page.final(page.view({"dataset": "a", "size": 16}))
+
+
+class LeavingTest(WithService):
+    """Those who close their connections while the gateway works for them."""
+
+    TRIES, AT_ONCE = 100, 8
+
+    def leave(self, random_number):
+        if random_number.random() < 0.4:
+            connection = self.gateway.connect()
+            path = random_number.choice(["/api/v1/render?dataset=channels&size=300", "/api/v1/point?dataset=times&at=1,1,1", "/api/v1/info?dataset=b"])
+            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {self.gateway.authority}\r\nAuthorization: Bearer {self.gateway.token}\r\n\r\n".encode())
+        else:
+            page = Page(self.gateway)
+            connection = page.socket
+            for time_shown in range(random_number.randrange(1, 5)):
+                # Pictures that take long to pack, of which those that move are JPEG.
+                page.view({"dataset": "times", "time": str(time_shown % 3)} if random_number.random() < 0.3 else {"dataset": "b", "size": 1000, "zoom": 2})
+                if random_number.random() < 0.5:
+                    message = page.receive()
+                    if isinstance(message, tuple):
+                        page.ack(message[0]["frame"])
+        select.select([], [], [], random_number.uniform(0, 0.15))  # any moment of the work
+        if random_number.random() < 0.5:  # with a reset
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        connection.close()
+
+    def test_who_leaves_at_any_moment_spoils_nothing(self):
+        seed = random.randrange(1 << 30)
+        with self.subTest(seed=seed), concurrent.futures.ThreadPoolExecutor(self.AT_ONCE) as threads:
+            numbers = random.Random(seed)
+            for done in [threads.submit(self.leave, random.Random(numbers.random())) for _ in range(self.TRIES)]:
+                done.result()
+            page = self.page()
+            page.final(page.view({"dataset": "a", "size": 16}))
+            self.assertIsNone(self.process.poll())
+            metrics = lambda: self.gateway.request("/metrics")[2].decode()
+            wait_until(lambda: re.search(r"^slabstream_gateway_sessions 1$", metrics(), re.MULTILINE), "all sessions but this one end")
 
 
 class ServiceLossTest(unittest.TestCase):
