@@ -54,7 +54,8 @@ def run_program(name: str, main, interrupted: str = "interrupted; the same comma
 class Service:
     """A coordinator on the first host, a client on the second, a worker on each of the others."""
 
-    def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path):
+    def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path,
+                 worker_options: list[str] = ()):
         self._programs, self._folder = programs, folder
         self._coordinator, self._client, *self._workers = hosts
         self._keys = folder / "keys"
@@ -65,7 +66,7 @@ class Service:
         self._wait("the coordinator listens", lambda: "ready" in (folder / "coordinator.log").read_text(encoding="utf-8"))
         for host in self._workers:
             # Images are not packed: `auto` would compare a dilated link with the speed of a codec that is not dilated.
-            options = ["--service", str(self._keys / "worker.json"), "--threads", "1", "--compress=off"]
+            options = ["--service", str(self._keys / "worker.json"), "--threads", "1", "--compress=off", *worker_options]
             self._start(host, host.hostname, ["slabstream-worker", *options])
         self._wait("all workers are registered", lambda: self._registered() == len(self._workers))
 
@@ -88,6 +89,14 @@ class Service:
             if time.monotonic() > deadline:
                 raise ClusterError(f"after {START_SECONDS} s it is not so that {what}; logs are in {self._folder}")
             time.sleep(0.1)
+
+    def memory_mib(self) -> list[float]:
+        """The most memory that each worker has had, as the kernel counts it."""
+        peaks = []
+        for host in self._workers:
+            texts = [pathlib.Path(f"/proc/{pid}/status").read_text(encoding="utf-8") for pid in host.quota.processes()]
+            peaks.append(max(int(text.partition("VmHWM:")[2].split()[0]) / 1024 for text in texts))
+        return peaks
 
     def ask(self, command: list[str], **popen) -> subprocess.Popen:
         """A command of the client."""

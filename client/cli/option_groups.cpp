@@ -158,9 +158,9 @@ void AddSource(const Command& app, AskedVolume& volume) {
   app.GroupOptions("Options");
   app.AddText("SOURCE", volume.source, kSourceHelp).Required();
   AddReadOptions(app, kOfRequests);
-  app.AddText(
-         "--channel", volume.field,
-         "Which channel, by its number or name (`value`: channels, separated by commas); of a file also luminance, of red, green and blue")
+  app.AddText("--channel", volume.field,
+              "Which channel, by its number or name (`value`: channels, separated by commas); of a file also luminance, of red, green and "
+              "blue, or magnitude, of a vector")
       .TypeName("CHANNEL")
       .Default("the first one that is shown");
   app.AddText("--time", volume.time, "Which time: its number, a number with a unit of time, or last, the newest one")
@@ -174,7 +174,7 @@ void AddSource(const Command& app, AskedVolume& volume) {
     if (!with_options.ok()) return with_options.status();
     volume.source = *std::move(with_options);
     // A reader mixes it; it is no field of the file.
-    if (is_file && volume.field == "luminance") volume.source = WithReadOption(volume.source, "channel", std::exchange(volume.field, ""));
+    if (is_file && IsMixedChannel(volume.field)) volume.source = WithReadOption(volume.source, "channel", std::exchange(volume.field, ""));
     return Status::Ok();
   });
 }

@@ -16,6 +16,7 @@
 #include "data/positional/file_source.h"
 #include "data/sources/hollow_source.h"
 #include "data/sources/label_source.h"
+#include "data/sources/magnitude_source.h"
 #include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
 #include "data/volume_io/chosen_channel.h"
@@ -121,6 +122,25 @@ Result<std::shared_ptr<VolumeSource>> OpenValues(const std::string& path, const 
   return OpenRemote(found->version, options.query, [&] { return OpenAs(*found->format, path, with_store, context); });
 }
 
+// The magnitude of a vector whose components are channels. Of a grid its reader makes it; any other reader says which channels there are.
+Result<std::shared_ptr<VolumeSource>> OpenMagnitude(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  ReadOptions of_component = options;
+  of_component.channel = 0;
+  Result<std::shared_ptr<VolumeSource>> opened = OpenValues(path, of_component, context);
+  if (!opened.ok()) return opened;
+  const SourceInfo& info = (*opened)->info();
+  const int count = int(info.channels.size());
+  if (count < 2 || count > kMostVectorComponents) return OpenValues(path, options, context);
+  std::vector<std::shared_ptr<VolumeSource>> components = {*opened};
+  for (of_component.channel = 1; *of_component.channel < count; ++*of_component.channel) {
+    std::shared_ptr<VolumeSource> at = components.front()->At(info.time, *of_component.channel);
+    opened = at != nullptr ? Result(std::move(at)) : OpenValues(path, of_component, context);
+    if (!opened.ok()) return opened;
+    components.push_back(*std::move(opened));
+  }
+  return MagnitudeOf(std::move(components));
+}
+
 std::shared_ptr<VolumeSource> Beside(VolumeSource& open, const ReadOptions& options) {
   const SourceInfo& info = open.info();
   const Result<std::int64_t> time = ChosenVolume("", info.times.count, options);
@@ -139,7 +159,8 @@ bool IsSame(const SourceInfo& info, const StoredAt& stored) {
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context,
                                                  VolumeSource* beside) {
   if (std::shared_ptr<VolumeSource> at = beside != nullptr ? Beside(*beside, options) : nullptr; at != nullptr) return at;
-  Result<std::shared_ptr<VolumeSource>> source = OpenValues(path, options, context);
+  const bool magnitude = options.channel == kMagnitude;
+  Result<std::shared_ptr<VolumeSource>> source = (magnitude ? OpenMagnitude : OpenValues)(path, options, context);
   if (source.ok() && options.hollow) return AsHollow(*std::move(source));
   if (source.ok() && options.labels) source = AsLabels(*std::move(source));
   return source;

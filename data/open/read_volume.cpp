@@ -49,9 +49,11 @@ std::vector<std::string> PartTexts(const std::string& path, const ReadOptions& o
   if (info.components == 1) {
     if (auto channel = ShownChannelText(path, info.channels, info.channel, options)) texts.push_back(*std::move(channel));
   } else if (!options.channel) {
-    const bool colour = info.components == 3 || info.components == 4;
-    texts.push_back(fmt::format("{}: shows component 0 of {}; --channel takes another one: 0 to {}{}", path, info.components,
-                                info.components - 1, colour ? ", or luminance, of red, green and blue" : ""));
+    const int count = info.components;
+    const std::string_view colour = count == 3 || count == 4 ? ", or luminance, of red, green and blue" : "";
+    const std::string_view vector = count <= kMostVectorComponents ? ", or magnitude, of a vector" : "";
+    texts.push_back(
+        fmt::format("{}: shows component 0 of {}; --channel takes another one: 0 to {}{}{}", path, count, count - 1, colour, vector));
   }
   return texts;
 }

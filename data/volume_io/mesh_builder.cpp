@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/raw_volume.h"
@@ -25,6 +26,10 @@ Result<std::size_t> MeshBuilder::SetArrays(const std::string& path, std::vector<
   info.array = *chosen;
   info.channel = options.channel;
   result_.mesh.at = info.arrays[*chosen].at;
+  if (const int components = info.arrays[*chosen].components;
+      options.channel == kMagnitude && (components == 2 || components == kMostVectorComponents)) {
+    return *chosen;
+  }
   if (Status status = CheckChannel(path, RawHeader{.components = info.arrays[*chosen].components}, {.channel = options.channel});
       !status.ok())
     return status;
@@ -33,7 +38,12 @@ Result<std::size_t> MeshBuilder::SetArrays(const std::string& path, std::vector<
 
 float MeshBuilder::ValueOf(std::size_t element) const {
   const MeshFileInfo& info = result_.info;
-  return TakenComponent(piece_.values.data() + element * std::size_t(info.arrays[info.array].components), info.channel);
+  const auto components = std::size_t(info.arrays[info.array].components);
+  const float* const values = piece_.values.data() + element * components;
+  if (info.channel != kMagnitude) return TakenComponent(values, info.channel);
+  double squares = 0;
+  for (const float value : std::span(values, components)) squares += double(value) * value;
+  return float(std::sqrt(squares));
 }
 
 Status MeshBuilder::BeginPiece(const std::string& where, MeshPiece piece) {

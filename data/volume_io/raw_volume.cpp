@@ -71,7 +71,7 @@ Status CheckChannel(const std::string& path, const RawHeader& header, const Read
   if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
   const std::string which = fmt::format("0 to {}{}", components - 1, colour ? ", or luminance, of red, green and blue" : "");
   if (!options.channel) return wrong(fmt::format("has {} components a voxel, of which --channel takes one: {}", components, which));
-  if (luminance ? colour : *options.channel < components) return Status::Ok();
+  if (luminance ? colour : *options.channel >= 0 && *options.channel < components) return Status::Ok();
   return wrong(fmt::format("has {} components a voxel, so channel must be {}", components, which));
 }
 

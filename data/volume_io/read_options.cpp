@@ -31,9 +31,10 @@ Status SetTime(ReadOptions& options, std::string_view option, std::string_view t
 
 Status SetChannel(ReadOptions& options, std::string_view option, std::string_view text) {
   constexpr int kMost = 65535;
-  options.channel = text == "luminance" ? kLuminance : ParseNumber<int>(text);
-  if (text == "luminance" || (options.channel && *options.channel >= 0 && *options.channel <= kMost)) return Status::Ok();
-  return Wrong(option, text, fmt::format("luminance or a whole number in [0, {}]", kMost));
+  const bool mixed = IsMixedChannel(text);
+  options.channel = text == "luminance" ? kLuminance : mixed ? kMagnitude : ParseNumber<int>(text);
+  if (mixed || (options.channel && *options.channel >= 0 && *options.channel <= kMost)) return Status::Ok();
+  return Wrong(option, text, fmt::format("luminance, magnitude or a whole number in [0, {}]", kMost));
 }
 
 // "X,Y,Z"
@@ -152,7 +153,9 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
       {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime, IsGiven<&ReadOptions::time>},
-      {"channel", "N|luminance", "Which channel of an image (default: 0) or component of a voxel; or the luminance of red, green and blue",
+      {"channel", "N|luminance|magnitude",
+       "Which channel of an image (default: 0) or component of a voxel; or the luminance of red, green and blue, or the magnitude of a "
+       "vector",
        SetChannel, IsGiven<&ReadOptions::channel>},
       {"matrix", "sform|qform", "Which matrix places a NIfTI volume that states both (default: the sform)", SetMatrix,
        IsGiven<&ReadOptions::matrix>},

@@ -25,8 +25,11 @@ namespace slabstream {
 
 class Store;
 
-inline constexpr std::int64_t kMaxVolumes = 1 << 20;  // in one file
-inline constexpr int kLuminance = -1;
+inline constexpr std::int64_t kMaxVolumes = 1 << 20;    // in one file
+inline constexpr int kLuminance = -1, kMagnitude = -2;  // ReadOptions::channel
+inline constexpr int kMostVectorComponents = 3;         // of which there is a magnitude; at least 2
+// Whether a channel of this name is made of several ones of a file, by whoever reads it.
+constexpr bool IsMixedChannel(std::string_view name) { return name == "luminance" || name == "magnitude"; }
 inline constexpr std::size_t kMaxDatasetBytes = 4096;
 
 // Volumes of a file that holds several, both included.
@@ -41,7 +44,7 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
 struct ReadOptions {
   std::string series;             // in a DICOM folder a number or UID; "": the only series. In an OME-TIFF an image; "": the first
   std::optional<TimeRange> time;  // the volume of a file that holds several. Readers take one, a catalogue takes several
-  std::optional<int> channel;     // the component of a voxel, from 0; or kLuminance
+  std::optional<int> channel;     // the component of a voxel, from 0; or kLuminance or kMagnitude
   std::optional<Vec3> spacing;    // each > 0, finite
   std::string matrix;             // the matrix of a NIfTI file that states both: "sform" or "qform"; "": by its codes
   // For VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.

@@ -27,8 +27,8 @@ def load_program(name: str):
     return module
 
 
-PROGRAMS = ("cluster", "cluster_paper", "cluster_balance", "cluster_trace")
-cluster, cluster_paper, cluster_balance, cluster_trace = (load_program(name) for name in PROGRAMS)
+PROGRAMS = ("cluster", "cluster_paper", "cluster_balance", "cluster_trace", "cluster_pieces")
+cluster, cluster_paper, cluster_balance, cluster_trace, cluster_pieces = (load_program(name) for name in PROGRAMS)
 
 
 def options(*arguments: str, program=cluster):
@@ -85,6 +85,7 @@ class Options(unittest.TestCase):
             (cluster_balance, "--workers", "17"): "--workers 17: must be from 1 to 16",
             (cluster_trace, "--frames", "0"): "--frames 0: must be from 1 to 1000",
             (cluster_trace, "--link", "1000"): "--link 1000: must be from 0.01 to 100",
+            (cluster_pieces, "--size", "63"): "--size 63: must be from 64 to 2048",
         }
         for (program, *arguments), says in cases.items():
             told = io.StringIO()
@@ -124,6 +125,29 @@ class Timelines(unittest.TestCase):
         for part, seconds in expected.items():
             self.assertAlmostEqual(parts[part], seconds, msg=part)
         self.assertAlmostEqual(sum(parts.values()), 100)
+
+
+class Pieces(unittest.TestCase):
+    def test_a_seam_shows_beside_the_border_of_pieces_alone(self) -> None:
+        size, span = 96, 2 * cluster_pieces.MEANS
+        a, b, c = cluster_pieces.waves(size)
+        values = (b.T * c.mean(axis=1)) @ a  # by another way than the program's
+        picture = (255 * (values[::-1, :, None] / span + 0.5)).clip(0, 255).round().astype(int)
+        step = span / 255 / cluster_pieces.RANGE
+        beside, elsewhere = cluster_pieces.differences(picture, size)
+        self.assertLess(max(beside, elsewhere), 0.51 * step)
+        (border,) = {extent[2] for extent in cluster_pieces.extents(size)} & {24}
+        picture[size - 1 - border, 40:44] += 3
+        beside, elsewhere = cluster_pieces.differences(picture, size)
+        self.assertGreater(beside, 2.4 * step)
+        self.assertLess(elsewhere, 0.51 * step)
+
+    def test_pieces_share_their_borders_and_leave_nothing_out(self) -> None:
+        for size in (64, 97, 1500):
+            taken = [(y, z) for _, _, y0, y1, z0, z1 in cluster_pieces.extents(size) for y in (y0, y1) for z in (z0, z1)]
+            cuts = sorted({y for y, _ in taken})
+            self.assertEqual((cuts[0], cuts[-1], len(cuts)), (0, size - 1, 5))
+            self.assertEqual({taken.count(corner) for corner in taken}, {1, 2, 4})
 
 
 class Repeats(unittest.TestCase):

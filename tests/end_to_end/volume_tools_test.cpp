@@ -155,6 +155,22 @@ TEST_F(VolumeToolsTest, InfoTellsOfTheLuminanceOfAnUncompressedFile) {
   EXPECT_EQ(info["range"]["max"], 120);
 }
 
+TEST_F(VolumeToolsTest, AMagnitudeIsThatOfAVectorOfTwoOrThreeComponents) {
+  const auto write = [&](const std::string& name, int components, const std::string& voxel) {
+    std::string voxels;
+    for (int i = 0; i < 8; ++i) voxels += voxel;
+    std::ofstream(Path(name)) << "NRRD0004\ntype: uint8\ndimension: 4\nsizes: " << components << " 2 2 2\nencoding: raw\n\n" << voxels;
+  };
+  write("vector.nrrd", 3, {3, 4, 12});
+  write("four.nrrd", 4, {1, 2, 3, 4});
+  EXPECT_EQ(Info("vector.nrrd?channel=magnitude")["range"], (Json{{"max", 13}, {"min", 13}}));
+  EXPECT_EQ(Info("vector.nrrd", {"--channel", "magnitude"})["range"], (Json{{"max", 13}, {"min", 13}}));
+  EXPECT_THAT(MustRun({"value", "vector.nrrd", "--at", "1,1,1", "--channel", "magnitude", "--local"}).out, HasSubstr("value 13"));
+  const ProgramResult four = Slabstream({"info", "four.nrrd", "--channel", "magnitude"});
+  EXPECT_EQ(four.exit_status, 2);
+  EXPECT_THAT(four.err, HasSubstr("four.nrrd: has 4 components a voxel, so channel must be 0 to 3, or luminance"));
+}
+
 TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
   const std::string text = MustRun({"render", "--help-all"}).out;
   for (const char* part : {"--local", "--transfer", "auto", "opaque", "slab", "fan-in", "--azimuth"}) EXPECT_THAT(text, HasSubstr(part));
