@@ -1,25 +1,36 @@
 // Plotfiles of AMReX, folders that hold an adaptive mesh: boxes of cells at levels, each level finer than the one before by a whole factor.
-// A level lies in Level_N: Cell_H says which boxes it has, and where in which file their values are. Each box is a part of a mosaic; cells
-// of a level that lie in no box of it are interpolated between those of the coarser one. Sources: https://amrex-codes.github.io/amrex/
-// docs_html/IO.html, and what AMReX writes (WriteGenericPlotfileHeader, VisMF and FArrayBox).
+// A level lies in Level_N: Cell_H says which boxes it has, and where in which file their values are. Each box is a part of a mosaic (a
+// patch); cells of a level that lie in no box of it are interpolated between those of the coarser one. Sources:
+// https://amrex-codes.github.io/amrex/ docs_html/IO.html, and what AMReX writes (WriteGenericPlotfileHeader, VisMF and FArrayBox).
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cerrno>
 #include <filesystem>
-#include <fstream>
 #include <limits>
+#include <list>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <span>
 #include <sstream>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "common/base/printable.h"
+#include "common/files/file_descriptor.h"
 #include "common/files/files.h"
 #include "data/mosaic/mosaic_source.h"
-#include "data/positional/file_source.h"
-#include "data/positional/located_volume.h"
-#include "data/sources/part_source.h"
+#include "data/positional/stored_samples.h"
+#include "data/sources/read_context.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/grid_arrays.h"
+#include "data/volume_io/world_placement.h"
 
 namespace slabstream {
 namespace {
@@ -72,32 +83,33 @@ StoredBox NextBox(Scanner& text) {
 }
 
 struct Patch {
-  Box box;  // of the level's cells, from the domain's first one on
-  std::string file;
+  Box box;                  // of the level's cells, from the domain's first one on
+  std::uint32_t file = 0;   // of Plotfile::data
   std::int64_t offset = 0;  // of its header there
 };
 
 struct Level {
-  Box domain;  // as the file counts cells
-  std::vector<Patch> patches;
+  Box domain;                  // as the file counts cells
+  std::vector<Patch> patches;  // in the order of their bytes, so that those that are read together lie together
 };
 
 struct Plotfile {
   std::vector<std::string> variables;
   double time = 0;
-  Vec3 low, high;             // the corners of the domain
-  std::vector<Level> levels;  // coarsest first
-  std::vector<std::string> files;
+  Vec3 low, high;                  // the corners of the domain
+  std::vector<Level> levels;       // coarsest first
+  std::vector<std::string> files;  // that say what lies where
+  std::vector<std::string> data;   // that hold values
 };
 
 Status Wrong(const std::string& file, const std::string& why) { return Status::InvalidArgument(file + ": " + why); }
 
-Result<Level> ReadLevel(const std::string& path, const std::string& name, const Box& domain, std::vector<std::string>& files) {
+Result<Level> ReadLevel(const std::string& path, const std::string& name, const Box& domain, Plotfile& plot) {
   const std::string file = (fs::path(path) / (name + "_H")).string(), folder = fs::path(file).parent_path().string();
   if (Status status = CheckIsFile(file); !status.ok()) return status;
   const Result<std::string> read = ReadTextFile(file, kMostTextBytes);
   if (!read.ok()) return read.status();
-  files.push_back(file);
+  plot.files.push_back(file);
   Scanner text(*read);
   Level level{.domain = domain};
   // The version, how it was written, the number of components, and of layers of ghosts; of the latter there may be one for each axis.
@@ -117,12 +129,16 @@ Result<Level> ReadLevel(const std::string& path, const std::string& name, const 
     level.patches.push_back({.box = {box.begin - domain.begin, box.end - domain.begin}});
   }
   if (text.Next<std::size_t>() != count) return Wrong(file, "says of other boxes where they are than it has");
+  std::map<std::string, std::uint32_t> numbers;
   for (Patch& patch : level.patches) {
     const auto word = text.Next<std::string>(), data = text.Next<std::string>();
     patch.offset = text.Next<std::int64_t>();
     if (!text.good() || word != "FabOnDisk:" || data.empty() || patch.offset < 0) return Wrong(file, "a place FabOnDisk is none");
-    patch.file = (fs::path(folder) / data).string();
+    const auto [found, is_new] = numbers.try_emplace(data, std::uint32_t(plot.data.size()));
+    if (is_new) plot.data.push_back((fs::path(folder) / data).string());
+    patch.file = found->second;
   }
+  std::ranges::sort(level.patches, {}, [](const Patch& patch) { return std::pair(patch.file, patch.offset); });
   return level;
 }
 
@@ -171,7 +187,7 @@ Result<Plotfile> ReadPlotfile(const std::string& path) {
     for (std::int64_t i = 0; i < 6 * boxes && text.good(); ++i) text.Next<double>();
     const auto name = text.Next<std::string>();
     if (!text.good()) return Wrong(file, "ends before all levels are named");
-    Result<Level> of_file = ReadLevel(path, name, level.domain, plot.files);
+    Result<Level> of_file = ReadLevel(path, name, level.domain, plot);
     if (!of_file.ok()) return of_file.status();
     level = *std::move(of_file);
   }
@@ -187,20 +203,33 @@ struct FabHeader {
   std::int64_t bytes = 0;  // of the header
 };
 
-Result<FabHeader> ReadFabHeader(const Patch& patch) {
+// An open file of values.
+struct DataFile {
+  std::string name;
+  FileDescriptor file;
+  std::int64_t bytes = 0;
+
+  Status Wrong(std::int64_t offset, const std::string& why) const {
+    return Status::DataLoss(fmt::format("{}: at byte {} {}", name, offset, why));
+  }
+};
+
+Result<std::shared_ptr<const DataFile>> OpenData(const std::string& name) {
+  if (Status status = CheckIsFile(name); !status.ok()) return status;
+  FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat about {};
+  if (file.number() < 0 || ::fstat(file.number(), &about) != 0) {
+    return Status::NotFound(fmt::format("{}: cannot be opened for reading: {}", name, std::generic_category().message(errno)));
+  }
+  return std::make_shared<const DataFile>(DataFile{name, std::move(file), about.st_size});
+}
+
+Result<FabHeader> ReadFabHeader(const DataFile& file, std::int64_t offset) {
   constexpr std::size_t kMost = 1024;
-  if (Status status = CheckIsFile(patch.file); !status.ok()) return status;
-  std::ifstream file(patch.file, std::ios::binary);
-  if (!file) return Status::NotFound(patch.file + ": cannot be opened for reading");
   std::string line(kMost, '\0');
-  file.seekg(patch.offset);
-  file.read(line.data(), std::streamsize(line.size()));
-  line.resize(std::size_t(file.gcount()));
+  line.resize(ReadBytesAt(file.file.number(), std::uint64_t(offset), std::as_writable_bytes(std::span(line))));
   const std::size_t end = line.find('\n');
-  const auto wrong = [&](const std::string& why) {
-    return Status::DataLoss(fmt::format("{}: at byte {} {}", patch.file, patch.offset, why));
-  };
-  if (end == std::string::npos || !line.starts_with("FAB")) return wrong("begins no box: FAB is missing");
+  if (end == std::string::npos || !line.starts_with("FAB")) return file.Wrong(offset, "begins no box: FAB is missing");
   Scanner text(line.substr(3, end - 3));
   FabHeader header{.bytes = std::int64_t(end) + 1};
   const auto describing = text.Next<int>();
@@ -211,34 +240,77 @@ Result<FabHeader> ReadFabHeader(const Patch& patch) {
   header.box = NextBox(text).box;
   header.components = text.Next<int>();
   if (!text.good() || (bytes != 4 && bytes != 8) || (order.front() != 1 && order.front() != bytes)) {
-    return wrong("values are of a type that is not supported: it must be floats of 4 or 8 bytes");
+    return file.Wrong(offset, "values are of a type that is not supported: it must be floats of 4 or 8 bytes");
   }
   header.type = bytes == 4 ? SampleType::kFloat32 : SampleType::kFloat64;
   header.big_endian = order.front() == 1;
   return header;
 }
 
-// The values of a variable in the cells of a patch.
-Result<std::shared_ptr<VolumeSource>> OpenPatch(const Patch& patch, const Index3& first, int variable, const SourceContext& context) {
-  const Result<FabHeader> found = ReadFabHeader(patch);
-  if (!found.ok()) return found.status();
-  const Box box = {found->box.begin - first, found->box.end - first};
-  const auto wrong = [&](const std::string& why) {
-    return Status::DataLoss(fmt::format("{}: at byte {} {}", patch.file, patch.offset, why));
-  };
-  if (variable >= found->components) return wrong(fmt::format("are {} variables, must be more than {}", found->components, variable));
-  if (!box.Contains(patch.box)) return wrong("lies another box than Cell_H says");
-  const std::int64_t cells = box.voxel_count();
-  const Index3 size = box.size();
-  if (std::max({size.x, size.y, size.z}) > kMaxVolumeSide) return wrong("lies a box that is too large");
-  LocatedSamples located{.header = {.size = size, .type = found->type},
-                         .payload = {.file = patch.file,
-                                     .offset = patch.offset + found->bytes + variable * cells * std::int64_t(BytesPerSample(found->type)),
-                                     .big_endian = found->big_endian}};
-  Result<std::shared_ptr<VolumeSource>> source = OpenLocated("AMReX", patch.file, located, context);
-  if (!source.ok() || box == patch.box) return source;
-  return MakePartSource(*std::move(source), 0, {patch.box.begin - box.begin, patch.box.end - box.begin});
-}
+// The values of a variable. There may be very many patches, in few files.
+class PatchReader : public PartReader {
+ public:
+  // `levels`: finest first.
+  PatchReader(std::vector<Level> levels, std::vector<std::string> data, int variable, SampleType type)
+      : levels_(std::move(levels)), data_(std::move(data)), variable_(variable), type_(type) {}
+
+  void Read(int level, std::size_t part, const Box& box, const BoxRoom& out, std::stop_token, VolumeSource::ReadDone done) override {
+    const Level& of = levels_[std::size_t(level)];
+    done(Printable(ReadPatch(of.patches[part], of.domain.begin, box, out)));
+  }
+  VolumeSource::Counts counts() override { return {.stored_bytes = read_bytes_}; }
+
+ private:
+  Status ReadPatch(const Patch& patch, const Index3& first, const Box& box, const BoxRoom& out) {
+    const Result<std::shared_ptr<const DataFile>> file = File(patch.file);
+    if (!file.ok()) return file.status();
+    const Result<FabHeader> header = ReadFabHeader(**file, patch.offset);
+    if (!header.ok()) return header.status();
+    const auto wrong = [&](const std::string& why) { return (*file)->Wrong(patch.offset, why); };
+    if (variable_ >= header->components) {
+      return wrong(fmt::format("are {} variables, must be more than {}", header->components, variable_));
+    }
+    if (header->type != type_) return wrong(fmt::format("values are of {}, must be of {}", ToString(header->type), ToString(type_)));
+    const Box stored = {header->box.begin - first, header->box.end - first};
+    if (!stored.Contains(patch.box)) return wrong("lies another box than Cell_H says");
+    const Index3 size = stored.size();
+    if (std::max({size.x, size.y, size.z}) > kMaxVolumeSide) return wrong("lies a box that is too large");
+    const std::int64_t begin = patch.offset + header->bytes, bytes = stored.voxel_count() * std::int64_t(BytesPerSample(type_));
+    if (bytes > ((*file)->bytes - begin) / (variable_ + 1)) return wrong("lies a box that is truncated: the file ends before it does");
+    StoredSamples samples({.size = size, .type = type_},
+                          {.file = (*file)->name, .offset = begin + variable_ * bytes, .big_endian = header->big_endian}, 0,
+                          {*file, &(*file)->file});
+    const Box there = {box.begin - stored.begin, box.end - stored.begin};
+    for (const Box& some : samples.Parts(there)) {
+      if (Status status = samples.Read(some, {{}, size, there, out}); !status.ok()) return status;
+    }
+    read_bytes_ += samples.read_bytes();
+    return Status::Ok();
+  }
+
+  Result<std::shared_ptr<const DataFile>> File(std::uint32_t number) {
+    constexpr std::size_t kMostOpen = 64;
+    const std::lock_guard lock(mutex_);
+    const auto found = std::ranges::find(open_, number, &std::pair<std::uint32_t, std::shared_ptr<const DataFile>>::first);
+    if (found != open_.end()) {
+      open_.splice(open_.begin(), open_, found);
+      return open_.front().second;
+    }
+    Result<std::shared_ptr<const DataFile>> file = OpenData(data_[number]);
+    if (!file.ok()) return file;
+    if (open_.size() == kMostOpen) open_.pop_back();
+    open_.emplace_front(number, *file);
+    return file;
+  }
+
+  const std::vector<Level> levels_;
+  const std::vector<std::string> data_;
+  const int variable_;
+  const SampleType type_;
+  std::atomic<std::uint64_t> read_bytes_ = 0;
+  std::mutex mutex_;                                                           // guards what follows
+  std::list<std::pair<std::uint32_t, std::shared_ptr<const DataFile>>> open_;  // by number, the last one that was wanted first
+};
 
 Result<int> ChosenVariable(const std::string& path, const Plotfile& plot, const ReadOptions& options, std::vector<std::string>& notes) {
   std::vector<GridArray> arrays;
@@ -261,33 +333,46 @@ Result<VolumeGeometry> GeometryOf(const std::string& path, const Plotfile& plot,
   return Wrong(path, "its domain has corners in another order than from low to high");
 }
 
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<Plotfile> plot = ReadPlotfile(path);
+// The largest blocks, of at most 32 cells a side, at whose multiples all patches begin and end: who reads whole ones reads each row once.
+Index3 BlockOf(const std::vector<Box>& boxes, const Index3& size) {
+  Index3 block = Uniform(32);
+  for (const Axis axis : kAxes) {
+    for (const Box& box : boxes) {
+      block[axis] = std::gcd(block[axis], box.begin[axis]);
+      if (box.end[axis] != size[axis]) block[axis] = std::gcd(block[axis], box.end[axis]);
+    }
+  }
+  return Min(block, size);
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext&) {
+  Result<Plotfile> plot = ReadPlotfile(path);
   if (!plot.ok()) return plot.status();
   SourceInfo info{.format = "AMReX plotfile"};
   const Result<int> variable = ChosenVariable(path, *plot, options, info.notes);
   if (!variable.ok()) return variable.status();
-  const Result<FabHeader> first = ReadFabHeader(plot->levels.front().patches.front());
-  if (!first.ok()) return first.status();
-  info.file_type = ToString(first->type);
-  info.exact = {first->type, {}};
+  const Patch& first = plot->levels.front().patches.front();
+  const Result<std::shared_ptr<const DataFile>> file = OpenData(plot->data[first.file]);
+  if (!file.ok()) return file.status();
+  const Result<FabHeader> header = ReadFabHeader(**file, first.offset);
+  if (!header.ok()) return header.status();
+  info.file_type = ToString(header->type);
+  info.exact = {header->type, {}};
   info.notes.push_back(fmt::format("time {} of the simulation; {} levels of cells", plot->time, plot->levels.size()));
   info.files = plot->files;
   info.folder = path;
-  std::vector<std::vector<MosaicPart>> levels;
-  for (auto level = plot->levels.rbegin(); level != plot->levels.rend(); ++level) {
-    const Result<VolumeGeometry> geometry = GeometryOf(path, *plot, *level);
+  std::ranges::reverse(plot->levels);
+  PartBoxes boxes;
+  for (const Level& level : plot->levels) {
+    const Result<VolumeGeometry> geometry = GeometryOf(path, *plot, level);
     if (!geometry.ok()) return geometry.status();
-    info.levels.push_back({{*geometry, ScalarType::kFloat32, {}}, Uniform(1)});
-    std::vector<MosaicPart>& parts = levels.emplace_back();
-    for (const Patch& patch : level->patches) {
-      const auto open = [patch, begin = level->domain.begin, variable = *variable, context] {
-        return OpenPatch(patch, begin, variable, context);
-      };
-      parts.push_back({fmt::format("{} at byte {}", patch.file, patch.offset), patch.box, open});
-    }
+    auto of_level = std::make_shared<std::vector<Box>>();
+    for (const Patch& patch : level.patches) of_level->push_back(patch.box);
+    info.levels.push_back({{*geometry, ScalarType::kFloat32, {}}, BlockOf(*of_level, level.domain.size())});
+    boxes.push_back(std::move(of_level));
   }
-  return MakeMosaic(path, std::move(info), std::move(levels));
+  return MakeMosaic(path, std::move(info), boxes,
+                    std::make_shared<PatchReader>(std::move(plot->levels), std::move(plot->data), *variable, header->type));
 }
 
 bool IsPlotfile(const std::string& path, const ReadOptions&) {

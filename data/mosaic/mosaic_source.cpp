@@ -12,6 +12,7 @@
 #include "common/base/printable.h"
 #include "common/memory/pooled_vector.h"
 #include "common/volume/box_assembly.h"
+#include "data/mosaic/box_tree.h"
 #include "data/mosaic/prolong.h"
 #include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
@@ -20,41 +21,117 @@
 namespace slabstream {
 namespace {
 
-// Sources hold their files open, of which a process may have about a thousand.
-constexpr std::size_t kMostOpen = 64;
+Status TooMany(const std::string& name, std::size_t parts) {
+  return Status::InvalidArgument(fmt::format("{}: has {} parts, must have 1 to {}", name, parts, kMaxMosaicParts));
+}
 
-// The parts of all levels, which live as long as the mosaic or a read of it.
+// Parts that are sources. They hold their files open, of which a process may have about a thousand.
+class SourceParts : public PartReader {
+ public:
+  SourceParts(std::string name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels)
+      : name_(std::move(name)), info_(std::move(info)), levels_(std::move(levels)) {}
+
+  void Read(int level, std::size_t part, const Box& box, const BoxRoom& out, std::stop_token stop, VolumeSource::ReadDone done) override {
+    Result<std::shared_ptr<VolumeSource>> source = Source(level, part);
+    if (!source.ok()) return done(Printable(source.status()));
+    const Index3 begin = levels_[std::size_t(level)][part].box.begin;
+    (*source)->Read(0, {box.begin - begin, box.end - begin}, out, std::move(stop),
+                    [done = std::move(done), keep = *source](Status status) { done(std::move(status)); });
+  }
+
+  VolumeSource::Counts counts() override {
+    const std::lock_guard lock(mutex_);
+    VolumeSource::Counts all = closed_;
+    for (const Open& open : open_) Add(open.source->counts(), all);
+    return all;
+  }
+
+  // Waits.
+  Result<std::shared_ptr<VolumeSource>> Source(int level, std::size_t i) {
+    constexpr std::size_t kMostOpen = 64;
+    const std::lock_guard lock(mutex_);
+    const auto found = std::ranges::find_if(open_, [&](const Open& open) { return open.level == level && open.part == i; });
+    if (found != open_.end()) {
+      open_.splice(open_.begin(), open_, found);
+      return open_.front().source;
+    }
+    const MosaicPart& part = levels_[std::size_t(level)][i];
+    Result<std::shared_ptr<VolumeSource>> source = part.open();
+    if (!source.ok()) return source;
+    if (Status status = CheckPart(part, (*source)->info()); !status.ok()) return status;
+    if (open_.size() == kMostOpen) {
+      Add(open_.back().source->counts(), closed_);
+      open_.pop_back();
+    }
+    open_.push_front({level, i, *source});
+    return source;
+  }
+
+  // Blocks lie at multiples of their size in the level, so those of parts that begin elsewhere are of no use.
+  Index3 BlockLike(Index3 block, std::size_t level) const {
+    for (const MosaicPart& part : levels_[level]) {
+      for (int axis = 0; axis < 3; ++axis) {
+        if (part.box.begin[axis] % block[axis] != 0) block[axis] = 1;
+      }
+    }
+    return block;
+  }
+
+ private:
+  struct Open {
+    int level = 0;
+    std::size_t part = 0;
+    std::shared_ptr<VolumeSource> source;
+  };
+
+  static void Add(const VolumeSource::Counts& counts, VolumeSource::Counts& all) {
+    all.stored_bytes += counts.stored_bytes;
+    all.chunks += counts.chunks;
+  }
+
+  Status CheckPart(const MosaicPart& part, const SourceInfo& info) const {
+    const auto& [geometry, type, mapping] = info.finest();
+    const VolumeDescription& wanted = info_.finest();
+    const auto text = [](const Index3& size) { return fmt::format("{} x {} x {} voxels", size.x, size.y, size.z); };
+    if (geometry.size != part.box.size()) {
+      return Status::InvalidArgument(
+          fmt::format("{}: {} has {}, must have {}", name_, part.name, text(geometry.size), text(part.box.size())));
+    }
+    const auto& [exact_type, exact] = info_.exact;
+    if (type == wanted.type && mapping == wanted.mapping && info.exact.type == exact_type && info.exact.mapping == exact) {
+      return Status::Ok();
+    }
+    return Status::InvalidArgument(fmt::format("{}: {} has samples of {} from {} and scale {}, must have {} from {} and scale {}", name_,
+                                               part.name, ToString(info.exact.type), info.exact.mapping.offset, info.exact.mapping.scale,
+                                               ToString(exact_type), exact.offset, exact.scale));
+  }
+
+  const std::string name_;
+  const SourceInfo info_;
+  const std::vector<std::vector<MosaicPart>> levels_;
+  std::mutex mutex_;             // guards what follows
+  std::list<Open> open_;         // the last one that was wanted first
+  VolumeSource::Counts closed_;  // of those that are not open any more
+};
+
+// What lies in the parts, and what is interpolated. Lives as long as the mosaic or a read of it.
 class Parts : public std::enable_shared_from_this<Parts> {
  public:
-  Parts(std::string name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels)
-      : name_(std::move(name)), info_(std::move(info)), levels_(std::move(levels)) {}
+  Parts(std::string name, SourceInfo info, const PartBoxes& boxes, std::shared_ptr<PartReader> reader)
+      : name_(std::move(name)), info_(std::move(info)), boxes_(boxes), trees_(boxes.begin(), boxes.end()), reader_(std::move(reader)) {}
 
   // Errors of MakeMosaic.
   Result<SourceInfo> Check() {
-    for (const std::vector<MosaicPart>& parts : levels_) {
-      if (parts.empty() || parts.size() > kMaxMosaicParts) {
-        return Status::InvalidArgument(fmt::format("{}: has {} parts, must have 1 to {}", name_, parts.size(), kMaxMosaicParts));
-      }
-    }
-    const Result<std::shared_ptr<VolumeSource>> first = Source(int(levels_.size()) - 1, 0);
-    if (!first.ok()) return first.status();
     const SampleType type = info_.exact.type;
-    if (levels_.size() > 1 && type != SampleType::kFloat32 && type != SampleType::kFloat64) {
+    if (boxes_.size() > 1 && type != SampleType::kFloat32 && type != SampleType::kFloat64) {
       return Status::InvalidArgument(fmt::format("{}: has samples of {}, must have float32 or float64", name_, ToString(type)));
     }
     const Box coarsest = info_.levels.back().description.geometry.bounds();
-    if (const std::int64_t missing = Assembled(int(levels_.size()) - 1, coarsest).missing_voxels(); missing > 0) {
+    if (const std::int64_t missing = Assembled(int(boxes_.size()) - 1, coarsest).missing_voxels(); missing > 0) {
       return Status::InvalidArgument(fmt::format("{}: its parts hold {} of the {} voxels between them", name_,
                                                  coarsest.voxel_count() - missing, coarsest.voxel_count()));
     }
-    info_.whole = (*first)->info().whole;
-    for (std::size_t level = 0; level < levels_.size(); ++level) {
-      info_.levels[level].block = BlockLike((*first)->info().levels.front().block, levels_[level]);
-      if (level + 1 == levels_.size()) break;
-      auto boxes = std::make_shared<std::vector<Box>>();
-      for (const MosaicPart& part : levels_[level]) boxes->push_back(part.box);
-      info_.levels[level].refined = std::move(boxes);
-    }
+    for (std::size_t level = 0; level + 1 < boxes_.size(); ++level) info_.levels[level].refined = boxes_[level];
     return info_;
   }
 
@@ -75,91 +152,28 @@ class Parts : public std::enable_shared_from_this<Parts> {
     reading->EndPart();
   }
 
-  VolumeSource::Counts counts() {
-    const std::lock_guard lock(mutex_);
-    VolumeSource::Counts all = closed_;
-    for (const Open& open : open_) Add(open.source->counts(), all);
-    return all;
-  }
+  VolumeSource::Counts counts() const { return reader_->counts(); }
 
  private:
-  struct Open {
-    int level = 0;
-    std::size_t part = 0;
-    std::shared_ptr<VolumeSource> source;
-  };
-
-  static void Add(const VolumeSource::Counts& counts, VolumeSource::Counts& all) {
-    all.stored_bytes += counts.stored_bytes;
-    all.chunks += counts.chunks;
-  }
-
   Status NoMemory(const std::exception& error) const {
     return Status::ResourceExhausted(fmt::format("{}: a part cannot be read: {}", name_, error.what()));
   }
 
-  // Blocks lie at multiples of their size in the level, so those of parts that begin elsewhere are of no use.
-  static Index3 BlockLike(Index3 block, const std::vector<MosaicPart>& parts) {
-    for (const MosaicPart& part : parts) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (part.box.begin[axis] % block[axis] != 0) block[axis] = 1;
-      }
-    }
-    return block;
-  }
-
-  // Which parts a box is read from. Unlike Assemble (box_assembly.h), looks at each part once, since there may be many.
+  // Which parts a box is read from, in ascending order.
   BoxAssembly Assembled(int level, const Box& box) const {
-    const std::vector<MosaicPart>& parts = levels_[std::size_t(level)];
+    const std::vector<Box>& parts = *boxes_[std::size_t(level)];
     BoxAssembly assembly{{}, {box}};
-    for (std::size_t i = 0; i < parts.size() && !assembly.missing.empty(); ++i) {
-      if (Intersection(box, parts[i].box).empty()) continue;
+    for (const std::uint32_t part : trees_[std::size_t(level)].Meeting(box)) {
       std::vector<Box> missing;
       for (const Box& each : assembly.missing) {
-        if (const Box common = Intersection(each, parts[i].box); !common.empty()) assembly.copied.push_back({i, common});
-        const std::vector<Box> rest = Difference(each, parts[i].box);
+        if (const Box common = Intersection(each, parts[part]); !common.empty()) assembly.copied.push_back({part, common});
+        const std::vector<Box> rest = Difference(each, parts[part]);
         missing.insert(missing.end(), rest.begin(), rest.end());
       }
       assembly.missing = std::move(missing);
+      if (assembly.missing.empty()) break;
     }
     return assembly;
-  }
-
-  // Waits.
-  Result<std::shared_ptr<VolumeSource>> Source(int level, std::size_t i) {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find_if(open_, [&](const Open& open) { return open.level == level && open.part == i; });
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
-      return open_.front().source;
-    }
-    const MosaicPart& part = levels_[std::size_t(level)][i];
-    Result<std::shared_ptr<VolumeSource>> source = part.open();
-    if (!source.ok()) return source;
-    if (Status status = CheckPart(part, (*source)->info()); !status.ok()) return status;
-    if (open_.size() == kMostOpen) {
-      Add(open_.back().source->counts(), closed_);
-      open_.pop_back();
-    }
-    open_.push_front({level, i, *source});
-    return source;
-  }
-
-  Status CheckPart(const MosaicPart& part, const SourceInfo& info) const {
-    const auto& [geometry, type, mapping] = info.finest();
-    const VolumeDescription& wanted = info_.finest();
-    const auto text = [](const Index3& size) { return fmt::format("{} x {} x {} voxels", size.x, size.y, size.z); };
-    if (geometry.size != part.box.size()) {
-      return Status::InvalidArgument(
-          fmt::format("{}: {} has {}, must have {}", name_, part.name, text(geometry.size), text(part.box.size())));
-    }
-    const auto& [exact_type, exact] = info_.exact;
-    if (type == wanted.type && mapping == wanted.mapping && info.exact.type == exact_type && info.exact.mapping == exact) {
-      return Status::Ok();
-    }
-    return Status::InvalidArgument(fmt::format("{}: {} has samples of {} from {} and scale {}, must have {} from {} and scale {}", name_,
-                                               part.name, ToString(info.exact.type), info.exact.mapping.offset, info.exact.mapping.scale,
-                                               ToString(exact_type), exact.offset, exact.scale));
   }
 
   template <class Task>
@@ -194,29 +208,23 @@ class Parts : public std::enable_shared_from_this<Parts> {
     };
   }
 
-  // A task for several parts, which may be small. Not on the thread of whoever reads: they may have to be opened.
+  // A task for several parts, which may be small. Not on the thread of whoever reads: files may have to be opened.
   void ReadParts(int level, const std::shared_ptr<const BoxAssembly>& assembly, const std::shared_ptr<BoxReading>& reading) {
-    constexpr std::size_t kTogether = 8;
+    constexpr std::size_t kTogether = 32;
     for (std::size_t first = 0; first < assembly->copied.size(); first += kTogether) {
-      const std::size_t count = std::min(kTogether, assembly->copied.size() - first);
-      Begin(reading, [self = shared_from_this(), level, assembly, first, count, reading] {
-        for (std::size_t i = first; i < first + count; ++i) {
+      const std::size_t end = std::min(first + kTogether, assembly->copied.size());
+      Begin(reading, [self = shared_from_this(), level, assembly, first, end, reading] {
+        for (std::size_t i = first; i < end && reading->goes_on(); ++i) {
+          const BoxAssembly::Part& copied = assembly->copied[i];
           reading->BeginPart();
-          self->EndIfItThrows(reading, [&] { self->ReadFrom(level, assembly->copied[i], reading); });
+          self->EndIfItThrows(reading, [&] {
+            self->reader_->Read(level, copied.source, copied.box, self->RoomFor(copied.box, *reading), reading->stop(), EndOf(reading));
+          });
         }
+        if (!reading->goes_on()) reading->GiveUp();
         reading->EndPart();
       });
     }
-  }
-
-  void ReadFrom(int level, const BoxAssembly::Part& copied, const std::shared_ptr<BoxReading>& reading) {
-    const VolumeSource::ReadDone end = EndOf(reading);
-    if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
-    Result<std::shared_ptr<VolumeSource>> source = Source(level, copied.source);
-    if (!source.ok()) return end(Printable(source.status()));
-    const Index3 begin = levels_[std::size_t(level)][copied.source].box.begin;
-    (*source)->Read(0, {copied.box.begin - begin, copied.box.end - begin}, RoomFor(copied.box, *reading), reading->stop(),
-                    [end, keep = *source](Status status) { end(std::move(status)); });
   }
 
   // Of a box some voxels of which lie in no part. One read of the coarser level is quicker than one for each of the gaps, so what lies
@@ -249,10 +257,9 @@ class Parts : public std::enable_shared_from_this<Parts> {
 
   const std::string name_;
   SourceInfo info_;  // complete once it is checked
-  const std::vector<std::vector<MosaicPart>> levels_;
-  std::mutex mutex_;             // guards what follows
-  std::list<Open> open_;         // the last one that was wanted first; at most kMostOpen
-  VolumeSource::Counts closed_;  // of those that are not open any more
+  const PartBoxes boxes_;
+  const std::vector<BoxTree> trees_;  // by level
+  const std::shared_ptr<PartReader> reader_;
 };
 
 class MosaicSource : public VolumeSource {
@@ -273,12 +280,35 @@ class MosaicSource : public VolumeSource {
 
 }  // namespace
 
-Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels) {
-  CHECK(!levels.empty() && levels.size() == info.levels.size());
-  const auto parts = std::make_shared<Parts>(name, std::move(info), std::move(levels));
+Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, const PartBoxes& boxes,
+                                                 std::shared_ptr<PartReader> reader) {
+  CHECK(!boxes.empty() && boxes.size() == info.levels.size());
+  for (const auto& of_level : boxes) {
+    if (of_level->empty() || of_level->size() > kMaxMosaicParts) return TooMany(name, of_level->size());
+  }
+  const auto parts = std::make_shared<Parts>(name, std::move(info), boxes, std::move(reader));
   Result<SourceInfo> checked = parts->Check();
   if (!checked.ok()) return checked.status();
   return std::shared_ptr<VolumeSource>(std::make_shared<MosaicSource>(*std::move(checked), parts));
+}
+
+Result<std::shared_ptr<VolumeSource>> MakeMosaic(const std::string& name, SourceInfo info, std::vector<std::vector<MosaicPart>> levels) {
+  CHECK(!levels.empty() && levels.size() == info.levels.size());
+  PartBoxes boxes;
+  for (const std::vector<MosaicPart>& parts : levels) {
+    std::vector<Box> of_level;
+    for (const MosaicPart& part : parts) of_level.push_back(part.box);
+    boxes.push_back(std::make_shared<const std::vector<Box>>(std::move(of_level)));
+  }
+  if (levels.back().empty()) return TooMany(name, 0);
+  const auto reader = std::make_shared<SourceParts>(name, info, std::move(levels));
+  const Result<std::shared_ptr<VolumeSource>> first = reader->Source(int(boxes.size()) - 1, 0);
+  if (!first.ok()) return first.status();
+  info.whole = (*first)->info().whole;
+  for (std::size_t level = 0; level < boxes.size(); ++level) {
+    info.levels[level].block = reader->BlockLike((*first)->info().levels.front().block, level);
+  }
+  return MakeMosaic(name, std::move(info), boxes, reader);
 }
 
 }  // namespace slabstream

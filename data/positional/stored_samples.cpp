@@ -21,15 +21,15 @@ constexpr std::int64_t kGap = 4096;
 }  // namespace
 
 Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int component) {
-  FileDescriptor file(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.number() < 0) {
+  const auto file = std::make_shared<const FileDescriptor>(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file->number() < 0) {
     return Status::Unavailable(
         fmt::format("{}: cannot be opened for reading: {}", payload.file.string(), std::generic_category().message(errno)));
   }
-  return std::shared_ptr<StoredSamples>(new StoredSamples(header, payload, component, std::move(file)));
+  return std::make_shared<StoredSamples>(header, payload, component, file);
 }
 
-StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file)
+StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int component, std::shared_ptr<const FileDescriptor> file)
     : name_(payload.file.string()),
       file_(std::move(file)),
       type_(header.type),
@@ -129,7 +129,7 @@ Status StoredSamples::ReadApart(std::int64_t offset, std::byte* to, std::int64_t
     const auto count = std::size_t(std::min(kMostRows, rows - row));
     for (std::size_t i = 0; i < count; ++i) places.at(i) = {to + (row + std::int64_t(i)) * pitch, std::size_t(row_)};
     places[0] = {to + row * pitch + within, std::size_t(row_ - within)};
-    const Result<std::int64_t> got = Got(::preadv(file_.number(), places.data(), int(count), off_t(offset + done)), offset + done);
+    const Result<std::int64_t> got = Got(::preadv(file_->number(), places.data(), int(count), off_t(offset + done)), offset + done);
     if (!got.ok()) return got.status();
     done += *got;
   }
@@ -139,7 +139,7 @@ Status StoredSamples::ReadApart(std::int64_t offset, std::byte* to, std::int64_t
 Status StoredSamples::ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes) {
   for (std::int64_t done = 0; done < bytes;) {
     const Result<std::int64_t> got =
-        Got(::pread(file_.number(), to + done, std::size_t(bytes - done), off_t(offset + done)), offset + done);
+        Got(::pread(file_->number(), to + done, std::size_t(bytes - done), off_t(offset + done)), offset + done);
     if (!got.ok()) return got.status();
     done += *got;
   }

@@ -21,6 +21,8 @@ class StoredSamples {
  public:
   // `payload`: of this volume alone. `component`: which of the header's components, in [0, components). Unavailable: it cannot be opened.
   static Result<std::shared_ptr<StoredSamples>> Open(const RawHeader& header, const Payload& payload, int component);
+  // The same of a payload whose file is open already.
+  StoredSamples(const RawHeader& header, const Payload& payload, int component, std::shared_ptr<const FileDescriptor> file);
 
   // A box, by the stored axes, cut into parts that are read on their own, each with little memory.
   std::vector<Box> Parts(const Box& box) const;
@@ -40,7 +42,6 @@ class StoredSamples {
     std::int64_t row = 0, slice = 0;
   };
 
-  StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file);
   Pitch PitchFor(const Index3& size) const;
   bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }
@@ -50,7 +51,7 @@ class StoredSamples {
   Result<std::int64_t> Got(std::int64_t bytes, std::int64_t offset);
 
   const std::string name_;
-  const FileDescriptor file_;
+  const std::shared_ptr<const FileDescriptor> file_;
   const SampleType type_;
   const bool big_endian_;
   const std::int64_t first_;                         // byte of the file

@@ -28,6 +28,7 @@ struct Kind {
   SampleType type = SampleType::kFloat64;
   bool big_endian = false;
   int ghosts = 0;
+  bool apart = false;  // each box lies in a file of its own, the last one in the first file
 };
 
 // The values are those of their place in the world.
@@ -49,11 +50,14 @@ class AmrexTest : public testing::Test {
       const std::vector<Box> boxes = factor == 1 ? std::vector<Box>{{{0, 0, 0}, {16, 8, 4}}, {{0, 0, 4}, {16, 8, 8}}}
                                                  : std::vector<Box>{{{4, 4, 4}, {12, 8, 12}}, {{12, 4, 8}, {20, 8, 12}}};
       grids += fmt::format("{} {} 0.5\n7\n", factor - 1, boxes.size());
-      std::string of_level = fmt::format("1\n1\n2\n{}\n({} 0\n", kind.ghosts, boxes.size()), places, data;
+      std::string of_level = fmt::format("1\n1\n2\n{}\n({} 0\n", kind.ghosts, boxes.size()), places;
+      std::vector<std::string> files(boxes.size());
       for (const Box& box : boxes) {
         grids += "0 1\n0 1\n0 1\n";  // corners, which the boxes tell
         of_level += TextOf({box.begin + first, box.end + first}) + "\n";
-        places += fmt::format("FabOnDisk: Cell_D_00000 {}\n", data.size());
+        const std::size_t file = kind.apart ? std::size_t(&boxes.back() - &box) : 0;
+        std::string& data = files[file];
+        places += fmt::format("FabOnDisk: Cell_D_0000{} {}\n", file, data.size());
         const Box stored = {box.begin - Uniform(kind.ghosts), box.end + Uniform(kind.ghosts)};
         data += fmt::format("FAB (({}),({}, ({}))){} 2\n", real, bytes, order, TextOf({stored.begin + first, stored.end + first}));
         std::vector<double> values;
@@ -70,7 +74,8 @@ class AmrexTest : public testing::Test {
       }
       const std::string folder = fmt::format("plt/Level_{}/", factor - 1);
       WriteFile(directory_ / (folder + "Cell_H"), of_level + fmt::format(")\n{}\n", boxes.size()) + places + "\n2,2\n0,0,\n0,0,\n");
-      WriteFile(directory_ / (folder + "Cell_D_00000"), data);
+      for (std::size_t file = 0; file < files.size(); ++file)
+        WriteFile(directory_ / fmt::format("{}Cell_D_0000{}", folder, file), files[file]);
       grids += fmt::format("Level_{}/Cell\n", factor - 1);
     }
     WriteFile(directory_ / "plt/Header", header + "\n7 7 \n" + sides + "0\n0\n" + grids);
@@ -89,12 +94,13 @@ class AmrexTest : public testing::Test {
 };
 
 TEST_F(AmrexTest, ALinearFieldIsThatOfItsPlaceAtEachLevel) {
-  for (const Kind& kind : {Kind{}, Kind{.big_endian = true}, Kind{.type = SampleType::kFloat32, .ghosts = 2}}) {
+  for (const Kind& kind : {Kind{}, Kind{.big_endian = true, .apart = true}, Kind{.type = SampleType::kFloat32, .ghosts = 2}}) {
     Write(kind);
     for (const std::string array : {"v", "w"}) {
       const std::shared_ptr<VolumeSource> source = Opened(Open(array));
       ASSERT_EQ(source->info().levels.size(), 2U);
       ASSERT_EQ(source->info().levels[0].refined->size(), 2U);
+      EXPECT_EQ(source->info().levels[0].block, Uniform(4)) << "all boxes begin and end at multiples of it";
       for (const int level : {0, 1}) {
         const VolumeGeometry& geometry = source->info().levels[std::size_t(level)].description.geometry;
         EXPECT_EQ(geometry.size, Uniform(2 - level) * kCoarse);
@@ -134,6 +140,9 @@ TEST_F(AmrexTest, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(with("Level_1/Cell_D_00000", "(64 11", "(64 12"), testing::IsEmpty()) << "the parts of a number are not looked at";
   EXPECT_THAT(with("Level_1/Cell_D_00000", ")) 2\n", ")) 0\n"), HasSubstr("are 0 variables"));
   EXPECT_THAT(with("Level_1/Cell_D_00000", "((-12,", "((-11,"), HasSubstr("lies another box than Cell_H says"));
+  EXPECT_THAT(with("Level_1/Cell_D_00000", "FAB ((8, (64 11 52 0 1 12 0 1023)),(8, (8 7 6 5 4 3 2 1))",
+                   "FAB ((8, (64 11 52 0 1 12 0 1023)),(4, (4 3 2 1))"),
+              HasSubstr("values are of float32, must be of float64"));
   EXPECT_THAT(with("Level_0/Cell_H", "((-8,0,4) (7,7,7)", "((-8,0,4) (7,6,7)"), HasSubstr("plt: its parts hold 960 of the 1024 voxels"));
   ASSERT_EQ(::mkfifo((directory_ / "plt/Level_1/pipe").c_str(), 0600), 0);
   EXPECT_THAT(with("Level_1/Cell_H", "FabOnDisk: Cell_D_00000", "FabOnDisk: pipe"), HasSubstr("pipe: not a file that can be read"));

@@ -8,6 +8,8 @@
 #include <random>
 #include <set>
 
+#include "data/mosaic/box_tree.h"
+
 namespace slabstream {
 namespace {
 
@@ -128,6 +130,26 @@ TEST_F(Mosaic, IsTheVolumeOfItsParts) {
     }
     EXPECT_EQ((*mosaic)->counts().stored_bytes, std::uint64_t(voxels)) << "no voxel is read twice, and closed parts count";
     EXPECT_LE(*open_, 64);
+  }
+}
+
+// Boxes may overlap, repeat and be empty.
+TEST_F(Mosaic, ATreeFindsTheBoxesThatMeetOne) {
+  const unsigned seed = 63;
+  std::mt19937 random(seed);
+  for (const int count : {0, 1, 8, 9, 500}) {
+    auto boxes = std::make_shared<std::vector<Box>>();
+    for (int i = 0; i < count; ++i) boxes->push_back(i % 7 == 6 ? boxes->front() : RandomBox(i % 5 == 4 ? kSize : Uniform(9), random));
+    if (count > 8) boxes->back() = {};
+    const BoxTree tree(boxes);
+    for (int i = 0; i < 50; ++i) {
+      const Box box = RandomBox(kSize, random);
+      std::vector<std::uint32_t> met;
+      for (std::size_t n = 0; n < boxes->size(); ++n) {
+        if (!Intersection((*boxes)[n], box).empty()) met.push_back(std::uint32_t(n));
+      }
+      ASSERT_EQ(tree.Meeting(box), met) << "seed " << seed << ", " << count << " boxes";
+    }
   }
 }
 
