@@ -115,8 +115,8 @@ std::vector<std::uint8_t> RefinedIn(const LevelMap& map, const VolumeLevels& lev
   return finest;
 }
 
-// The map of a picture whose finest level is `first`.
-LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const FrameSetup& setup) {
+// The map of a picture whose finest level is `first`. `all`: also of what the picture does not show; its pixels are as wide everywhere.
+LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const FrameSetup& setup, bool all = false) {
   constexpr int kMostOfMesh = 32;
   const VolumeDescription& grid = levels.levels[std::size_t(first)];
   LevelMap map = levels.refined.empty() ? ZonesOf(grid.geometry.size) : ZonesOf(grid.geometry.size, kMostOfMesh);
@@ -125,7 +125,9 @@ LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const Frame
     return level.type == grid.type && level.mapping == grid.mapping && CanStandIn(level.geometry, grid.geometry);
   };
   for (; end < int(levels.levels.size()) && fits(levels.levels[std::size_t(end)]); ++end) map.levels.push_back(end);
-  VisitZones(map, grid.geometry, setup, [&](double width) {
+  const double everywhere = all ? setup.unit * WidthAt({}, setup.camera) : 0;
+  VisitZones(map, grid.geometry, setup, [&](double shown) {
+    const double width = shown > 0 ? shown : everywhere;
     const int level = CoarsestFor(detail * width, levels, end);
     map.of_zone.push_back(width > 0 ? std::uint8_t(std::max(level - first, 0)) : LevelMap::kOutside);
   });
@@ -241,7 +243,10 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   for (int first = CoarsestFor(detail * least, levels, count);; ++first) {
     LevelMap map = MapOf(detail, levels, first, *setup);
     // The frame's grid is a level that is drawn.
-    if (std::ranges::find(map.of_zone, 0) != map.of_zone.end() || first + 1 == count) return WithoutUnused(std::move(map));
+    if (std::ranges::find(map.of_zone, 0) == map.of_zone.end() && first + 1 < count) continue;
+    // The boxes of a mesh are the same in all orthographic views, so their voxels stay where they are when the view turns.
+    if (!levels.refined.empty() && camera.projection == Projection::kOrthographic) map = MapOf(detail, levels, first, *setup, true);
+    return WithoutUnused(std::move(map));
   }
 }
 
