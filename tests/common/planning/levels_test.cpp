@@ -334,6 +334,14 @@ TEST(LevelOfTest, AnAdaptiveMeshIsDrawnFromLevelsThatHaveVoxelsThere) {
         at_finest += map->Of(zone) == 0 ? 1 : 0;
       }
       EXPECT_LE(at_finest, 2 * 8 * 8) << "two boxes of 32 voxels, and their neighbours";
+      if (projection == Projection::kOrthographic) {
+        request.view.azimuth_degrees = random.Integer(0, 359);
+        request.view.zoom = 2;
+        const LevelMap turned = LevelsOf(request, levels).value();
+        if (turned.levels == map->levels) {  // else the picture shows nothing of the finest one
+          EXPECT_EQ(turned, *map) << "voxels stay where they are";
+        }
+      }
       request.detail = 1000;
       EXPECT_EQ(LevelOf(request, levels), 2);
     }
