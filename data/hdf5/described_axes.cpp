@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/log.h"
 #include "common/base/printable.h"
 #include "data/hdf5/hdf5_image.h"
 #include "data/metadata/json_fields.h"
@@ -96,6 +95,7 @@ void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64
   if (!values.ok() || values->size() != size) return;  // a dimension without coordinates, or names
   const std::string unit = file.Text(scale, "units").value_or(file.Text(scale, "unit").value_or(""));
   const std::string named = Printable(LastPart(scale) + (unit.empty() ? "" : " (" + unit + ")"));
+  const bool down = file.Text(scale, "positive").value_or("") == "down";
   const std::optional<EvenSteps> even = EvenStepsOf(*values);
   if (kind == AxisKind::kTime) {
     if (!even) return;
@@ -104,9 +104,9 @@ void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64
     return;
   }
   if (!even && size > 1) {
-    image.notes.push_back(
-        fmt::format("coordinates {} are not evenly spaced: {}; voxels along it are shown at a distance of 1", named, WhyUneven(*values)));
-    LogWarning(fmt::format("{}: {}", file.path(), image.notes.back()));
+    axis.uneven = *values;
+    axis.uneven_named = named + (down ? " (running down)" : "");
+    axis.unit = LengthUnitNamed(unit);
     return;
   }
   if (!even && !std::isfinite(values->front())) return;
@@ -114,7 +114,6 @@ void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64
   axis.step = even ? even->step : 1;
   axis.unit = LengthUnitNamed(unit);
   image.world = World::kScene;
-  const bool down = file.Text(scale, "positive").value_or("") == "down";
   image.notes.push_back(
       fmt::format("coordinates {} place its axis: {:g} and steps of {:g}{}", named, axis.start, axis.step, down ? "; they run down" : ""));
 }

@@ -58,7 +58,7 @@ VolumeFormat Hdf5() {
   return {.name = "HDF5",
           .endings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"},
           .recognises = Recognises,
-          .options = {"time", "channel", "dataset"},
+          .options = {"time", "channel", "dataset", "resample"},
           .open = Open};
 }
 

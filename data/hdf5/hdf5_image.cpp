@@ -7,8 +7,10 @@
 #include <set>
 #include <sstream>
 
+#include "common/base/log.h"
 #include "common/base/printable.h"
 #include "data/sources/axis_choice.h"
+#include "data/volume_io/even_steps.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
@@ -96,7 +98,8 @@ Result<ImageDescription> Described(AttributedFile& file, const DatasetFacts& dat
 }
 
 // The volume of the chosen axes as RawHeader has it: its stored axes are the dataset's x, y and z.
-RawHeader HeaderOf(const ImageDescription& image, const ChosenAxes& choice, const std::vector<std::uint64_t>& sizes) {
+Result<RawHeader> HeaderOf(const std::string& named, const ImageDescription& image, const ChosenAxes& choice,
+                           const std::vector<std::uint64_t>& sizes) {
   RawHeader header{.size = {1, 1, 1}, .world = image.world, .origin = image.origin, .matrix = "the directions of its axes"};
   std::array<const ImageAxis*, 3> axes{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -114,8 +117,34 @@ RawHeader HeaderOf(const ImageDescription& image, const ChosenAxes& choice, cons
     const Vec3 direction = axes[i]->direction.value_or(Normalized(header.steps[i]));
     header.steps[i] = factor * axes[i]->step * direction;
     header.origin = header.origin + factor * axes[i]->start * direction;
+    if (axes[i]->uneven.empty()) continue;
+    std::vector<double> coordinates = axes[i]->uneven;
+    for (double& coordinate : coordinates) coordinate *= factor;
+    Result<UnevenAxis> uneven = UnevenAxisOf(named + ": coordinates " + axes[i]->uneven_named, coordinates, ValuesAt::kPoints);
+    if (!uneven.ok()) return uneven.status();
+    header.uneven[i] = *std::move(uneven);
   }
   return header;
+}
+
+// What becomes of axes whose coordinates are not even.
+void PlaceUneven(const std::string& path, const ReadOptions& options, ImageDescription& image) {
+  for (ImageAxis& axis : image.axes) {
+    if (axis.uneven.empty()) continue;
+    if (options.resample) {
+      image.world = World::kScene;
+      axis.start = axis.uneven.front();
+      axis.step = (axis.uneven.back() - axis.start) / double(axis.uneven.size() - 1);
+      image.notes.push_back(fmt::format("coordinates {} place its axis", axis.uneven_named));
+      continue;
+    }
+    image.notes.push_back(fmt::format(
+        "coordinates {} are not evenly spaced: {}; voxels along it are shown at a distance of 1, unless --resample even resamples them",
+        axis.uneven_named, WhyUneven(axis.uneven)));
+    LogWarning(fmt::format("{}: {}", path, image.notes.back()));
+    axis.uneven.clear();
+    axis.unit.reset();
+  }
 }
 
 std::string NoteOfAxes(const ImageDescription& image, const std::vector<AxisKind>& kinds) {
@@ -133,6 +162,7 @@ Result<Pyramid> ReadImage(AttributedFile& file, const ReadOptions& options, cons
   if (!dataset.ok()) return dataset.status();
   Result<ImageDescription> image = Described(file, *dataset);
   if (!image.ok()) return image.status();
+  PlaceUneven(file.path(), options, *image);
   const std::string named = file.Named(*path);
   std::vector<std::string> names;
   for (const ImageAxis& axis : image->axes) names.push_back(axis.name);
@@ -142,7 +172,9 @@ Result<Pyramid> ReadImage(AttributedFile& file, const ReadOptions& options, cons
   const Result<ChosenAxes> choice = ChooseAxes(named, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   if (choice->axes[0] < 0 || choice->axes[1] < 0) return Status::InvalidArgument(named + " has no axes x and y");
-  const Result<WorldPlacement> placed = PlaceInWorld(HeaderOf(*image, *choice, sizes), named);
+  const Result<RawHeader> header = HeaderOf(named, *image, *choice, sizes);
+  if (!header.ok()) return header.status();
+  const Result<WorldPlacement> placed = PlaceInWorld(*header, named);
   if (!placed.ok()) return placed.status();
   if (placed->slant)
     return Status::InvalidArgument(named + " has axes that are not at right angles, which is not supported in HDF5 and netCDF files");
@@ -167,7 +199,8 @@ Result<Pyramid> ReadImage(AttributedFile& file, const ReadOptions& options, cons
                   .file_type = std::string(ToString(dataset->type)),
                   .labels = image->labels,
                   .notes = std::move(image->notes),
-                  .files = {file.path()}};
+                  .files = {file.path()},
+                  .uneven = placed->uneven};
   choice->Describe(pyramid.info);
   if (const auto time = std::ranges::find(*kinds, AxisKind::kTime); time != kinds->end()) {
     const ImageAxis& axis = image->axes[std::size_t(time - kinds->begin())];

@@ -25,6 +25,9 @@ struct ImageAxis {
   std::optional<Vec3> direction = {};   // in the world; none: that of the world's axis of this name
   std::optional<LengthUnit> unit = {};  // if the file states one that is known
   std::string time_unit = {};           // of the step of an axis of time, as the file spells it
+  // Where its coordinates are not even: all of them, in `unit`, which then do not place it (step, start) unless it is resampled.
+  std::vector<double> uneven = {};
+  std::string uneven_named = {};  // "depth (m)"
 };
 
 struct ImageDescription {

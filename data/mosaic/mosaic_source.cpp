@@ -13,9 +13,9 @@
 #include "common/memory/pooled_vector.h"
 #include "common/volume/box_assembly.h"
 #include "data/mosaic/box_tree.h"
-#include "data/mosaic/prolong.h"
 #include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
+#include "data/sources/prolong.h"
 #include "data/stores/read_threads.h"
 
 namespace slabstream {
@@ -234,20 +234,20 @@ class Parts : public std::enable_shared_from_this<Parts> {
     if (!reading->goes_on()) return end(Status::Cancelled("reading was stopped"));
     Box gaps;
     for (const Box& missing : assembly->missing) gaps = Hull(gaps, missing);
-    const VolumeGeometry &fine = info_.levels[std::size_t(level)].description.geometry,
-                         &coarse = info_.levels[std::size_t(level) + 1].description.geometry;
-    const Box between = BoxBetween(gaps, fine, coarse);
+    VoxelPlaces places = PlacesBetween(gaps, info_.levels[std::size_t(level)].description.geometry,
+                                       info_.levels[std::size_t(level) + 1].description.geometry);
+    const Box between = BoxBetween(places);
     const bool exact = reading->out().exact;
     const auto samples =
         std::make_shared<UnwrittenVector<std::byte>>(std::size_t(between.voxel_count()) * CopiedBytes(info_.exact.type, exact));
     Read(level + 1, between, BoxRoom::Dense(between, samples->data(), exact), reading->stop(),
-         [self = shared_from_this(), level, assembly, samples, gaps, &fine, &coarse, reading, end](Status status) {
+         [self = shared_from_this(), level, assembly, samples, gaps, places = std::move(places), reading, end](Status status) {
            if (status.ok()) {
              const BoxRoom room = self->RoomFor(gaps, *reading);
              if (room.exact && self->info_.exact.type == SampleType::kFloat64) {
-               Prolong(reinterpret_cast<const double*>(samples->data()), gaps, fine, coarse, room);
+               Prolong<double, double>(reinterpret_cast<const double*>(samples->data()), places, room);
              } else {
-               Prolong(reinterpret_cast<const float*>(samples->data()), gaps, fine, coarse, room);
+               Prolong<float, float>(reinterpret_cast<const float*>(samples->data()), places, room);
              }
              self->ReadParts(level, assembly, reading);
            }

@@ -40,7 +40,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 }  // namespace
 
 VolumeFormat VtkParallelImage() {
-  return {.name = "VTK parallel image", .endings = {".pvti", ".pvtr"}, .options = {"channel", "array"}, .open = Open};
+  return {.name = "VTK parallel image", .endings = {".pvti", ".pvtr"}, .options = {"channel", "array", "resample"}, .open = Open};
 }
 
 }  // namespace slabstream

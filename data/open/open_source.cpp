@@ -14,6 +14,7 @@
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/positional/file_source.h"
+#include "data/sources/even_source.h"
 #include "data/sources/hollow_source.h"
 #include "data/sources/label_source.h"
 #include "data/sources/magnitude_source.h"
@@ -47,11 +48,12 @@ std::atomic<std::uint64_t> process_memory = 0;  // 0: not said
 
 Result<std::shared_ptr<VolumeSource>> OpenAs(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
                                              const SourceContext& context) try {
-  if (format.open != nullptr) {
-    Result<std::shared_ptr<VolumeSource>> source = format.open(path, options, context);
-    if (!source.ok() || *source != nullptr) return source;
-  }
-  return OpenFile(format, path, options, context);
+  Result<std::shared_ptr<VolumeSource>> source = std::shared_ptr<VolumeSource>();
+  if (format.open != nullptr) source = format.open(path, options, context);
+  if (source.ok() && *source == nullptr) source = OpenFile(format, path, options, context);
+  if (!source.ok() || !options.resample) return source;
+  if (options.labels) return Status::InvalidArgument(path + ": --ids says that values are labels, which are not resampled");
+  return MakeEven(path, *std::move(source), *options.resample);
 } catch (const std::bad_alloc&) {
   return Status::ResourceExhausted(path + ": does not fit the memory");
 }

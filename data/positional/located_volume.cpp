@@ -21,7 +21,8 @@ SourceInfo InfoOfFile(const std::string& format, const std::string& path, const 
                      .time = int(header.number),
                      .notes = header.notes,
                      .files = {path},
-                     .stored = StoredAxes{header.size, header.steps, placed.slant.has_value()}};
+                     .stored = StoredAxes{header.size, header.steps, placed.slant.has_value()},
+                     .uneven = placed.uneven};
   if (header.channels.empty() && header.components > 1) {
     info.components = header.components;
     info.channels.resize(std::size_t(header.components));

@@ -29,6 +29,7 @@
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/read_progress.h"
 #include "data/volume_io/stated_label.h"
+#include "data/volume_io/uneven_axis.h"
 
 namespace slabstream {
 
@@ -79,6 +80,9 @@ struct SourceInfo {
   std::shared_ptr<const FileStamp> growth = {};
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
+  // Of a rectilinear grid: where its voxels lie along x, y and z of the level, in lengths from the world's origin; those that are there
+  // rise. The level's spacing is then that of no two voxels, so whoever opens such a source makes it even (even_source.h).
+  UnevenAxes uneven = {};
   // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).
   std::optional<SliceOrder> slices = {};
   bool whole = false;  // whoever reads a box first decodes all, and the source holds it (data/positional/decoded_source.h)

@@ -21,6 +21,7 @@
 #include "data/volume_io/payload.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
+#include "data/volume_io/uneven_axis.h"
 
 namespace slabstream {
 
@@ -37,7 +38,8 @@ struct RawHeader {
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
   std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  Vec3 origin;                       // the centre of the first voxel
+  Vec3 origin;             // the centre of the first voxel
+  UnevenAxes uneven = {};  // of a rectilinear grid: where the voxels lie along x, y and z of the file, which are those of the world
   std::optional<LengthUnit> unit{};  // the unit of steps and origin, if the file states it
   std::string_view matrix{};         // the file's name for the steps, for messages; lives as long as the program
   SampleType type = SampleType::kUint8;

@@ -98,6 +98,12 @@ Status SetLattice(ReadOptions& options, std::string_view option, std::string_vie
   return Wrong(option, text, fmt::format("a whole number in [1, {}]", kMaxLatticeSide));
 }
 
+Status SetResample(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.resample = text == "even" ? 0 : ParseNumber<std::int32_t>(text);
+  if (text == "even" || (options.resample && *options.resample >= 2 && *options.resample <= kMaxVolumeSide)) return Status::Ok();
+  return Wrong(option, text, fmt::format("even or a whole number in [2, {}]", kMaxVolumeSide));
+}
+
 Status SetDataset(ReadOptions& options, std::string_view option, std::string_view text) {
   if (text.empty() || text.size() > kMaxDatasetBytes) {
     return Wrong(option, text.substr(0, 64), fmt::format("the path of a dataset in an HDF5 file, of 1 to {} bytes", kMaxDatasetBytes));
@@ -171,6 +177,10 @@ const std::vector<ReadOption>& ReadOptionList() {
        IsGiven<&ReadOptions::array>},
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},
+      {"resample", "even|VOXELS",
+       "Puts a rectilinear grid on even voxels by linear interpolation: none longer than the shortest distance, or so many along each "
+       "uneven axis",
+       SetResample, IsGiven<&ReadOptions::resample>},
       {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
       {"follow-links", "", "Follow links that lead out of a folder of Zarr, N5 or precomputed, such as those of git-annex and DataLad",
        SetYes<&ReadOptions::follow_links>, IsGiven<&ReadOptions::follow_links>},

@@ -50,6 +50,9 @@ struct ReadOptions {
   // For VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
   std::string array;                    // the array; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
+  // For rectilinear grids: voxels along each uneven axis, in [2, kMaxVolumeSide], or 0: as many as its shortest distance needs
+  // (data/sources/even_source.h).
+  std::optional<std::int32_t> resample;
   // For HDF5 files.
   std::string dataset;  // the path of one in the file, at most kMaxDatasetBytes; "": the image that its layout says, or the only volume
   // For raw samples.

@@ -21,10 +21,21 @@ Status SetGrid(RawHeader& header, const std::string& path, const PointGrid& grid
   header.world = World::kScene;
   header.matrix = grid.matrix;
   header.steps = grid.steps;
+  for (const Axis axis : kAxes) {
+    const auto i = std::size_t(Number(axis));
+    if (grid.uneven[i].empty()) continue;
+    Result<UnevenAxis> uneven = UnevenAxisOf(fmt::format("{}: its coordinates along {}", path, Letter(axis)), grid.uneven[i], at);
+    if (!uneven.ok()) return uneven.status();
+    const std::vector<double>& centres = uneven->centres;
+    header.origin[axis] = centres.front();
+    header.steps[i][axis] = (centres.back() - centres.front()) / double(centres.size() - 1);
+    header.uneven[i] = *std::move(uneven);
+  }
   return SetSize(header, path, std::move(sizes), {});
 }
 
-Result<PointGrid> EvenGrid(const std::string& path, const std::array<std::vector<double>, 3>& coordinates) {
+Result<PointGrid> GridOfCoordinates(const std::string& path, const std::array<std::vector<double>, 3>& coordinates,
+                                    const ReadOptions& options) {
   PointGrid grid{.matrix = "coordinates"};
   Vec3 steps;
   double smallest = std::numeric_limits<double>::infinity();
@@ -35,10 +46,14 @@ Result<PointGrid> EvenGrid(const std::string& path, const std::array<std::vector
     for (std::size_t i = 0; i < places.size(); ++i) {
       const double even = first + double(i) * step;
       if (std::abs(places[i] - even) <= kMostUneven * std::abs(step) + rounding && (step != 0 || places.size() == 1)) continue;
-      return Status::InvalidArgument(
-          fmt::format("{}: its coordinates along {} are not even: number {} is {}, must be within {} of a mean spacing of {}; ParaView's "
-                      "filter Resample To Image makes an image of it",
-                      path, Letter(axis), i, places[i], kMostUneven, even));
+      if (!options.resample) {
+        return Status::InvalidArgument(
+            fmt::format("{}: its coordinates along {} are not even: number {} is {}, must be within {} of a mean spacing of {}; --resample "
+                        "even puts it on even voxels",
+                        path, Letter(axis), i, places[i], kMostUneven, even));
+      }
+      grid.uneven[std::size_t(Number(axis))] = places;
+      break;
     }
     grid.points[std::size_t(Number(axis))] = double(places.size());
     grid.origin[axis] = first;

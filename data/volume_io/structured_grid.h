@@ -6,6 +6,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/mesh/mesh.h"
@@ -19,16 +20,19 @@ struct PointGrid {
   std::array<Vec3, 3> steps = StepsOf({1, 1, 1});
   Vec3 origin;                // the place of the first point
   std::string_view matrix{};  // RawHeader::matrix
+  // Coordinates of the points along uneven axes, whose step is the mean one; empty: the axis is even.
+  std::array<std::vector<double>, 3> uneven = {};
 };
 
 // Sets size and place of a volume whose voxels are at the points, or at the centres of the cells: a grid that is
-// flat along an axis has one layer of them there. Errors of SetSize.
+// flat along an axis has one layer of them there. Errors of SetSize and UnevenAxisOf.
 Status SetGrid(RawHeader& header, const std::string& path, const PointGrid& grid, ValuesAt at);
 
 // The grid of points at these coordinates along x, y and z, at least one each; an axis with one point has the smallest spacing of the
-// others. InvalidArgument, naming `path`, axis and coordinate: they are not even, by more than kMostUneven of the mean spacing and what
-// rounding to float32 makes.
+// others. They are uneven if they are off by more than kMostUneven of the mean spacing and what rounding to float32 makes. InvalidArgument,
+// naming `path`, axis and coordinate: they are uneven, and options.resample does not say what becomes of them.
 inline constexpr double kMostUneven = 0.01;
-Result<PointGrid> EvenGrid(const std::string& path, const std::array<std::vector<double>, 3>& coordinates);
+Result<PointGrid> GridOfCoordinates(const std::string& path, const std::array<std::vector<double>, 3>& coordinates,
+                                    const ReadOptions& options);
 
 }  // namespace slabstream

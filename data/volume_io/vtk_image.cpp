@@ -1,5 +1,5 @@
-// Structured grids in VTK's XML files (vtk_xml.h): image data (.vti), and rectilinear grids whose coordinates are even (.vtr). Values
-// belong to points or cells; pieces are put together.
+// Structured grids in VTK's XML files (vtk_xml.h): image data (.vti) and rectilinear grids (.vtr). Values belong to points or cells;
+// pieces are put together.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -103,7 +103,8 @@ Status AddCoordinatesOfFile(const VtkXmlFile& file, const Piece& piece, const Ex
   return Status::Ok();
 }
 
-Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& path, const std::vector<Piece>& pieces, const Extent& bounds) {
+Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& path, const std::vector<Piece>& pieces, const Extent& bounds,
+                                  const ReadOptions& options) {
   Coordinates coordinates;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     constexpr std::int64_t kMost = kMaxVolumeSide + 1;  // around kMaxVolumeSide cells
@@ -116,7 +117,7 @@ Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& pat
     const Status status = (file.parallel() ? AddCoordinatesOfFile : AddCoordinates)(file, piece, bounds, coordinates);
     if (!status.ok()) return status;
   }
-  return EvenGrid(path, coordinates);
+  return GridOfCoordinates(path, coordinates, options);
 }
 
 // An array of each piece: that of pieces[i] is arrays[i].
@@ -172,8 +173,8 @@ Result<std::shared_ptr<ImageFile>> OpenImage(const std::string& path, std::strin
   if (!pieces.ok()) return pieces.status();
   const auto image = std::make_shared<ImageFile>(ImageFile{*std::move(file), *std::move(pieces)});  // which arrays are part of
   image->bounds = BoundsOf(image->pieces);
-  const Result<PointGrid> grid =
-      kind.ends_with(kImage) ? ImageGrid(image->file, image->bounds) : RectilinearGrid(image->file, path, image->pieces, image->bounds);
+  const Result<PointGrid> grid = kind.ends_with(kImage) ? ImageGrid(image->file, image->bounds)
+                                                        : RectilinearGrid(image->file, path, image->pieces, image->bounds, options);
   if (!grid.ok()) return grid.status();
   if (Status status = FindArrays(*image, path, options); !status.ok()) return status;
   if (Status status = SetGrid(image->header, path, *grid, image->at); !status.ok()) return status;
@@ -301,7 +302,7 @@ VolumeFormat VtkImage() {
 VolumeFormat VtkRectilinear() {
   return {.name = kRectilinearName,
           .endings = {".vtr"},
-          .options = {"time", "channel", "array"},
+          .options = {"time", "channel", "array", "resample"},
           .locate = Locate<kRectilinear>,
           .read = Read<kRectilinear>};
 }

@@ -157,6 +157,8 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
   for (std::size_t i = 0; i < 3; ++i) {
     geometry.size[int(i)] = header.size[placed.turn.from[i]];
     if (placed.turn.flipped[i]) origin = origin - double(geometry.size[int(i)] - 1) * steps[i];
+    const UnevenAxis& uneven = header.uneven[std::size_t(placed.turn.from[i])];
+    placed.uneven[i] = placed.turn.flipped[i] ? uneven.Reversed() : uneven;
   }
 
   // The straight axes by Gram and Schmidt: x stays, y stays in the plane of x and y. So slices stay slices.

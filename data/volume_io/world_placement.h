@@ -30,6 +30,7 @@ struct WorldPlacement {
   AxisTurn turn;
   std::optional<Slant> slant;  // the slant of the turned voxels
   VolumeGeometry geometry;     // the geometry of the turned and straightened voxels
+  UnevenAxes uneven = {};      // SourceInfo::uneven, of the turned voxels
 };
 
 // Steps whose angles differ from right ones by less than this (radians) are at right angles: files round their numbers.

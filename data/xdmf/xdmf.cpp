@@ -230,6 +230,10 @@ class GridOpener {
       const auto off = [&](Axis axis, const char* why) {
         return Status::InvalidArgument(fmt::format("{}: {} along {}", grid.named, why, Letter(axis)));
       };
+      for (const Axis axis : kAxes) {
+        if (!piece.uneven[std::size_t(Number(axis))].centres.empty())
+          return off(axis, "is one of several pieces, and its coordinates are not even");
+      }
       if (piece.components != header.components) {
         return Status::InvalidArgument(fmt::format("{}: has {} components, must have {} as {} has", grid.named, piece.components,
                                                    header.components, grids.front().named));
@@ -293,6 +297,8 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 
 }  // namespace
 
-VolumeFormat Xdmf() { return {.name = "XDMF", .endings = {".xmf", ".xdmf"}, .options = {"time", "channel", "array"}, .open = Open}; }
+VolumeFormat Xdmf() {
+  return {.name = "XDMF", .endings = {".xmf", ".xdmf"}, .options = {"time", "channel", "array", "resample"}, .open = Open};
+}
 
 }  // namespace slabstream

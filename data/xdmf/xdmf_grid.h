@@ -24,7 +24,8 @@ struct XdmfGrid {
 // Of a grid of GridType Uniform. Sources of what numbers mean: https://www.xdmf.org/index.php/XDMF_Model_and_Format; that origin and
 // spacing stand in the order z, y, x, as dimensions do: VTK's vtkXdmfHeavyData.cxx and VisIt's manual (Data into VisIt, Xdmf). `like`: the
 // grid whose attribute is taken, if any; else the options choose one (ChooseArray). InvalidArgument: another topology or geometry,
-// coordinates that are not even, no such attribute; errors of ParseXdmfItem and XdmfArrays::ReadNumbers. Messages name grid or item. Waits.
+// coordinates as of GridOfCoordinates, no such attribute; errors of ParseXdmfItem and XdmfArrays::ReadNumbers. Messages name grid or item.
+// Waits.
 Result<XdmfGrid> ReadXdmfGrid(XdmfDocument& document, const XdmfElement& element, const ReadOptions& options, XdmfArrays& arrays,
                               const XdmfGrid* like = nullptr);
 

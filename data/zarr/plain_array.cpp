@@ -102,7 +102,7 @@ Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& conte
 // Spacing, origin, unit and times by coordinates that lie beside the array.
 Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
                           const std::vector<AxisKind>& kinds, const ChosenAxes& choice, const std::vector<std::uint64_t>& sizes,
-                          Pyramid& pyramid) {
+                          const ReadOptions& options, Pyramid& pyramid) {
   const std::size_t slash = node.path.rfind('/');
   if (node.path.empty()) return Status::Ok();
   const std::string group = slash == std::string::npos ? "" : node.path.substr(0, slash);
@@ -123,16 +123,23 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
     const Result<std::optional<AxisCoordinates>> coordinates = ReadCoordinates(context, group, name, sizes[std::size_t(number)]);
     if (!coordinates.ok()) return coordinates.status();
     if (!*coordinates) continue;
-    const std::optional<EvenSteps> even = EvenStepsOf((*coordinates)->values);
-    if (!even) {
-      if ((*coordinates)->values.size() > 1)
+    const std::vector<double>& values = (*coordinates)->values;
+    if (values.size() < 2) continue;
+    const bool falls = values.front() > values.back();
+    if (!EvenStepsOf(values)) {
+      if (!options.resample) {
         pyramid.info.notes.push_back(Printable(
-            fmt::format("the coordinates of {} are not evenly spaced ({}), so its spacing is 1", name, WhyUneven((*coordinates)->values))));
-      continue;
+            fmt::format("the coordinates of {} are not evenly spaced ({}), so its spacing is 1, unless --resample even resamples it", name,
+                        WhyUneven(values))));
+        continue;
+      }
+      const Result<UnevenAxis> uneven = UnevenAxisOf(Printable(node.path + ": coordinates " + name), values, ValuesAt::kPoints);
+      if (!uneven.ok()) return uneven.status();
+      pyramid.info.uneven[std::size_t(axis)] = falls ? uneven->Reversed() : *uneven;
     }
-    level.mirrored[std::size_t(axis)] = even->step < 0;
-    level.spacing[axis] = std::abs(even->step);
-    level.origin[axis] = std::min((*coordinates)->values.front(), (*coordinates)->values.back());
+    level.mirrored[std::size_t(axis)] = falls;
+    level.spacing[axis] = std::abs(values.back() - values.front()) / double(values.size() - 1);
+    level.origin[axis] = std::min(values.front(), values.back());
     placed.push_back(name);
     units.push_back((*coordinates)->unit);
   }
@@ -226,7 +233,7 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
     pyramid.levels.back().spacing = *options.spacing;
     return pyramid;
   }
-  if (Status status = PlaceByCoordinates(context, node, *names, *kinds, *choice, sizes, pyramid); !status.ok()) return status;
+  if (Status status = PlaceByCoordinates(context, node, *names, *kinds, *choice, sizes, options, pyramid); !status.ok()) return status;
   return pyramid;
 }
 

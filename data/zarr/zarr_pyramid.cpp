@@ -222,7 +222,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& opened, const ReadOpti
 VolumeFormat Zarr() {
   return {.name = "Zarr",
           .recognises = zarr::Recognises,
-          .options = {"time", "channel", "spacing", "array", "follow-links"},
+          .options = {"time", "channel", "spacing", "array", "resample", "follow-links"},
           .markers = {zarr::kNodeObjects.begin(), zarr::kNodeObjects.end()},
           .open = OpenInStore<zarr::OpenPyramid>};
 }

@@ -363,7 +363,7 @@ TEST_F(Hdf5ImageTest, LengthsOfSeveralUnitsAreThoseOfX) {
   EXPECT_DOUBLE_EQ(geometry.spacing.z, 2000);
 }
 
-TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOne) {
+TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOneOrAreResampled) {
   const std::vector<std::int16_t> samples = Ascending(3 * 2 * 2);
   {
     Hdf5Writer writer(path_);
@@ -379,6 +379,14 @@ TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOne) {
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr(why));
   EXPECT_THAT(source->info().notes, Contains(HasSubstr(why)));
   EXPECT_EQ(source->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
+
+  // The axis runs down.
+  const auto even = Open({.resample = 0});
+  EXPECT_EQ(even->info().finest().geometry.spacing, (Vec3{5, 4, 1350.0 / 4}));
+  EXPECT_THAT(even->info().notes, Contains(HasSubstr("the 3 voxels along z, 400 to 500 apart, are resampled linearly to 4 even ones")));
+  ExpectValuesOfPlaces(*even, {0, 0, 100}, {5, 4, 1000}, [](const Vec3& at) {
+    return at.x / 5 + at.y / 2 + 4 * (at.z < 500 ? 2 - (at.z - 100) / 400 : 1 - (at.z - 500) / 500);
+  });
 }
 
 // Latitudes of a Gaussian grid: zeros of a Legendre polynomial, a little off even ones.

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <future>
 #include <memory>
 #include <span>
@@ -63,6 +65,23 @@ inline AlignedVector<std::byte> ReadBoxApart(VolumeSource& source, int level, co
     }
   }
   return bytes;
+}
+
+// Whether a source of float32 has value(place) at all its voxels, whose places are held between `low` and `high`.
+template <class F>
+void ExpectValuesOfPlaces(VolumeSource& source, const Vec3& low, const Vec3& high, F value) {
+  const VolumeDescription& description = source.info().finest();
+  const Index3& size = description.geometry.size;
+  ASSERT_EQ(description.type, ScalarType::kFloat32);
+  const AlignedVector<std::byte> bytes = ReadBox(source, 0, description.geometry.bounds());
+  for (std::size_t i = 0; i < CountIn(size); ++i) {
+    const auto n = std::int32_t(i);
+    Vec3 place = description.geometry.ToWorld(ToVec3(Index3{n % size.x, n / size.x % size.y, n / size.x / size.y}));
+    for (const Axis axis : kAxes) place[axis] = std::clamp(place[axis], low[axis], high[axis]);
+    const double wanted = value(place);
+    const double read = description.mapping.FromStored(double(reinterpret_cast<const float*>(bytes.data())[i]));
+    ASSERT_NEAR(read, wanted, 1e-5 * (1 + std::abs(wanted))) << place.x << ' ' << place.y << ' ' << place.z;
+  }
 }
 
 // The samples of a whole level.

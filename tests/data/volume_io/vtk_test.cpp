@@ -205,6 +205,22 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
   EXPECT_EQ(orientation.origin, (Vec3{1, -3, 8}));
   EXPECT_THAT(WhyNot("v.vtr", file({1, 2, 4}, {0, 1}, {0, 1})),
               HasSubstr("coordinates along x are not even: number 1 is 2, must be within 0.01 of a mean spacing of 2.5"));
+  // From 0.5 to 5, or, run backwards, from -5 to -0.5; the points of cells: from 1 to 4.
+  const ReadOptions resampled = {.resample = 9};
+  const Values line = {0, 0.25, 0.75, 1.125, 1.375, 1.625, 1.875, 2, 2};
+  EXPECT_EQ(ValuesOf("v.vtr", file({1, 2, 4}, {0}, {0}), resampled), line);
+  EXPECT_EQ(ValuesOf("v.vtr", file({-1, -2, -4}, {0}, {0}), resampled), Values(line.rbegin(), line.rend()));
+  EXPECT_EQ(GeometryOf("v.vtr", file({-1, -2, -4}, {0}, {0}), resampled).orientation.origin.x, -4.75);
+  const auto of_cells = [](const Values& x) {
+    const std::string coordinates = "<Coordinates>\n" + Array("", x) + Array("", {0}) + Array("", {0}) + "</Coordinates>\n";
+    return XmlFile("RectilinearGrid", "WholeExtent=\"0 3 0 0 0 0\"", Piece("0 3 0 0 0 0", Cells(Array("c", {0, 1, 2})) + coordinates));
+  };
+  for (const Values& x : {Values{1, 2, 4, 10}, Values{10, 4, 2, 1}}) {
+    const VolumeGeometry geometry = GeometryOf("v.vtr", of_cells(x), {.resample = 6});
+    EXPECT_DOUBLE_EQ(geometry.ToWorld({-0.5, 0, 0}).x, 1);
+    EXPECT_DOUBLE_EQ(geometry.ToWorld({5.5, 0, 0}).x, 10);
+  }
+  EXPECT_THAT(WhyNot("v.vtr", file({0, 1, 1}, {0, 1}, {0, 1}), resampled), HasSubstr("along x: number 2 is 1, must be finite and above"));
   EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, 0}, {0, 1})), HasSubstr("coordinates along y are not even"));
   EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, NAN}, {0, 1})), HasSubstr("coordinates along y are not even: number 0"));
   EXPECT_THAT(WhyNot("v.vtr", Replaced(even, "<Coordinates>", "<Places>").replace(even.find("</Coordinates>") - 5, 14, "</Places>")),
@@ -219,15 +235,19 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
       AsText(Counted(24));
   EXPECT_EQ(ValuesOf("v.vtk", legacy), Counted(24));
   EXPECT_EQ(GeometryOf("v.vtk", legacy).spacing, (Vec3{1, 2, 3}));
+  const std::string uneven = Replaced(legacy, "0 2 4", "0 2 6");
+  EXPECT_THAT(WhyNot("v.vtk", uneven), HasSubstr("coordinates along y are not even"));
+  EXPECT_EQ(GeometryOf("v.vtk", uneven, {.resample = 0}).size, (Index3{4, 5, 2}));
+  EXPECT_THAT(WhyNot("v.vtk", uneven, {.resample = 0, .labels = true}), HasSubstr("labels, which are not resampled"));
   EXPECT_THAT(WhyNot("v.vtk", Replaced(legacy, "Z_COORDINATES 2 int\n5 8", "Z_COORDINATES 3 int\n5 8 11")),
               HasSubstr("Z_COORDINATES has 3 coordinates, DIMENSIONS 2"));
   EXPECT_THAT(WhyNot("v.vtk", Replaced(legacy, "Z_COORDINATES 2 int\n5 8", "")), HasSubstr("has no Z_COORDINATES"));
 }
 
-TEST(EvenGridTest, AllowsForTheRoundingOfFloats) {
+TEST(GridOfCoordinatesTest, AllowsForTheRoundingOfFloats) {
   Values floats;
   for (int i = 0; i < 100; ++i) floats.push_back(float(1000 + 0.001 * i));
-  const Result<PointGrid> grid = EvenGrid("f", {floats, {0, 1}, {0, 1}});
+  const Result<PointGrid> grid = GridOfCoordinates("f", {floats, {0, 1}, {0, 1}}, {});
   ASSERT_TRUE(grid.ok()) << grid.status().message();
   EXPECT_NEAR(grid->steps[0].x, 0.001, 1e-6);
 }

@@ -191,7 +191,15 @@ TEST_F(XdmfTest, EvenCoordinatesMakeAGrid) {
     }
   }
   EXPECT_EQ(Read(*source), expected);
-  ExpectRefused(Grid(mesh(HdfItem("5", "a.h5:/uneven")) + attribute), "its coordinates along z are not even: number 1 is 1");
+  const std::string uneven = Grid(mesh(HdfItem("5", "a.h5:/uneven")) + attribute);
+  ExpectRefused(uneven, "its coordinates along z are not even: number 1 is 1");
+  ExpectValuesOfPlaces(*Opened(Open(Write(uneven), {.resample = 0})), {1, 1.5, 0}, {4, 9, 5}, [](const Vec3& at) {
+    return (at.x - 1) / 0.5 + 10 * (9 - at.y) / 1.5 + 100 * (at.z < 3 ? at.z : 3 + (at.z - 3) / 2);
+  });
+  ExpectRefused(Collection("Spatial", uneven + uneven), "is one of several pieces, and its coordinates are not even along z",
+                {.resample = 0});
+  ExpectRefused(Grid(mesh(Item("5", "0 1 3 3 4")) + attribute),
+                "its coordinates along z: number 3 is 3, must be finite and above number 2, which is 3", {.resample = 0});
   ExpectRefused(Grid(mesh(Item("4", "1 2 3 4")) + attribute), "has 7, 6, 4 coordinates along x, y and z, but Dimensions is '5 6 7'");
   // As the library of XDMF 3 writes it.
   std::string turned = mesh(Item("5", "-3 -1 1 3 5"));

@@ -74,6 +74,16 @@ TEST(PlainArrayTest, EvenCoordinatesGiveSpacingOriginAndUnit) {
     EXPECT_EQ((*SamplesOf<std::uint16_t>(*other))[0], (*SamplesOf<std::uint16_t>(*source))[12]) << "the voxel with the lowest coordinates";
     EXPECT_EQ(other->info().levels[0].description.geometry.orientation.unit, LengthUnit::kMicrometre);
     EXPECT_THAT(other->info().notes, Contains(HasSubstr("coordinates of y are not evenly spaced")));
+
+    WriteCoordinates(folder.path(), version, "y", {3, 1, 0}, "um");
+    const auto even = Opened(Open(folder.path(), {.resample = 9}));
+    EXPECT_THAT(even->info().notes,
+                Contains(HasSubstr("the 3 voxels along y, 1 to 2 apart, are resampled linearly to 9 even ones 0.5 apart")));
+    ExpectValuesOfPlaces(*even, {0.5, 0, 90}, {1.25, 3, 100}, [](const Vec3& at) {
+      return (at.x - 0.5) / 0.25 + 4 * (at.y < 1 ? 2 - at.y : (3 - at.y) / 2) + 12 * (100 - at.z) / 10;
+    });
+    WriteCoordinates(folder.path(), version, "y", {3, 1, 1}, "um");
+    ExpectRefusal(Open(folder.path(), {.resample = 9}), "coordinates y: number 2 is 1, must be finite and below number 1, which is 1");
   }
 }
 
