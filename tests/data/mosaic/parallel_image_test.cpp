@@ -9,6 +9,7 @@
 
 #include "data/open/open_source.h"
 #include "data/open/read_volume.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/whole_file.h"
@@ -17,7 +18,6 @@ namespace slabstream {
 namespace {
 
 using testing::ContainsRegex;
-using testing::HasSubstr;
 
 constexpr Index3 kPoints = {14, 9, 11};
 constexpr Index3 kFirst = {-3, 2, 100};  // the extent of which begins there
@@ -54,7 +54,7 @@ class ParallelImage : public testing::Test {
       std::string coordinates;
       for (int axis = 0; axis < 3 && letters == "vtr"; ++axis) {
         coordinates += "<DataArray type=\"Float64\" format=\"ascii\">";
-        for (std::int32_t at = boxes[i].begin[axis]; at < boxes[i].end[axis]; ++at) coordinates += fmt::format("{} ", 5 + 0.5 * at);
+        for (std::int32_t at = boxes[i].begin[axis]; at < boxes[i].end[axis]; ++at) coordinates += fmt::format("{} ", CoordinateOf(at));
         coordinates += "</DataArray>";
       }
       const auto array = [](const std::string& array_name, const std::string& text) {
@@ -92,6 +92,9 @@ class ParallelImage : public testing::Test {
     return read.volume->description.mapping.FromStored(double(read.volume->block.samples<std::uint16_t>()[read.volume->block.Offset(v)]));
   }
 
+  double CoordinateOf(int point) const { return 5 + 0.5 * point + bend_ * point * point; }
+
+  double bend_ = 0;
   const TemporaryDirectory directory_;
 };
 
@@ -116,6 +119,20 @@ TEST_F(ParallelImage, PiecesAreOneVolumeOfPointsOrCells) {
       }
     }
   }
+}
+
+TEST_F(ParallelImage, UnevenCoordinatesOfPiecesAreResampled) {
+  bend_ = 0.02;
+  const std::string path = Write("RectilinearGrid", Blocks());
+  EXPECT_THAT(WhyNot(path), HasSubstr("whole.pvtr: its coordinates along x are not even"));
+  const auto place = [&](double coordinate) {
+    int point = 0;
+    while (CoordinateOf(point + 1) < coordinate) ++point;
+    return point + (coordinate - CoordinateOf(point)) / (CoordinateOf(point + 1) - CoordinateOf(point));
+  };
+  const auto source = Opened(OpenSource(path, {.array = "p", .resample = 0}, TestReadContext()));
+  ExpectValuesOfPlaces(*source, {5, 5, 5}, {CoordinateOf(kPoints.x - 1), CoordinateOf(kPoints.y - 1), CoordinateOf(kPoints.z - 1)},
+                       [&](const Vec3& at) { return place(at.x) + 20 * place(at.y) + 400 * place(at.z); });
 }
 
 // x of the file runs along -y of the world, and y along x.
