@@ -55,18 +55,20 @@ class Service:
     """A coordinator on the first host, a client on the second, a worker on each of the others."""
 
     def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path,
-                 worker_options: list[str] = ()):
+                 memory: str = ""):
+        """`memory`: of the coordinator and of each worker, as --memory takes it; "": no limit."""
+        limit = ["--memory", memory] if memory else []
         self._programs, self._folder = programs, folder
         self._coordinator, self._client, *self._workers = hosts
         self._keys = folder / "keys"
         self._processes: dict[str, subprocess.Popen] = {}
         data = [text for name, path in data.items() for text in ("--data", f"{name}={path}")]
         listen = ["--listen", f"tcp://{self._coordinator.address}:7420", "--keys", str(self._keys)]
-        self._start(self._coordinator, "coordinator", ["slabstream-coordinator", *listen, *data])
+        self._start(self._coordinator, "coordinator", ["slabstream-coordinator", *listen, *limit, *data])
         self._wait("the coordinator listens", lambda: "ready" in (folder / "coordinator.log").read_text(encoding="utf-8"))
         for host in self._workers:
             # Images are not packed: `auto` would compare a dilated link with the speed of a codec that is not dilated.
-            options = ["--service", str(self._keys / "worker.json"), "--threads", "1", "--compress=off", *worker_options]
+            options = ["--service", str(self._keys / "worker.json"), "--threads", "1", "--compress=off", *limit]
             self._start(host, host.hostname, ["slabstream-worker", *options])
         self._wait("all workers are registered", lambda: self._registered() == len(self._workers))
 
