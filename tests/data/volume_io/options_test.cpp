@@ -159,7 +159,7 @@ TEST(SourceText, SaysWhatIsWrong) {
       {"v?offset=-1", "offset '-1' must be a whole number of bytes"},
       {"v?dataset=", "dataset '' must be the path of a dataset"},
       {"v?follow-links=perhaps", "follow-links 'perhaps' must be yes or no"},
-      {"v?channel=red", "channel 'red' must be luminance or a whole number"},
+      {"v?channel=red", "channel 'red' must be luminance, magnitude or a whole number"},
   };
   for (const auto& [text, why] : cases) {
     const Result<SourceText> source = ParseSourceText(text);
