@@ -19,11 +19,28 @@
 namespace slabstream {
 namespace {
 
+// Bytes of a file in their order. If some were not taken, no others are given.
+class FileBytes {
+ public:
+  explicit FileBytes(const WriteBytes& write) : write_(write) {}
+
+  bool ok() const { return ok_; }
+  void Add(std::span<const std::byte> bytes) {
+    ok_ = ok_ && write_(offset_, bytes);
+    offset_ += std::int64_t(bytes.size());
+  }
+
+ private:
+  const WriteBytes& write_;
+  std::int64_t offset_ = 0;
+  bool ok_ = true;
+};
+
 // ---- PNG
 
 class PngWriter {
  public:
-  explicit PngWriter(const WriteBytes& write) : write_(write) {
+  explicit PngWriter(const WriteBytes& write) : bytes_(write) {
     png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, Fail, nullptr);
     info = png == nullptr ? nullptr : png_create_info_struct(png);
     if (info == nullptr) throw std::bad_alloc();
@@ -33,7 +50,7 @@ class PngWriter {
   PngWriter(const PngWriter&) = delete;
   PngWriter& operator=(const PngWriter&) = delete;
 
-  bool ok() const { return ok_; }
+  bool ok() const { return bytes_.ok(); }
 
   png_structp png = nullptr;
   png_infop info = nullptr;
@@ -42,14 +59,10 @@ class PngWriter {
   // What we ask of libpng is right, and Write reports no errors to it: only memory can be lacking.
   [[noreturn]] static void Fail(png_structp, png_const_charp) { throw std::bad_alloc(); }
   static void Write(png_structp png, png_bytep data, std::size_t size) {
-    auto& writer = *static_cast<PngWriter*>(png_get_io_ptr(png));
-    writer.ok_ = writer.ok_ && writer.write_(writer.offset_, {reinterpret_cast<const std::byte*>(data), size});
-    writer.offset_ += std::int64_t(size);
+    static_cast<PngWriter*>(png_get_io_ptr(png))->bytes_.Add({reinterpret_cast<const std::byte*>(data), size});
   }
 
-  const WriteBytes& write_;
-  std::int64_t offset_ = 0;
-  bool ok_ = true;
+  FileBytes bytes_;
 };
 
 void AddText(PngWriter& writer, const char* name, std::string value) {
@@ -92,14 +105,14 @@ std::optional<std::string> EncodePng(const EncodedFormat& format, const PictureR
 
 // ---- JPEG
 
-// libjpeg ends the process on errors unless told otherwise. Write reports none to it: only memory can be lacking.
+// libjpeg ends the process on errors unless told otherwise. JpegWriter tells it of none, so the only one that is left is a lack of memory.
 [[noreturn]] void OutOfMemory(j_common_ptr) { throw std::bad_alloc(); }
 
 // A destination of our own: that of jpeg_mem_dest knows the memory that it took only once the picture is complete, and pictures are given
 // up halfway.
 class JpegWriter {
  public:
-  explicit JpegWriter(const WriteBytes& write) : write_(write) {
+  explicit JpegWriter(const WriteBytes& write) : bytes_(write) {
     info.err = jpeg_std_error(&errors_);
     errors_.error_exit = OutOfMemory;
     jpeg_create_compress(&info);
@@ -116,7 +129,7 @@ class JpegWriter {
   JpegWriter(const JpegWriter&) = delete;
   JpegWriter& operator=(const JpegWriter&) = delete;
 
-  bool ok() const { return ok_; }
+  bool ok() const { return bytes_.ok(); }
 
   jpeg_compress_struct info{};
 
@@ -129,17 +142,14 @@ class JpegWriter {
     destination_.free_in_buffer = buffer_.size();
   }
   void Write(std::size_t size) {
-    ok_ = ok_ && write_(offset_, std::as_bytes(std::span(buffer_).first(size)));
-    offset_ += std::int64_t(size);
+    bytes_.Add(std::as_bytes(std::span(buffer_).first(size)));
     Reuse();
   }
 
-  const WriteBytes& write_;
+  FileBytes bytes_;
   jpeg_error_mgr errors_{};
   jpeg_destination_mgr destination_{};
   std::vector<JOCTET> buffer_ = std::vector<JOCTET>(kBufferBytes);
-  std::int64_t offset_ = 0;
-  bool ok_ = true;
 };
 
 // In whole pixels an inch; the other block (Exif) states fractions, too.

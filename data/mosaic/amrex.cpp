@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <filesystem>
 #include <limits>
-#include <list>
 #include <map>
 #include <mutex>
 #include <numeric>
@@ -22,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/lru_map.h"
 #include "common/base/printable.h"
 #include "common/files/file_descriptor.h"
 #include "common/files/files.h"
@@ -291,15 +291,11 @@ class PatchReader : public PartReader {
   Result<std::shared_ptr<const DataFile>> File(std::uint32_t number) {
     constexpr std::size_t kMostOpen = 64;
     const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(open_, number, &std::pair<std::uint32_t, std::shared_ptr<const DataFile>>::first);
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
-      return open_.front().second;
-    }
+    if (const auto* const found = open_.Find(number)) return *found;
     Result<std::shared_ptr<const DataFile>> file = OpenData(data_[number]);
     if (!file.ok()) return file;
-    if (open_.size() == kMostOpen) open_.pop_back();
-    open_.emplace_front(number, *file);
+    open_.Put(number, *file);
+    open_.DropBeyond(kMostOpen);
     return file;
   }
 
@@ -308,8 +304,8 @@ class PatchReader : public PartReader {
   const int variable_;
   const SampleType type_;
   std::atomic<std::uint64_t> read_bytes_ = 0;
-  std::mutex mutex_;                                                           // guards what follows
-  std::list<std::pair<std::uint32_t, std::shared_ptr<const DataFile>>> open_;  // by number, the last one that was wanted first
+  std::mutex mutex_;                                             // guards what follows
+  LruMap<std::uint32_t, std::shared_ptr<const DataFile>> open_;  // by number
 };
 
 Result<int> ChosenVariable(const std::string& path, const Plotfile& plot, const ReadOptions& options, std::vector<std::string>& notes) {

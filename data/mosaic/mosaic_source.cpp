@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <exception>
-#include <list>
 #include <mutex>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/lru_map.h"
 #include "common/base/printable.h"
 #include "common/memory/pooled_vector.h"
 #include "common/volume/box_assembly.h"
@@ -42,7 +42,7 @@ class SourceParts : public PartReader {
   VolumeSource::Counts counts() override {
     const std::lock_guard lock(mutex_);
     VolumeSource::Counts all = closed_;
-    for (const Open& open : open_) Add(open.source->counts(), all);
+    for (const auto& open : open_.entries()) all += open.value->counts();
     return all;
   }
 
@@ -50,20 +50,13 @@ class SourceParts : public PartReader {
   Result<std::shared_ptr<VolumeSource>> Source(int level, std::size_t i) {
     constexpr std::size_t kMostOpen = 64;
     const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find_if(open_, [&](const Open& open) { return open.level == level && open.part == i; });
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
-      return open_.front().source;
-    }
+    if (const auto* const found = open_.Find({level, i})) return *found;
     const MosaicPart& part = levels_[std::size_t(level)][i];
     Result<std::shared_ptr<VolumeSource>> source = part.open();
     if (!source.ok()) return source;
     if (Status status = CheckPart(part, (*source)->info()); !status.ok()) return status;
-    if (open_.size() == kMostOpen) {
-      Add(open_.back().source->counts(), closed_);
-      open_.pop_back();
-    }
-    open_.push_front({level, i, *source});
+    open_.Put({level, i}, *source);
+    for (const auto& closed : open_.DropBeyond(kMostOpen)) closed_ += closed.value->counts();
     return source;
   }
 
@@ -78,17 +71,6 @@ class SourceParts : public PartReader {
   }
 
  private:
-  struct Open {
-    int level = 0;
-    std::size_t part = 0;
-    std::shared_ptr<VolumeSource> source;
-  };
-
-  static void Add(const VolumeSource::Counts& counts, VolumeSource::Counts& all) {
-    all.stored_bytes += counts.stored_bytes;
-    all.chunks += counts.chunks;
-  }
-
   Status CheckPart(const MosaicPart& part, const SourceInfo& info) const {
     const auto& [geometry, type, mapping] = info.finest();
     const VolumeDescription& wanted = info_.finest();
@@ -109,9 +91,9 @@ class SourceParts : public PartReader {
   const std::string name_;
   const SourceInfo info_;
   const std::vector<std::vector<MosaicPart>> levels_;
-  std::mutex mutex_;             // guards what follows
-  std::list<Open> open_;         // the last one that was wanted first
-  VolumeSource::Counts closed_;  // of those that are not open any more
+  std::mutex mutex_;                                                         // guards what follows
+  LruMap<std::pair<int, std::size_t>, std::shared_ptr<VolumeSource>> open_;  // by level and number
+  VolumeSource::Counts closed_;                                              // of those that are not open any more
 };
 
 // What lies in the parts, and what is interpolated. Lives as long as the mosaic or a read of it.

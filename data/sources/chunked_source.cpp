@@ -355,11 +355,7 @@ class ChunkedSource : public VolumeSource {
 
   Counts counts() const override {
     Counts all;
-    for (const std::shared_ptr<Level>& level : levels_) {
-      const Counts counts = level->counts();
-      all.stored_bytes += counts.stored_bytes;
-      all.chunks += counts.chunks;
-    }
+    for (const std::shared_ptr<Level>& level : levels_) all += level->counts();
     return all;
   }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/memory/aligned_buffer.h"
+#include "common/memory/pooled_vector.h"
 #include "data/sources/box_reading.h"
 
 namespace slabstream {
@@ -42,18 +42,14 @@ class MagnitudeSource final : public VolumeSource {
   }
 
   Counts counts() const override {
-    Counts counts;
-    for (const auto& component : components_) {
-      const Counts its = component->counts();
-      counts.stored_bytes += its.stored_bytes;
-      counts.chunks += its.chunks;
-    }
-    return counts;
+    Counts all;
+    for (const auto& component : components_) all += component->counts();
+    return all;
   }
 
   using VolumeSource::Read;
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
-    const auto samples = std::make_shared<std::vector<AlignedVector<std::byte>>>();
+    const auto samples = std::make_shared<std::vector<UnwrittenVector<std::byte>>>();
     const auto combine = [this, samples, level, box, out, done = std::move(done)](Status read) {
       std::vector<Component> of;
       for (std::size_t i = 0; i < samples->size(); ++i) of.push_back({(*samples)[i].data(), DescriptionOf(i, level)});

@@ -80,8 +80,8 @@ struct SourceInfo {
   std::shared_ptr<const FileStamp> growth = {};
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
-  // Of a rectilinear grid: where its voxels lie along x, y and z of the level, in lengths from the world's origin; those that are there
-  // rise. The level's spacing is then that of no two voxels, so whoever opens such a source makes it even (even_source.h).
+  // Of a rectilinear grid: its coordinates along each uneven axis of the world, rising. The level's spacing is then their mean distance,
+  // so whoever opens such a source makes it even (even_source.h).
   UnevenAxes uneven = {};
   // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).
   std::optional<SliceOrder> slices = {};
@@ -154,6 +154,12 @@ class VolumeSource {
   // Since it was opened: bytes that were read as they are stored, and chunks that were decoded.
   struct Counts {
     std::uint64_t stored_bytes = 0, chunks = 0;
+
+    Counts& operator+=(const Counts& other) {
+      stored_bytes += other.stored_bytes;
+      chunks += other.chunks;
+      return *this;
+    }
   };
   virtual Counts counts() const = 0;
   // The part of counts().stored_bytes that no call before has returned.
