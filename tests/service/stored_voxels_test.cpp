@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -84,7 +85,11 @@ TEST_F(StoredVoxelsTest, OtherTimesBehindAnAddressAreReadAtOnce) {
   Time now = Time{} + std::chrono::hours(1);
   show(0);
   EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now)));
-  const std::size_t requests = server.requests().size();
+  const auto chunks = [&] {
+    return std::ranges::count_if(server.requests(), [](const ServerRequest& each) { return NamesChunk(each.target); });
+  };
+  EXPECT_EQ(chunks(), 1);
+  const auto opened = server.requests().size();
   for (const int time : {7, 19, 3}) {
     show(time);
     now += std::chrono::seconds(1);
@@ -95,7 +100,9 @@ TEST_F(StoredVoxelsTest, OtherTimesBehindAnAddressAreReadAtOnce) {
     ASSERT_TRUE(std::holds_alternative<ChunkStored>(event.get()));
     EXPECT_EQ(*box_->RoomFor(kPadded.box)->first, std::byte(10 + time));
   }
-  EXPECT_EQ(server.requests().size(), requests + 3) << "a chunk each";
+  EXPECT_EQ(chunks(), 1 + 3) << "a chunk each";
+  // Of those that were on their way, no more than an opening makes.
+  EXPECT_LT(server.requests().size(), 2 * opened);
 }
 
 }  // namespace

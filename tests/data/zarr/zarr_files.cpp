@@ -207,4 +207,9 @@ void WriteZarrArray(const std::string& folder, const ZarrSpec& spec, const Eleme
   });
 }
 
+bool NamesChunk(const std::string& key) {
+  const std::string name = key.substr(key.rfind('/') + 1);
+  return !name.empty() && name.find_first_not_of("0123456789.") == std::string::npos;
+}
+
 }  // namespace slabstream

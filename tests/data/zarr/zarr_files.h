@@ -53,4 +53,8 @@ void WriteJson(const std::string& path, const Json& json);
 // A group; of version 2 `attributes` are .zattrs.
 void WriteZarrGroup(const std::string& folder, int version, const Json& attributes = nullptr);
 
+// Whether a key or an address is that of a chunk. Metadata are asked for all at a time and the first that is there decides, so a server may
+// get requests for the others after a source is open.
+bool NamesChunk(const std::string& key);
+
 }  // namespace slabstream
