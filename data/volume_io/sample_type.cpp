@@ -15,8 +15,8 @@ namespace slabstream {
 namespace {
 
 // In the order of SampleType.
-constexpr std::array<std::string_view, 11> kNames = {"int8",  "uint8",  "int16",   "uint16",  "int32",  "uint32",
-                                                     "int64", "uint64", "float32", "float64", "float16"};
+constexpr std::array<std::string_view, 11> kTypeNames = {"int8",  "uint8",  "int16",   "uint16",  "int32",  "uint32",
+                                                         "int64", "uint64", "float32", "float64", "float16"};
 constexpr std::array<std::size_t, 11> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8, 2};
 
 template <class T>
@@ -100,13 +100,13 @@ KeptSamples Widen(AlignedVector<std::byte> bytes) {
 
 }  // namespace
 
-std::string_view ToString(SampleType type) { return kNames[std::size_t(type)]; }
-std::string SampleTypeNames() { return fmt::format("{}", fmt::join(kNames, ", ")); }
+std::string_view ToString(SampleType type) { return kTypeNames[std::size_t(type)]; }
+std::string SampleTypeNames() { return fmt::format("{}", fmt::join(kTypeNames, ", ")); }
 std::size_t BytesPerSample(SampleType type) { return kBytes[std::size_t(type)]; }
 
 std::optional<SampleType> SampleTypeNamed(std::string_view name) {
-  const auto found = std::ranges::find(kNames, name);
-  return found == kNames.end() ? std::nullopt : std::optional(SampleType(found - kNames.begin()));
+  const auto found = std::ranges::find(kTypeNames, name);
+  return found == kTypeNames.end() ? std::nullopt : std::optional(SampleType(found - kTypeNames.begin()));
 }
 
 std::string ValuesOf(SampleType type) {

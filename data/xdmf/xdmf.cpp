@@ -17,8 +17,11 @@
 #include "data/sources/chunked_source.h"
 #include "data/sources/part_source.h"
 #include "data/volume_io/chosen_channel.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/grid_volume.h"
 #include "data/volume_io/stated_field.h"
 #include "data/xdmf/xdmf_grid.h"
+#include "data/xdmf/xdmf_mesh.h"
 
 namespace slabstream {
 
@@ -73,6 +76,12 @@ Result<GridAtTime> FindGrid(XdmfDocument& document, const ReadOptions& options) 
   for (const XdmfElement* domain : XdmfDocument::Children(document.root(), "Domain")) {
     const std::vector<const XdmfElement*> more = XdmfDocument::Children(*domain, "Grid");
     grids.insert(grids.end(), more.begin(), more.end());
+  }
+  // Finite element programs put a grid before those of the times whose topology they share.
+  if (grids.size() > 1) {
+    std::erase_if(grids, [](const XdmfElement* grid) {
+      return XdmfDocument::Children(*grid, "Attribute").empty() && XdmfDocument::Children(*grid, "Grid").empty();
+    });
   }
   if (grids.size() != 1) {
     return Status::InvalidArgument(
@@ -270,18 +279,37 @@ class GridOpener {
   const std::shared_ptr<XdmfArrays> arrays_;
 };
 
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<XdmfDocument>> document = XdmfDocument::Read(path);
+// The grid of a file that the options choose.
+struct ChosenGrid {
+  std::shared_ptr<XdmfDocument> document;
+  GridAtTime at_time;
+  std::vector<const XdmfElement*> pieces;  // at least one
+  bool is_mesh = false;                    // its pieces have cells, not straight axes
+};
+Result<ChosenGrid> ChooseGrid(const std::string& path, const ReadOptions& options) {
+  Result<std::shared_ptr<XdmfDocument>> document = XdmfDocument::Read(path);
   if (!document.ok()) return document.status();
-  const Result<GridAtTime> found = FindGrid(**document, options);
+  ChosenGrid chosen{.document = *std::move(document), .at_time = {}, .pieces = {}};
+  Result<GridAtTime> found = FindGrid(*chosen.document, options);
   if (!found.ok()) return found.status();
-  std::vector<const XdmfElement*> pieces;
-  if (Status status = AddPieces(**document, *found->grid, 0, pieces); !status.ok()) return status;
+  chosen.at_time = *std::move(found);
+  if (Status status = AddPieces(*chosen.document, *chosen.at_time.grid, 0, chosen.pieces); !status.ok()) return status;
+  const Result<bool> is_mesh = IsXdmfMesh(*chosen.document, *chosen.pieces.front());
+  if (!is_mesh.ok()) return is_mesh.status();
+  chosen.is_mesh = *is_mesh;
+  return chosen;
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  const Result<ChosenGrid> chosen = ChooseGrid(path, options);
+  if (!chosen.ok()) return chosen.status();
+  if (chosen->is_mesh) return std::shared_ptr<VolumeSource>();
+  if (options.lattice) return Status::InvalidArgument(path + ": has straight axes, so it takes no option lattice");
   const auto arrays = std::make_shared<XdmfArrays>(context);
   std::vector<XdmfGrid> grids;
   std::vector<std::string> files;
-  for (const XdmfElement* piece : pieces) {
-    Result<XdmfGrid> grid = ReadXdmfGrid(**document, *piece, options, *arrays, grids.empty() ? nullptr : grids.data());
+  for (const XdmfElement* piece : chosen->pieces) {
+    Result<XdmfGrid> grid = ReadXdmfGrid(*chosen->document, *piece, options, *arrays, grids.empty() ? nullptr : grids.data());
     if (!grid.ok()) return grid.status();
     files.insert(files.end(), grid->files.begin(), grid->files.end());
     grids.push_back(*std::move(grid));
@@ -289,16 +317,34 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
   std::ranges::sort(files);
   files.erase(std::unique(files.begin(), files.end()), files.end());
   RawHeader header = grids.front().header;
-  header.times = found->times;
-  header.number = found->time;
-  const GridOpener opener(*document, options, arrays);
+  header.times = chosen->at_time.times;
+  header.number = chosen->at_time.time;
+  const GridOpener opener(chosen->document, options, arrays);
   return grids.size() == 1 ? opener.Open(grids.front(), header, files) : opener.OpenMosaic(std::move(grids), header, files);
+}
+
+// A grid with cells.
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  const Result<ChosenGrid> chosen = ChooseGrid(path, options);
+  if (!chosen.ok()) return chosen.status();
+  XdmfArrays arrays(std::make_shared<ReadContext>(ReadContext::Limits{}));
+  Result<LoadedMesh> grid = ReadXdmfMesh(*chosen->document, chosen->pieces, MeshOptionsOf(options), arrays);
+  if (!grid.ok()) return grid.status();
+  Result<RawVolume> raw = GridVolume(path, *std::move(grid), options);
+  if (!raw.ok()) return raw;
+  raw->header.times = chosen->at_time.times;
+  raw->header.number = chosen->at_time.time;
+  return raw;
 }
 
 }  // namespace
 
 VolumeFormat Xdmf() {
-  return {.name = "XDMF", .endings = {".xmf", ".xdmf"}, .options = {"time", "channel", "array", "resample"}, .open = Open};
+  return {.name = "XDMF",
+          .endings = {".xmf", ".xdmf"},
+          .options = {"time", "channel", "array", "lattice", "resample"},
+          .open = Open,
+          .read = Read};
 }
 
 }  // namespace slabstream

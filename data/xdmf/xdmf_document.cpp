@@ -20,6 +20,7 @@ constexpr std::size_t kMostParts = std::size_t{1} << 20;  // elements and attrib
 constexpr std::size_t kMostNested = 64;
 constexpr std::uint64_t kMostSteps = std::uint64_t{1} << 26;  // a fraction of a second
 constexpr int kMostReferences = 16;                           // one behind the other
+constexpr std::string_view kInclude = ":include";
 
 // What an XPath says in brackets: a number from 1 on, or an attribute.
 struct Condition {
@@ -115,7 +116,7 @@ Status XdmfDocument::Parse() {
           fmt::format("{}: has more than {} elements and attributes, or elements in more than {} others", path_, kMostParts, kMostNested));
     } else if (open.empty() && tag.name != "Xdmf") {
       wrong = Status::InvalidArgument(fmt::format("{}: its first element is '{}', must be Xdmf", path_, Printable(tag.name)));
-    } else if (tag.name.ends_with(":include")) {
+    } else if (tag.name.ends_with(kInclude) && tag.attributes.contains("href")) {
       wrong = Status::InvalidArgument(path_ + ": includes other files (XInclude), which is not supported");
     }
     if (!wrong.ok()) return false;
@@ -140,9 +141,26 @@ std::vector<const XdmfElement*> XdmfDocument::Children(const XdmfElement& elemen
   return found;
 }
 
-Result<const XdmfElement*> XdmfDocument::Child(const XdmfElement& element, std::string_view name) {
-  const auto found = std::ranges::find_if(element.children, [&](const XdmfElement* child) { return child->name == name; });
-  return found == element.children.end() ? Result<const XdmfElement*>(nullptr) : Resolved(**found);
+Result<const XdmfElement*> XdmfDocument::Needed(const XdmfElement& element, std::string_view name) { return NeededAt(element, name, 0); }
+
+Result<const XdmfElement*> XdmfDocument::NeededAt(const XdmfElement& element, std::string_view name, int includes) {
+  for (const XdmfElement* child : element.children) {
+    if (child->name == name) return Resolved(*child);
+  }
+  for (const XdmfElement* child : element.children) {
+    if (!child->name.ends_with(kInclude)) continue;
+    // "xpointer(PATH/*[self::Topology or self::Geometry])"
+    const std::string pointer = child->Attribute({"xpointer"});
+    const std::size_t begin = pointer.find('('), chosen = pointer.find("/*[");
+    if (begin == std::string::npos || chosen == std::string::npos || includes == kMostReferences) {
+      return Wrong(element, fmt::format("includes '{}', which is not supported; supported: xpointer(PATH/*[self::NAME or self::NAME])",
+                                        Printable(pointer)));
+    }
+    if (pointer.find(fmt::format("self::{}", name), chosen) == std::string::npos) continue;
+    const Result<const XdmfElement*> found = Find(element, std::string_view(pointer).substr(begin + 1, chosen - begin - 1));
+    return found.ok() ? NeededAt(**found, name, includes + 1) : found;
+  }
+  return Wrong(element, fmt::format("has no {}", name));
 }
 
 Status XdmfDocument::Spend(std::uint64_t steps) {

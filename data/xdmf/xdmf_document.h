@@ -31,8 +31,8 @@ struct XdmfElement {
 
 class XdmfDocument {
  public:
-  // NotFound: no such file. InvalidArgument: it is no XDMF, or includes other files (XInclude). ResourceExhausted: it is too long, too deep
-  // or has too many elements. Messages name the path.
+  // NotFound: no such file. InvalidArgument: it is no XDMF, or includes other files (XInclude with href). ResourceExhausted: it is too
+  // long, too deep or has too many elements. Messages name the path.
   static Result<std::shared_ptr<XdmfDocument>> Read(const std::string& path);
 
   const std::string& path() const { return path_; }
@@ -42,8 +42,9 @@ class XdmfDocument {
   // "//DataItem[@Name='p']"). InvalidArgument: it leads nowhere, to an element of another name or in a circle, or is another XPath.
   // ResourceExhausted: as of Spend.
   Result<const XdmfElement*> Resolved(const XdmfElement& element);
-  // The first child of that name, as its reference leads. Null: there is none. Errors of Resolved.
-  Result<const XdmfElement*> Child(const XdmfElement& element, std::string_view name);
+  // The first child of that name, as its reference leads; or the one that is included from elsewhere in the document (XInclude), as finite
+  // element programs share the mesh of all times. Errors of Resolved; InvalidArgument: there is none.
+  Result<const XdmfElement*> Needed(const XdmfElement& element, std::string_view name);
   static std::vector<const XdmfElement*> Children(const XdmfElement& element, std::string_view name);
 
   // Counts what is done for this file: small elements can stand for much work. ResourceExhausted: too much.
@@ -56,6 +57,7 @@ class XdmfDocument {
  private:
   explicit XdmfDocument(std::string path) : path_(std::move(path)) {}
   Status Parse();
+  Result<const XdmfElement*> NeededAt(const XdmfElement& element, std::string_view name, int includes);
   Result<const XdmfElement*> Find(const XdmfElement& from, std::string_view path);
 
   const std::string path_;

@@ -7,6 +7,7 @@
 
 #include "common/base/printable.h"
 #include "data/volume_io/structured_grid.h"
+#include "data/xdmf/xdmf_attributes.h"
 
 namespace slabstream {
 namespace {
@@ -22,9 +23,9 @@ class GridReader {
     const Result<const XdmfElement*> attribute = like == nullptr ? Choose(*points, options) : FindLike(*like);
     if (!attribute.ok()) return attribute.status();
     if (Status status = SetGrid(grid_.header, grid_.named, *points, grid_.at); !status.ok()) return status;
-    Result<XdmfItem> item = ItemOf(**attribute);
+    Result<XdmfItem> item = ItemOf(document_, **attribute);
     if (!item.ok()) return item.status();
-    grid_.header.components = ComponentsOf(*item);
+    grid_.header.components = ComponentsOf(*item, std::uint64_t(CountIn(grid_.header.size)));
     grid_.header.type = item->type.value_or(SampleType::kFloat32);
     TakeFile(*item);
     grid_.item = *std::move(item);
@@ -32,15 +33,8 @@ class GridReader {
   }
 
  private:
-  Status Wrong(const std::string& why) const { return Status::InvalidArgument(grid_.named + ": " + why); }
-
   void TakeFile(const XdmfItem& item) {
     if (!item.file.empty() && std::ranges::find(grid_.files, item.file) == grid_.files.end()) grid_.files.push_back(item.file);
-  }
-
-  Result<const XdmfElement*> Needed(std::string_view name) {
-    Result<const XdmfElement*> child = document_.Child(element_, name);
-    return child.ok() && *child == nullptr ? Wrong(fmt::format("has no {}", name)) : child;
   }
 
   // The arrays of the geometry, at most `most` numbers each.
@@ -52,24 +46,24 @@ class GridReader {
       const Result<XdmfItem> item = ParseXdmfItem(document_, *each);
       if (!item.ok()) return item.status();
       if (Status status = document_.Spend(item->elements() + item->text.size() / 8); !status.ok()) return status;
-      Result<std::vector<double>> numbers = arrays_.ReadNumbers(*item, most);
+      const Result<AlignedVector<double>> numbers = arrays_.ReadNumbers<double>(*item, most);
       if (!numbers.ok()) return numbers.status();
       TakeFile(*item);
-      all.push_back(*std::move(numbers));
+      all.emplace_back(numbers->begin(), numbers->end());
     }
     return all;
   }
 
   // Their dimensions, coordinates, origin and spacing are in the order z, y, x; arrays of coordinates in that of x, y, z.
   Result<PointGrid> ReadPoints(const ReadOptions& options) {
-    const Result<const XdmfElement*> topology = Needed("Topology");
+    const Result<const XdmfElement*> topology = document_.Needed(element_, "Topology");
     if (!topology.ok()) return topology.status();
     const std::string type = (*topology)->Word({"TopologyType", "Type"});
     const bool even = type == "3dcorectmesh";
     if (!even && type != "3drectmesh") {
       return document_.Wrong(**topology,
-                             fmt::format("TopologyType '{}' is not supported; supported: 3DCoRectMesh and 3DRectMesh, whose axes "
-                                         "are straight",
+                             fmt::format("TopologyType '{}' is not supported; supported: 3DCoRectMesh, 3DRectMesh, 3DSMesh, Mixed, "
+                                         "Tetrahedron, Hexahedron, Wedge and Pyramid",
                                          Printable(type)));
     }
     const std::string dimensions = (*topology)->Attribute({"Dimensions", "NumberOfElements"});
@@ -77,7 +71,7 @@ class GridReader {
     if (!sizes || sizes->size() != 3 || std::ranges::count(*sizes, 0) > 0) {
       return document_.Wrong(**topology, fmt::format("Dimensions is '{}', must be 3 whole numbers above 0", Printable(dimensions)));
     }
-    const Result<const XdmfElement*> geometry = Needed("Geometry");
+    const Result<const XdmfElement*> geometry = document_.Needed(element_, "Geometry");
     if (!geometry.ok()) return geometry.status();
     const std::string kind = (*geometry)->Word({"GeometryType", "Type"}), wanted = even ? "origin_dxdydz" : "vxvyvz";
     if (kind != wanted) {
@@ -106,59 +100,26 @@ class GridReader {
     return GridOfCoordinates(grid_.named, {(*coordinates)[0], (*coordinates)[1], (*coordinates)[2]}, options);
   }
 
-  // Where its values belong; nullopt: not to points or cells.
-  static std::optional<ValuesAt> PlaceOf(const XdmfElement& attribute) {
-    const std::string center = attribute.Word({"Center"});
-    if (center == "cell") return ValuesAt::kCells;
-    return center.empty() || center == "node" ? std::optional(ValuesAt::kPoints) : std::nullopt;
-  }
-
-  Result<XdmfItem> ItemOf(const XdmfElement& attribute) {
-    const auto items = XdmfDocument::Children(attribute, "DataItem");
-    return items.empty() ? Result<XdmfItem>(document_.Wrong(attribute, "has no DataItem")) : ParseXdmfItem(document_, *items.front());
-  }
-
-  // Of the header's size; 1: it does not fit it, which shows when it is read.
-  int ComponentsOf(const XdmfItem& item) const {
-    const std::uint64_t voxels = CountIn(grid_.header.size), elements = item.elements();
-    return elements % voxels == 0 && elements / voxels <= std::uint64_t{kMaxComponents} ? int(elements / voxels) : 1;
-  }
-
   Result<const XdmfElement*> Choose(const PointGrid& points, const ReadOptions& options) {
+    const auto count = [&](ValuesAt at) {
+      return SetGrid(grid_.header, grid_.named, points, at).ok() ? std::uint64_t(CountIn(grid_.header.size)) : 0;
+    };
+    const Result<std::vector<XdmfAttribute>> attributes = AttributesOf(document_, element_, count);
+    if (!attributes.ok()) return attributes.status();
     std::vector<GridArray> arrays;
-    std::vector<const XdmfElement*> attributes;
-    for (const XdmfElement* child : XdmfDocument::Children(element_, "Attribute")) {
-      const Result<const XdmfElement*> attribute = document_.Resolved(*child);
-      if (!attribute.ok()) return attribute;
-      const std::optional<ValuesAt> at = PlaceOf(**attribute);
-      if (!at) continue;
-      GridArray array{.name = (*attribute)->Attribute({"Name"}), .at = *at};
-      // Whoever chooses one that cannot be read is told why then.
-      const Result<XdmfItem> item = ItemOf(**attribute);
-      if (item.ok() && SetGrid(grid_.header, grid_.named, points, *at).ok()) {
-        array.components = ComponentsOf(*item);
-        array.type_name = item->type_name;
-        if (item->format != XdmfItem::Format::kHdf5) array.type = item->type;
-      }
-      arrays.push_back(std::move(array));
-      attributes.push_back(*attribute);
-    }
+    for (const XdmfAttribute& attribute : *attributes) arrays.push_back(attribute.array);
     const Result<std::size_t> chosen = ChooseArray(grid_.named, arrays, options.array);
     if (!chosen.ok()) return chosen.status();
     grid_.array = arrays[*chosen].name;
     grid_.at = arrays[*chosen].at;
     grid_.header.notes = NotesOf(arrays, *chosen);
-    return attributes[*chosen];
+    return (*attributes)[*chosen].element;
   }
 
   Result<const XdmfElement*> FindLike(const XdmfGrid& like) {
     grid_.array = like.array;
     grid_.at = like.at;
-    for (const XdmfElement* child : XdmfDocument::Children(element_, "Attribute")) {
-      const Result<const XdmfElement*> attribute = document_.Resolved(*child);
-      if (!attribute.ok() || ((*attribute)->Attribute({"Name"}) == like.array && PlaceOf(**attribute) == like.at)) return attribute;
-    }
-    return Wrong(fmt::format("has no attribute '{}' of {}, which {} has", like.array, NameOf(like.at), like.named));
+    return FindAttribute(document_, element_, like.array, like.at, like.named);
   }
 
   XdmfDocument& document_;

@@ -13,9 +13,7 @@
 #include "common/text/trimmed.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_file.h"
-#include "data/sources/chunked_source.h"
 #include "data/sources/file_array.h"
-#include "data/volume_io/converted_samples.h"
 #include "data/volume_io/payload.h"
 
 namespace slabstream {
@@ -238,32 +236,19 @@ Result<std::shared_ptr<ChunkedArray>> XdmfArrays::Open(const XdmfItem& item) {
   return array;
 }
 
-Result<std::vector<double>> XdmfArrays::ReadNumbers(const XdmfItem& item, std::uint64_t most) {
-  const std::uint64_t elements = item.elements();
-  const auto longest = std::ranges::max_element(item.count);
-  if (elements > most || *longest != elements) {
-    return Status::InvalidArgument(
-        fmt::format("{}: is of {} numbers, must be up to {} in a row", item.named, fmt::join(item.count, " x "), most));
-  }
-  if (item.format == XdmfItem::Format::kText && item.count == item.size) return ReadText(item);
-  const Result<std::shared_ptr<ChunkedArray>> array = Open(item);
-  if (!array.ok()) return array.status();
-  // As a volume of one row.
-  const std::vector<int> axes = *MatchAxes((*array)->shape().size, item.size);
-  const auto row = std::size_t(longest - item.count.begin());
-  PyramidLevel level{.array = *array, .axes = {axes[row], -1, -1}, .at = std::vector<std::uint64_t>((*array)->shape().size.size(), 0)};
+ArrayBox XdmfArrays::BoxIn(const ArrayShape& shape, const XdmfItem& item) {
+  const std::vector<int> axes = *MatchAxes(shape.size, item.size);
+  ArrayBox box{std::vector<std::uint64_t>(shape.size.size(), 0), std::vector<std::uint64_t>(shape.size.size(), 1)};
   for (std::size_t i = 0; i < axes.size(); ++i) {
-    if (axes[i] >= 0) level.at[std::size_t(axes[i])] = item.begin[i];
+    if (axes[i] < 0) continue;
+    box.begin[std::size_t(axes[i])] = item.begin[i];
+    box.count[std::size_t(axes[i])] = item.count[i];
   }
-  const Result<std::shared_ptr<VolumeSource>> source = MakeChunkedSource(item.named, {.levels = {level}}, context_);
-  if (!source.ok()) return source.status();
-  const Box box = {{std::int32_t(item.begin[row]), 0, 0}, {std::int32_t(item.begin[row] + elements), 1, 1}};
-  const SampleType type = (*array)->shape().type;
-  AlignedVector<std::byte> bytes(elements * BytesPerSample(type));
-  const Status status = (*source)->ReadNow(0, box, BoxRoom::Dense(box, bytes.data(), true));
-  if (!status.ok()) return status;
-  const AlignedVector<double> numbers = Converted<double>(type, bytes);
-  return std::vector(numbers.begin(), numbers.end());
+  return box;
+}
+
+Status XdmfArrays::TooMany(const XdmfItem& item, std::uint64_t most) {
+  return Status::InvalidArgument(fmt::format("{}: is of {} numbers, must be at most {}", item.named, fmt::join(item.count, " x "), most));
 }
 
 }  // namespace slabstream

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "data/sources/array_numbers.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/read_context.h"
 #include "data/xdmf/xdmf_document.h"
@@ -56,11 +57,20 @@ class XdmfArrays {
   // InvalidArgument: it is no such array.
   Result<std::shared_ptr<ChunkedArray>> Open(const XdmfItem& item);
 
-  // The numbers in the box, which has one axis of more than one element at most. Errors of Open; InvalidArgument: there are more than
-  // `most`. Waits.
-  Result<std::vector<double>> ReadNumbers(const XdmfItem& item, std::uint64_t most);
+  // The numbers in the box, the last axis fastest. Errors of Open; InvalidArgument: there are more than `most`. Waits.
+  template <class T>
+  Result<AlignedVector<T>> ReadNumbers(const XdmfItem& item, std::uint64_t most) {
+    if (item.elements() > most) return TooMany(item, most);
+    const Result<std::shared_ptr<ChunkedArray>> array = Open(item);
+    if (!array.ok()) return array.status();
+    return slabstream::ReadNumbers<T>(item.named, *array, BoxIn((*array)->shape(), item));
+  }
 
  private:
+  // The item's box, by the axes of its array.
+  static ArrayBox BoxIn(const ArrayShape& shape, const XdmfItem& item);
+  static Status TooMany(const XdmfItem& item, std::uint64_t most);
+
   const SourceContext context_;
   // File, dataset, seek, byte order, type and size: what an item says of its array.
   using Key = std::tuple<std::string, std::string, std::uint64_t, bool, std::string, std::vector<std::uint64_t>>;

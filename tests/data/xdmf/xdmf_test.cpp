@@ -15,6 +15,7 @@
 #include "tests/data/hdf5/hdf5_files.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/volume_files.h"
+#include "tests/data/xdmf/xdmf_elements.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/whole_file.h"
 
@@ -42,32 +43,12 @@ std::vector<double> ValuesOf(const Index3& size, int field = 0, int fields = 1) 
 std::string ZyxOf(const Index3& size) { return fmt::format("{} {} {}", size.z, size.y, size.x); }
 std::vector<hsize_t> SizesOf(const Index3& size) { return {hsize_t(size.z), hsize_t(size.y), hsize_t(size.x)}; }
 
-std::string Element(const std::string& name, const std::string& attributes, const std::string& inside) {
-  return fmt::format("<{0} {1}>{2}</{0}>\n", name, attributes, inside);
-}
-std::string Item(const std::string& dimensions, const std::string& text, const std::string& attributes = "") {
-  return Element("DataItem", fmt::format("Dimensions=\"{}\" {}", dimensions, attributes), text);
-}
-std::string HdfItem(const std::string& dimensions, const std::string& place) { return Item(dimensions, place, "Format=\"HDF\""); }
-std::string Slab(const std::string& selection, const std::string& item) {
-  return Element("DataItem", "ItemType=\"HyperSlab\"", "<DataItem>" + selection + "</DataItem>" + item);
-}
-std::string Attribute(const std::string& name, const std::string& item, const std::string& attributes = "") {
-  return Element("Attribute", fmt::format("Name=\"{}\" {}", name, attributes), item);
-}
 // Spacing 0.5, 1.5, 2 along x, y, z.
 std::string EvenMesh(const Index3& points, const Vec3& origin = {1, 0, -3}, const std::string& spacing = "2 1.5 0.5") {
   return fmt::format("<Topology TopologyType=\"3DCoRectMesh\" Dimensions=\"{}\"/>", ZyxOf(points)) +
          Element("Geometry", "GeometryType=\"ORIGIN_DXDYDZ\"",
                  Item("3", fmt::format("{} {} {}", origin.z, origin.y, origin.x)) + Item("3", spacing));
 }
-std::string Grid(const std::string& inside, const std::string& attributes = "Name=\"g\" GridType=\"Uniform\"") {
-  return Element("Grid", attributes, inside);
-}
-std::string Collection(const std::string& type, const std::string& inside) {
-  return Grid(inside, "Name=\"all\" GridType=\"Collection\" CollectionType=\"" + type + "\"");
-}
-
 class XdmfTest : public testing::Test {
  protected:
   // The file, with this in its domain.
@@ -399,8 +380,8 @@ TEST_F(XdmfTest, RefusalsSayWhatIsWrong) {
     return changed.replace(at, from.size(), to);
   };
   const std::pair<std::string, const char*> cases[] = {
-      {with("3DCoRectMesh", "3DSMesh"), "TopologyType '3dsmesh' is not supported; supported: 3DCoRectMesh and 3DRectMesh"},
-      {with("3DCoRectMesh", "Tetrahedron"), "TopologyType 'tetrahedron' is not supported"},
+      {with("3DCoRectMesh", "3DSMesh"), "GeometryType 'origin_dxdydz' is not supported for cells"},
+      {with("3DCoRectMesh", "Polyhedron"), "TopologyType 'polyhedron' is not supported; supported: 3DCoRectMesh, 3DRectMesh"},
       {with("ORIGIN_DXDYDZ", "XYZ"), "GeometryType is 'xyz', must be origin_dxdydz for 3dcorectmesh"},
       {with("<Topology", "<Topo"), "Grid 'g': has no Topology"},
       {with("Dimensions=\"5 6 7\"/>", "Dimensions=\"5 6\"/>"), "Dimensions is '5 6', must be 3 whole numbers above 0"},

@@ -1,7 +1,8 @@
-"""XDMF: boxes of arrays that h5py and numpy wrote, which numpy cuts."""
+"""XDMF: boxes of arrays that h5py and numpy wrote, which numpy cuts; grids of cells that meshio wrote."""
 import os
 
 import h5py
+import meshio
 import numpy as np
 
 from case import Case, samples, scaled
@@ -29,7 +30,36 @@ def array_item(random, folder, name, stored):
     return f"<DataItem {attributes}>{name}.raw</DataItem>"
 
 
+def grids(random, folder):
+    """Cubes of one kind of cell or of two, and times that share them, with a linear field. The lattice has a voxel for each cube."""
+    sides = random.integers(2, 6, 3)
+    points = np.stack(np.meshgrid(*(np.arange(side + 1) for side in sides), indexing="ij"), -1).reshape(-1, 3).astype(float)
+    numbers = np.arange(len(points)).reshape(sides + 1)
+    corners = np.stack([numbers[x:sides[0] + x, y:sides[1] + y, z:sides[2] + z].ravel()
+                        for x, y, z in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))], -1)
+    wedges = corners[:, [0, 1, 3, 4, 5, 7, 1, 2, 3, 5, 6, 7]].reshape(-1, 6)
+    tetrahedra = wedges[:, [0, 1, 2, 3, 1, 2, 3, 4, 2, 3, 4, 5]].reshape(-1, 4)
+    half, slope = len(corners) // 2, random.normal(size=3)
+    mixed = [("hexahedron", corners[:half]), ("wedge", wedges[2 * half:])]
+    voxels = ((np.moveaxis(np.indices(sides), 0, -1) + 0.5) @ slope).astype(np.float32)
+    affine, options = scaled((1, 1, 1), (0.5, 0.5, 0.5)), f"lattice={max(sides)},array=f"
+    for kind, cells in (("hexahedron", [("hexahedron", corners)]), ("wedge", [("wedge", wedges)]), ("tetra", [("tetra", tetrahedra)]),
+                        ("mixed", mixed)):
+        for data in ("XML", "Binary", "HDF"):
+            path = os.path.join(folder, f"{kind}{data}.xdmf")
+            meshio.write(path, meshio.Mesh(points, cells, point_data={"f": points @ slope}), data_format=data)
+            yield Case(f"meshio {kind} {data}", path, voxels, affine, options, tolerance=2e-5)
+    path = os.path.join(folder, "times.xdmf")
+    with meshio.xdmf.TimeSeriesWriter(path, data_format="XML") as writer:
+        writer.write_points_cells(points, mixed)
+        for time in range(3):
+            writer.write_data(time, point_data={"f": points @ slope + time})
+    for time in range(3):
+        yield Case(f"meshio time {time}", path, voxels + np.float32(time), affine, f"{options},time={time}", tolerance=2e-5)
+
+
 def cases(random, folder, count, skipped):
+    yield from grids(random, folder)
     for number in range(count):
         stored = samples(random, tuple(int(side) for side in random.integers(2, 9, 4)), random.choice(list(NUMBERS)))
         begin = [int(random.integers(side)) for side in stored.shape]
