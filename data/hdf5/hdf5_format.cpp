@@ -9,6 +9,7 @@
 #include "data/hdf5/classic_netcdf.h"
 #include "data/hdf5/hdf5_image.h"
 #include "data/hdf5/hdf5_layouts.h"
+#include "data/hdf5/vtk_hdf_mesh.h"
 
 namespace slabstream {
 namespace {
@@ -25,9 +26,23 @@ bool IsClassicNetcdf(const std::string& path) { return BeginsWith(path, "CDF"); 
 bool Recognises(const std::string& path, const ReadOptions&) { return BeginsWith(path, "\x89HDF\r\n\x1a\n") || IsClassicNetcdf(path); }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  if (!IsClassicNetcdf(path)) {
+    const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
+    if (!file.ok()) return file.status();
+    const std::string type = VtkHdfType(**file);
+    if (IsVtkHdfGrid(type)) return std::shared_ptr<VolumeSource>();
+    if (options.lattice) return Status::InvalidArgument(path + ": holds voxels, so it takes no option lattice");
+    if (type == kVtkHdfAmr) return OpenVtkHdfAmr(*file, options, context);
+  }
   Result<Pyramid> pyramid = ReadHdf5(path, options, context);
   if (!pyramid.ok()) return pyramid.status();
   return MakeChunkedSource(path, *std::move(pyramid), context);
+}
+
+// A grid with cells.
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
+  return file.ok() ? ReadVtkHdfGrid(*file, options) : file.status();
 }
 
 }  // namespace
@@ -58,8 +73,9 @@ VolumeFormat Hdf5() {
   return {.name = "HDF5",
           .endings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"},
           .recognises = Recognises,
-          .options = {"time", "channel", "dataset", "resample"},
-          .open = Open};
+          .options = {"time", "channel", "dataset", "lattice", "resample"},
+          .open = Open,
+          .read = Read};
 }
 
 }  // namespace slabstream

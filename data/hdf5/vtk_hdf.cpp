@@ -19,7 +19,9 @@ Result<std::vector<std::string>> Images(AttributedFile& file) {
   const std::string type = file.Text(kRoot, "Type").value_or("");
   if (type != "ImageData") {
     return Status::InvalidArgument(
-        fmt::format("{}: is a VTKHDF file of type '{}', which is not supported; supported: ImageData", file.path(), type));
+        fmt::format("{}: is a VTKHDF file of type '{}', which is not supported; supported: ImageData, UnstructuredGrid, blocks of it "
+                    "(MultiBlockDataSet, PartitionedDataSetCollection), and OverlappingAMR",
+                    file.path(), Printable(type)));
   }
   std::vector<std::string> images;
   for (const std::string& group : {kPointData, kCellData}) {

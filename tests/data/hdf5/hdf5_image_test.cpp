@@ -198,8 +198,8 @@ TEST_F(Hdf5ImageTest, VtkHdfCellsLieInTheirCentres) {
   EXPECT_EQ(Open()->info().levels[0].description.geometry.orientation.world, World::kScene);
   write("ImageData", "/VTKHDF/PointData", {2, 6, 0, 2, 1, 2});
   ExpectRefused("is of 2 x 3 x 4, but WholeExtent says 2 x 3 x 5 along z, y and x");
-  write("UnstructuredGrid", "/VTKHDF/PointData", {2, 5, 0, 2, 1, 2});
-  ExpectRefused("is a VTKHDF file of type 'UnstructuredGrid', which is not supported");
+  write("HyperTreeGrid", "/VTKHDF/PointData", {2, 5, 0, 2, 1, 2});
+  ExpectRefused("is a VTKHDF file of type 'HyperTreeGrid', which is not supported");
 }
 
 // As openPMD-api writes them: iterations are times, and components of a vector channels.

@@ -42,17 +42,18 @@ def grids(random, folder):
             (".vts", vtk.vtkXMLStructuredGridWriter, field), (".pvts", vtk.vtkXMLPStructuredGridWriter, field),
             (".vtu", vtk.vtkXMLUnstructuredGridWriter, unstructured), (".pvtu", vtk.vtkXMLPUnstructuredGridWriter, unstructured),
             (".vtm", vtk.vtkXMLMultiBlockDataWriter, None), (".vtk", vtk.vtkStructuredGridWriter, field),
+            (".vtkhdf", vtk.vtkHDFWriter, None), (".vtkhdf", vtk.vtkHDFWriter, unstructured),
             (".vtk", vtk.vtkUnstructuredGridWriter, unstructured))):
-        writer, legacy = writer(), end == ".vtk"
-        if legacy != (mode is None):
+        writer, modeless = writer(), end in (".vtk", ".vtkhdf")
+        if modeless != (mode is None):
             continue
-        path = os.path.join(folder, f"{writer.GetClassName()}{mode or ''}{end}")
+        path = os.path.join(folder, f"{writer.GetClassName()}{mode or ''}{'' if port else 'Blocks'}{end}")
         writer.SetFileName(path)
         if port:
             writer.SetInputConnection(port.GetOutputPort())
         else:
             writer.SetInputData(blocks)
-        if not legacy:
+        if not modeless:
             getattr(writer, mode)()
         if end.startswith(".p"):
             writer.SetNumberOfPieces(4)
@@ -60,7 +61,7 @@ def grids(random, folder):
             writer.SetEndPiece(3)
             writer.SetGhostLevel(1)
         writer.Write()
-        yield Case(os.path.basename(path), path, voxels, scaled((1, 1, 1), (0.5, 0.5, 0.5)), f"lattice={max(cells)},array=Elevation", tolerance=2e-5)
+        yield Case(os.path.basename(path), path, voxels, scaled((1, 1, 1), (0.5, 0.5, 0.5)), f"lattice={max(cells)},{'dataset' if end == '.vtkhdf' else 'array'}=Elevation", tolerance=2e-5)
 
 
 def cases(random, folder, count, skipped):
