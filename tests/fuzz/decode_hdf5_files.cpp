@@ -10,7 +10,7 @@
 namespace slabstream {
 bool DecodeHdf5File(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
-  const ReadOptions options{.dataset = input.Take<std::uint8_t>() % 2 == 1 ? "/data" : ""};
+  const ReadOptions options{.dataset = input.Take<std::uint8_t>() % 2 == 1 ? "/data" : "", .describe = true};
   const std::string path = PathOfSource("volume.h5");
   WriteFile(path, FileBytes(input.Text()));
   return ReadSource(path, options);
@@ -81,6 +81,40 @@ std::vector<FuzzBytes> Hdf5FileSeeds() {
     writer.Text("/minc-2.0/image/0/image", "dimorder", "zspace,yspace,xspace");
     writer.Doubles("/minc-2.0/image/0/image-min", {6}, double_of(0, 6));
     writer.Doubles("/minc-2.0/image/0/image-max", {6}, double_of(9, 6));
+  }
+  keep(0);
+  {
+    Hdf5Writer writer(path);
+    writer.Group("/VTKHDF");
+    writer.Text("/VTKHDF", "Type", "UnstructuredGrid");
+    writer.Doubles("/VTKHDF/NumberOfPoints", {2}, {4, 5});
+    writer.Doubles("/VTKHDF/NumberOfCells", {2}, {1, 2});
+    writer.Doubles("/VTKHDF/NumberOfConnectivityIds", {2}, {4, 8});
+    writer.Doubles("/VTKHDF/Points", {9, 3}, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1});
+    writer.Doubles("/VTKHDF/Types", {3}, {10, 10, 10});
+    writer.Doubles("/VTKHDF/Offsets", {5}, {0, 4, 0, 4, 8});
+    writer.Doubles("/VTKHDF/Connectivity", {12}, {0, 1, 2, 3, 0, 1, 3, 4, 1, 2, 3, 4});
+    writer.Doubles("/VTKHDF/PointData/p", {9}, double_of(1, 9));
+    writer.Doubles("/VTKHDF/CellData/vtkGhostType", {3}, {0, 0, 1});
+    writer.Doubles("/VTKHDF/Steps/Values", {2}, {0, 1});
+    for (const std::string name : {"PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"}) {
+      writer.Doubles("/VTKHDF/Steps/" + name, {2}, {0, name == "PartOffsets" || name == "CellOffsets" ? 1.0 : 4.0});
+    }
+    writer.Doubles("/VTKHDF/Steps/NumberOfParts", {2}, {1, 1});
+  }
+  keep(0);
+  {
+    Hdf5Writer writer(path);
+    writer.Group("/VTKHDF");
+    writer.Text("/VTKHDF", "Type", "OverlappingAMR");
+    writer.Numbers("/VTKHDF", "Origin", {0, 0, 0});
+    for (const int level : {0, 1}) {
+      const std::string group = "/VTKHDF/Level" + std::to_string(level);
+      writer.Group(group);
+      writer.Numbers(group, "Spacing", double_of(level == 0 ? 1 : 0.5, 3));
+      writer.Doubles(group + "/AMRBox", {1, 6}, {0, 3, 0, 3, 0, level == 0 ? 3.0 : 1.0});
+      writer.Doubles(group + "/CellData/v", {64}, double_of(level, 64));
+    }
   }
   keep(0);
   for (const int version : {1, 2, 5}) {

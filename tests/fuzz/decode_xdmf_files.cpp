@@ -18,6 +18,8 @@ void WriteFilesBeside() {
     file.Write("/q", {.size = {2, 2, 3, 4}, .chunk = {1, 2, 2, 2}, .type = SampleType::kInt16, .fill = std::vector<std::byte>(2)},
                samples.data());
     file.Doubles("/x", {4}, {0, 1, 2, 3});
+    file.Doubles("/points", {5, 3}, {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0.5, 0.5, 1});
+    file.Doubles("/cells", {2, 4}, {0, 1, 3, 4, 1, 2, 3, 4});
     WriteFile(PathOfSource("beside.raw"), FileBytes(100, 'a'));
     return true;
   }();
@@ -39,7 +41,23 @@ std::vector<FuzzBytes> XdmfFileSeeds() {
       "<DataItem Dimensions='3'>0 0 0</DataItem><DataItem>2 1 -1</DataItem></Geometry>";
   const std::string points = "<Attribute Name='p'><DataItem Dimensions='2 3 4' Format='HDF'>beside.h5:/p</DataItem></Attribute>";
   const std::string grid = "<Grid>" + even + points + "</Grid>";
+  const std::string mesh =
+      "<Topology TopologyType='Mixed' NumberOfElements='3'><DataItem Dimensions='14'>6 0 1 3 4 4 1 2 3 6 1 2 3 4</DataItem></Topology>"
+      "<Geometry GeometryType='XYZ'><DataItem Dimensions='5 3'>0 0 0 1 0 0 1 1 0 0 1 0 .5 .5 1</DataItem></Geometry>";
+  const std::string values = "<Attribute Name='p'><DataItem Dimensions='5'>0 1 2 3 4</DataItem></Attribute>";
   const std::string inside[] = {
+      "<Grid>" + mesh + values +
+          "<Attribute Name='vtkGhostType' Center='Cell'><DataItem Dimensions='3'>0 0 1</DataItem></Attribute></Grid>",
+      "<Grid Name='m'>" + mesh + "</Grid><Grid GridType='Collection' CollectionType='Temporal'><Grid><xi:include " +
+          "xmlns:xi='http://www.w3.org/2001/XInclude' xpointer='xpointer(//Grid[1]/*[self::Topology or self::Geometry])'/>" + values +
+          "</Grid></Grid>",
+      "<Grid><Topology TopologyType='Tetrahedron' NumberOfElements='2'><DataItem Dimensions='2 4' Format='HDF'>beside.h5:/cells</DataItem>"
+      "</Topology><Geometry><DataItem Dimensions='5 3' Format='HDF'>beside.h5:/points</DataItem></Geometry><Attribute Name='c' "
+      "Center='Cell'><DataItem ItemType='HyperSlab'><DataItem>0 1 1 1 2 1</DataItem><DataItem Dimensions='2 4' "
+      "Format='HDF'>beside.h5:/cells</DataItem></DataItem></Attribute></Grid>",
+      "<Grid><Topology TopologyType='3DSMesh' Dimensions='2 2 2'/><Geometry GeometryType='X_Y_Z'><DataItem>0 1 0 1 0 1 0 1</DataItem>"
+      "<DataItem>0 0 1 1 0 0 1 1</DataItem><DataItem>0 0 0 0 1 1 1 2</DataItem></Geometry><Attribute Name='p'><DataItem "
+      "Dimensions='2 2 2'>0 1 2 3 4 5 6 7</DataItem></Attribute></Grid>",
       grid,
       "<Grid GridType='Uniform'><Topology Type='3DRectMesh' Dimensions='2 3 4'/><Geometry Type='VXVYVZ'><DataItem Dimensions='4' "
       "Format='HDF'>beside.h5:/x</DataItem><DataItem>0 2 4</DataItem><DataItem>9 8</DataItem></Geometry>" +
