@@ -33,6 +33,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
     if (IsVtkHdfGrid(type)) return std::shared_ptr<VolumeSource>();
     if (options.lattice) return Status::InvalidArgument(path + ": holds voxels, so it takes no option lattice");
     if (type == kVtkHdfAmr) return OpenVtkHdfAmr(*file, options, context);
+    if (options.dataset.find('/') == std::string::npos && IsFlash(**file)) return OpenFlash(*file, options, context);
   }
   Result<Pyramid> pyramid = ReadHdf5(path, options, context);
   if (!pyramid.ok()) return pyramid.status();

@@ -21,6 +21,11 @@ struct Hdf5Layout {
 Hdf5Layout Imaris();
 Hdf5Layout BigDataViewerHdf5();
 
+// Files of FLASH. options.dataset names the variable. Errors of VolumeFormat::open.
+bool IsFlash(AttributedFile& file);
+Result<std::shared_ptr<VolumeSource>> OpenFlash(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options,
+                                                const SourceContext& context);
+
 // How many names PREFIX0, PREFIX1, ... there are without a gap.
 int CountNumbered(const std::vector<std::string>& names, const std::string& prefix);
 

@@ -12,14 +12,13 @@
 
 #include "data/hdf5/hdf5_rows.h"
 #include "data/hdf5/vtk_hdf_mesh.h"
-#include "data/mosaic/mosaic_source.h"
+#include "data/mosaic/adaptive_mesh.h"
 #include "data/sources/array_numbers.h"
 #include "data/sources/chunked_source.h"
 #include "data/sources/file_array.h"
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/grid_arrays.h"
 #include "data/volume_io/stated_field.h"
-#include "data/volume_io/world_placement.h"
 
 namespace slabstream {
 namespace {
@@ -87,7 +86,7 @@ class AmrOpener {
       if (level->boxes.empty()) break;
       levels_.push_back(*std::move(level));
     }
-    if (levels_.empty()) return Wrong("has no boxes at level 0");
+    if (levels_.empty()) return Wrong("has no level 0");
     return MakeSource();
   }
 
@@ -189,58 +188,21 @@ class AmrOpener {
     return level;
   }
 
-  // How many cells of a level lie along one of level 0, along each axis.
-  Result<Index3> RatioOf(std::size_t number) const {
-    constexpr double kSame = 1e-3;
-    Index3 ratio;
-    for (const Axis axis : kAxes) {
-      const double exact = levels_.front().spacing[axis] / levels_[number].spacing[axis];
-      if (!(exact >= 1 - kSame && exact <= kMaxVolumeSide && std::abs(exact - std::round(exact)) <= kSame * exact)) {
-        return Wrong(fmt::format("Spacing of level {} is no whole part of that of level 0 along {}", number, Letter(axis)));
-      }
-      ratio[axis] = std::int32_t(std::round(exact));
-    }
-    return ratio;
-  }
-
   Result<std::shared_ptr<VolumeSource>> MakeSource() {
     const std::vector<double> origin = file_->Numbers(std::string(kRoot), "Origin").value_or(std::vector<double>{0, 0, 0});
     if (origin.size() != 3) return Wrong("Origin must be 3 numbers");
-    Box domain = levels_.front().boxes.front();
-    for (const Box& box : levels_.front().boxes) domain = Hull(domain, box);
     info_.format = "VTKHDF OverlappingAMR";
     info_.files = {file_->path()};
-    info_.notes.push_back(fmt::format("{} levels of cells", levels_.size()));
-    std::vector<std::vector<MosaicPart>> parts;
-    for (std::size_t number = 0; number < levels_.size(); ++number) {
-      const Result<Index3> ratio = RatioOf(number);
-      if (!ratio.ok()) return ratio.status();
-      Box of_level;
-      for (const Axis axis : kAxes) {
-        const std::int64_t begin = std::int64_t{domain.begin[axis]} * (*ratio)[axis], end = std::int64_t{domain.end[axis]} * (*ratio)[axis];
-        if (end - begin > kMaxVolumeSide || std::abs(begin) > std::numeric_limits<std::int32_t>::max() / 4) {
-          return Wrong(
-              fmt::format("level {} has {} cells along {}, must have at most {}", number, end - begin, Letter(axis), kMaxVolumeSide));
-        }
-        of_level.begin[axis] = std::int32_t(begin);
-        of_level.end[axis] = std::int32_t(end);
-      }
-      const Level& level = levels_[number];
-      const Vec3 spacing = levels_.front().spacing / ToVec3(*ratio);
-      RawHeader header{.size = of_level.size(), .world = World::kScene, .matrix = "Spacing"};
-      header.steps = StepsOf(spacing);
-      header.origin = Vec3{origin[0], origin[1], origin[2]} + spacing * (ToVec3(of_level.begin) + Vec3{0.5, 0.5, 0.5});
-      const Result<WorldPlacement> placed = PlaceInWorld(header, file_->path());
-      if (!placed.ok()) return placed.status();
-      info_.levels.insert(info_.levels.begin(), SourceLevel{{placed->geometry, ScalarType::kFloat32, {}}, {}});
-      Result<std::vector<MosaicPart>> of_boxes = PartsOf(level, of_level);
-      if (!of_boxes.ok()) return of_boxes.status();
-      parts.insert(parts.begin(), *std::move(of_boxes));
+    std::vector<MeshLevel> mesh;
+    for (const Level& level : levels_) {
+      Result<std::vector<MosaicPart>> parts = PartsOf(level);
+      if (!parts.ok()) return parts.status();
+      mesh.push_back({level.spacing, *std::move(parts)});
     }
-    return MakeMosaic(file_->path(), std::move(info_), std::move(parts));
+    return MakeAdaptiveMesh(file_->path(), std::move(info_), {origin[0], origin[1], origin[2]}, std::move(mesh));
   }
 
-  Result<std::vector<MosaicPart>> PartsOf(const Level& level, const Box& domain) {
+  Result<std::vector<MosaicPart>> PartsOf(const Level& level) {
     const std::string path = level.path + "/CellData/" + name_;
     const Result<std::shared_ptr<ChunkedArray>> values = OpenRows(file_, path, std::uint64_t(info_.components), context_);
     if (!values.ok()) return values.status();
@@ -250,7 +212,6 @@ class AmrOpener {
     std::vector<MosaicPart> parts;
     std::int64_t begin = level.begin;
     for (const Box& box : level.boxes) {
-      if (!domain.Contains(box)) return Wrong(fmt::format("{}: box {} lies beyond level 0", level.path, parts.size()));
       const std::string named = fmt::format("{}: box {}", file_->Named(path), parts.size());
       const Result<ArrayBox> rows = RowsOf(shape, named, begin, box.voxel_count());
       if (!rows.ok()) return rows.status();
@@ -258,7 +219,7 @@ class AmrOpener {
         PyramidLevel voxels{.array = std::make_shared<BoxArray>(named, values, std::uint64_t(begin), cells, channel), .at = {0, 0, 0}};
         return MakeChunkedSource(named, {.levels = {std::move(voxels)}}, context);
       };
-      parts.push_back({named, {box.begin - domain.begin, box.end - domain.begin}, open});
+      parts.push_back({named, box, open});
       begin += box.voxel_count();
     }
     return parts;

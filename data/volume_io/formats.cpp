@@ -86,6 +86,8 @@ std::string_view WhyUnread(const std::string& path) {
       {{".e", ".exo", ".ex2", ".g"}, kWhyNotExodus},
       {{".cgns"}, kWhyNotCgns},
       {{".foam"}, kWhyNotOpenFoam},
+      {{".vdb"}, "an OpenVDB file, which is not read; pyopenvdb's copyToArray and numpy.save write a grid as .npy"},
+      {{".bp", ".bp4", ".bp5"}, "output of ADIOS2, which is not read; openpmd-pipe copies what openPMD wrote to .h5"},
       {{".case", ".encas"}, "an EnSight file, which is not read; ParaView's Save Data writes its grid as .vtm"}};
   std::error_code error;
   if (std::filesystem::exists(std::filesystem::path(path) / "system" / "controlDict", error)) return kWhyNotOpenFoam;

@@ -117,6 +117,14 @@ std::vector<FuzzBytes> Hdf5FileSeeds() {
     }
   }
   keep(0);
+  {
+    Hdf5Writer writer(path);
+    writer.Doubles("/refine level", {3}, {1, 1, 2});
+    writer.Doubles("/node type", {3}, {2, 1, 1});
+    writer.Doubles("/bounding box", {3, 3, 2}, {0, 1, 0, 1, 0, 1, 1, 2, 0, 1, 0, 1, 0, 0.5, 0, 0.5, 0.5, 1});
+    writer.Doubles("/dens", {3, 2, 2, 2}, double_of(1, 24));
+  }
+  keep(0);
   for (const int version : {1, 2, 5}) {
     NetcdfWriter writer{.version = version, .streaming = version == 2, .records = 6, .dimensions = {{"z", 0}, {"lat", 7}, {"x", 8}}};
     writer.variables.push_back({"lat", {1}, SampleType::kFloat32, {7, 6, 5, 4, 3, 2, 1}, {{"units", "degrees_north"}}});

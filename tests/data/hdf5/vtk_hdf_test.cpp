@@ -307,7 +307,7 @@ TEST_F(VtkHdfAmrTest, WhatIsWrongIsSaidInOneLine) {
   const std::pair<std::function<void(std::vector<double>&)>, const char*> cases[] = {
       {[](std::vector<double>& corners) { corners[0] = 1e12; }, "box 0 of level 1 is from 1000000000000 to"},
       {[](std::vector<double>& corners) { std::swap(corners[2], corners[3]); }, "box 0 of level 1 is from"},
-      {[](std::vector<double>& corners) { corners[6] += 40, corners[7] += 40; }, "/VTKHDF/Level1: box 1 lies beyond level 0"},
+      {[](std::vector<double>& corners) { corners[6] += 40, corners[7] += 40; }, "/VTKHDF/Level1/CellData/v': box 1: lies beyond level 0"},
       {[](std::vector<double>& corners) { corners[5] -= 4; }, ""},  // fewer cells, of other places: nothing tells
       {[](std::vector<double>& corners) { corners[11] += 4; }, "are needed"},
       {[](std::vector<double>& corners) { corners.resize(6); }, ""},

@@ -284,6 +284,8 @@ TEST_F(VtkTest, FilesOfVtkThatAreNotReadAreNamed) {
   EXPECT_THAT(WhyNot("v.ex2", "exodus"), HasSubstr("v.ex2: an Exodus file, which is not read; ParaView's Save Data writes"));
   EXPECT_THAT(WhyNot("v.cgns", "ADF"), HasSubstr("v.cgns: a CGNS file, which is not read; ParaView"));
   EXPECT_THAT(WhyNot("v.case", "FORMAT"), HasSubstr("v.case: an EnSight file, which is not read; ParaView"));
+  EXPECT_THAT(WhyNot("v.vdb", "vdb"), HasSubstr("v.vdb: an OpenVDB file, which is not read; pyopenvdb"));
+  EXPECT_THAT(WhyNot("v.bp", "bp"), HasSubstr("v.bp: output of ADIOS2, which is not read; openpmd-pipe"));
   EXPECT_THAT(WhyNot("v.foam", ""), HasSubstr("v.foam: a case of OpenFOAM, which is not read; foamToVTK writes"));
   std::filesystem::create_directories(directory_ / "cavity/system");
   WriteFile(directory_ / "cavity/system/controlDict", "FoamFile {}");
