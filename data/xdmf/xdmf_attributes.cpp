@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "common/base/printable.h"
 #include "data/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -47,8 +48,13 @@ Result<const XdmfElement*> FindAttribute(XdmfDocument& document, const XdmfEleme
 }
 
 Result<XdmfItem> ItemOf(XdmfDocument& document, const XdmfElement& attribute) {
+  // Of a finite element function there are several items.
+  if (const std::string type = attribute.Word({"ItemType"}); !type.empty() && type != "uniform") {
+    return document.Wrong(attribute, fmt::format("ItemType '{}' is not supported for an attribute; supported: Uniform", Printable(type)));
+  }
   const auto items = XdmfDocument::Children(attribute, "DataItem");
-  return items.empty() ? Result<XdmfItem>(document.Wrong(attribute, "has no DataItem")) : ParseXdmfItem(document, *items.front());
+  if (items.size() != 1) return document.Wrong(attribute, fmt::format("has {} of DataItem, must have 1", items.size()));
+  return ParseXdmfItem(document, *items.front());
 }
 
 int ComponentsOf(const XdmfItem& item, std::uint64_t count) {

@@ -28,7 +28,7 @@ Result<std::vector<XdmfAttribute>> AttributesOf(XdmfDocument& document, const Xd
 Result<const XdmfElement*> FindAttribute(XdmfDocument& document, const XdmfElement& grid, const std::string& name, ValuesAt at,
                                          const std::string& like);
 
-// InvalidArgument, naming the attribute: it has no item; errors of ParseXdmfItem.
+// InvalidArgument, naming the attribute: it has none or several items, or is a finite element function; errors of ParseXdmfItem.
 Result<XdmfItem> ItemOf(XdmfDocument& document, const XdmfElement& attribute);
 
 // Numbers for each of so many points or cells; 1: the item has another size, which shows when it is read.

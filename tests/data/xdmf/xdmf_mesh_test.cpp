@@ -203,6 +203,7 @@ TEST_F(XdmfMeshTest, WhatIsWrongIsSaidInOneLine) {
   };
   const std::string include = "<xi:include xpointer=\"xpointer(/Xdmf/Domain/Grid/*[self::Topology])\"/>";
   const std::pair<std::string, const char*> cases[] = {
+      {with("Center=\"Node\"", "Center=\"Node\" ItemType=\"FiniteElementFunction\""), "ItemType 'finiteelementfunction' is not supported"},
       {with("\"XYZ\"", "\"XY\""), "GeometryType 'xy' is not supported for cells; supported: XYZ and X_Y_Z"},
       {with("\"Mixed\"", "\"Polyhedron\""), "TopologyType 'polyhedron' is not supported; supported: 3DCoRectMesh"},
       {with("\"Mixed\"", "\"Tetrahedron\""), "Topology: has 25 numbers, must have 4 a cell"},

@@ -399,7 +399,7 @@ TEST_F(XdmfTest, RefusalsSayWhatIsWrong) {
       {with("a.h5:/p", "a.xmf:/p"), "a.xmf: not an HDF5 file"},
       {with("a.h5:/p", "a.h5:/q"), "dataset '/q' cannot be opened"},
       {with("Name=\"p\" ", "Name=\"p\" Center=\"Face\""), "has no array of points or cells"},
-      {Grid(EvenMesh(kPoints) + Attribute("p", "")), "Attribute 'p': has no DataItem"},
+      {Grid(EvenMesh(kPoints) + Attribute("p", "")), "Attribute 'p': has 0 of DataItem, must have 1"},
       {Grid(EvenMesh(kPoints) + attribute + Attribute("q", item)), "choose one by its name (--array): p, q"},
       {Grid(EvenMesh(kPoints) + Attribute("p", HdfItem("5 6 0", "a.h5:/p"))),
        "Dimensions is '5 6 0', must be 1 to 8 whole numbers above 0"},
