@@ -113,10 +113,12 @@ Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& 
   return Bytes(std::move(cut));
 }
 
-Bytes VoxelServer::CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box) {
+Result<Bytes> VoxelServer::CellsIn(const std::shared_ptr<const GridCells>& cells, const Box& box) {
   kept_cells_.DropIf([](const auto& entry) { return entry.value.of.expired(); });
   if (const KeptCells* found = kept_cells_.Find({cells.get(), box})) return found->bytes;
-  Bytes bytes(EncodeMesh(cells->Cut(box)));
+  const Result<Mesh> cut = cells->CellsIn(box);
+  if (!cut.ok()) return cut.status();
+  Bytes bytes(EncodeMesh(*cut));
   const std::size_t size = bytes.size();
   const KeptCells& piece = kept_cells_.Put({cells.get(), box}, {cells, std::move(bytes)}, size);
   kept_cells_.DropBeyond(kMostKept);
@@ -124,7 +126,9 @@ Bytes VoxelServer::CellsIn(const std::shared_ptr<const MeshCutter>& cells, const
 }
 
 Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
-  const Bytes all = CellsIn(samples.cells, request.box);
+  const Result<Bytes> found = CellsIn(samples.cells, request.box);
+  if (!found.ok()) return found.status();
+  const Bytes& all = *found;
   const std::uint64_t begin = BeginOfCellChunk(request.chunk);
   if (begin >= all.size()) {
     return Status::InvalidArgument(

@@ -44,7 +44,7 @@ class VoxelServer {
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
-    std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
+    std::shared_ptr<const GridCells> cells = nullptr;     // the cells of an unstructured grid
     std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
     struct InParts {
@@ -104,9 +104,9 @@ class VoxelServer {
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
-  // The bytes of the cells in `box`, which is not empty, as EncodeMesh makes them.
-  Bytes CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
-  // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
+  // The bytes of the cells in `box`, which is not empty, as EncodeMesh makes them. Errors of GridCells.
+  Result<Bytes> CellsIn(const std::shared_ptr<const GridCells>& cells, const Box& box);
+  // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk. Errors of GridCells.
   Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
   static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
 
@@ -127,7 +127,7 @@ class VoxelServer {
 
   static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes of cells; those that were cut last stay in any case
   struct KeptCells {
-    std::weak_ptr<const MeshCutter> of;  // a dataset that is gone takes no memory
+    std::weak_ptr<const GridCells> of;  // a dataset that is gone takes no memory
     Bytes bytes;
   };
 
@@ -135,12 +135,12 @@ class VoxelServer {
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, Samples> samples_;                             // guarded by mutex_
-  std::map<DatasetId, DatasetId> light_volume_of_;                   // by LightVolumeOf; guarded by mutex_
-  std::vector<std::string> unwanted_;                                // users whose connections are to end; guarded by mutex_
-  LruMap<std::pair<const MeshCutter*, Box>, KeptCells> kept_cells_;  // a box is asked for chunk by chunk; the thread's
-  LimitedLog complaints_;                                            // the thread's
-  std::map<DatasetId, Reads> reads_;                                 // the thread's
+  std::map<DatasetId, Samples> samples_;                            // guarded by mutex_
+  std::map<DatasetId, DatasetId> light_volume_of_;                  // by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;                               // users whose connections are to end; guarded by mutex_
+  LruMap<std::pair<const GridCells*, Box>, KeptCells> kept_cells_;  // a box is asked for chunk by chunk; the thread's
+  LimitedLog complaints_;                                           // the thread's
+  std::map<DatasetId, Reads> reads_;                                // the thread's
   const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
   Socket socket_;                                                                          // the thread's
   std::jthread thread_;                                                                    // last member
