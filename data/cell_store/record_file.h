@@ -66,6 +66,7 @@ class Records {
 
   std::uint64_t size() const { return file_.size(); }
   Status Append(std::span<const T> records) { return file_.Append(std::as_bytes(records)); }
+  Status Append(const T& record) { return Append(std::span(&record, 1)); }
   Status Flush() { return file_.Flush(); }
   const std::vector<std::uint64_t>& digests() const { return file_.digests(); }
   Status Read(std::uint64_t begin, std::span<T> out) const { return file_.Read(begin, std::as_writable_bytes(out)); }

@@ -18,10 +18,9 @@
 
 #include "common/mesh/cell_runs.h"
 #include "common/mesh/kept_points.h"
-#include "common/mesh/point_gradients.h"
-#include "common/mesh/summarize_cells.h"
 #include "common/parallel/parallel.h"
 #include "common/volume/memory_budget.h"
+#include "data/cell_store/cell_passes.h"
 #include "data/cell_store/stored_cells.h"
 
 namespace slabstream {
@@ -67,31 +66,6 @@ class RecordStream {
   Status status_;
 };
 
-// Gathers records, and appends many at a time.
-template <class T>
-class RecordWriter {
- public:
-  explicit RecordWriter(Records<T>& file) : file_(file) {}
-  Status Add(const T& record) {
-    gathered_.push_back(record);
-    return gathered_.size() < kBlockRecords ? Status::Ok() : Write();
-  }
-  Status Finish() {
-    if (Status status = Write(); !status.ok()) return status;
-    return file_.Flush();
-  }
-
- private:
-  Status Write() {
-    const Status status = file_.Append(std::span<const T>(gathered_));
-    gathered_.clear();
-    return status;
-  }
-
-  Records<T>& file_;
-  std::vector<T> gathered_;
-};
-
 class CellStorer {
  public:
   CellStorer(CellSpool spool, const CellStoring& storing) : spool_(std::move(spool)), storing_(storing), part_(PartFor(storing.memory)) {
@@ -108,29 +82,21 @@ class CellStorer {
     const std::uint64_t points = spool_.points.size();
     if (Status fits = CheckFitsMemory(std::int64_t(points * sizeof(PointNumber)), "the numbers of a grid's points"); !fits.ok())
       return fits;
-    for (Status (CellStorer::*const step)() :
-         {&CellStorer::SortChunks, &CellStorer::Merge, &CellStorer::WritePoints, &CellStorer::WriteLattice, &CellStorer::WriteGradients}) {
+    for (Status (CellStorer::*const step)() : {&CellStorer::SortChunks, &CellStorer::Merge, &CellStorer::WritePoints}) {
       if (Status status = (this->*step)(); !status.ok()) return status;
     }
+    CellPasses passes = {spool_.folder, &*arrays_, storing_.lattice, part_, storing_.memory, [&](double done) { return Tell(3, done); }};
+    if (Status status = WriteLattice(passes, digests_, facts_.whole); !status.ok()) return status;
+    passes.progress = [&](double done) { return Tell(4, done); };
+    if (Status status = WriteGradients(passes, digests_); !status.ok()) return status;
     return WriteCellStoreHeader(spool_.folder, facts_, digests_);
   }
 
  private:
-  std::string PathOf(const std::string& name) const { return spool_.folder + "/" + name; }
+  std::string InFolder(const std::string& name) const { return spool_.folder + "/" + name; }
   void Remove(const std::string& name) const {
     std::error_code ignored;
-    fs::remove(PathOf(name), ignored);
-  }
-  template <class T>
-  Result<Records<T>> Create(std::size_t file) const {
-    return Records<T>::Create(PathOf(kCellStoreFiles[file]));
-  }
-  // Ends the file of this number, and keeps its digests.
-  template <class T>
-  Status End(std::size_t number, Records<T>& file) {
-    const Status status = file.Flush();
-    digests_[number] = file.digests();
-    return status;
+    fs::remove(InFolder(name), ignored);
   }
   // Steps take about the same time a cell.
   Status Tell(int step, double done) const { return storing_.progress((step + done) / kSteps); }
@@ -188,28 +154,24 @@ class CellStorer {
       if (Status status = Tell(0, double(first) / double(facts_.cells)); !status.ok()) return status;
     }
     ParallelSort(order);
-    auto file = Records<SortedCell>::Create(PathOf(fmt::format("sorted-{}", sorted_.size())));
+    auto file = Records<SortedCell>::Create(InFolder(fmt::format("sorted-{}", sorted_.size())));
     if (!file.ok()) return file.status();
-    RecordWriter<SortedCell> writer(*file);
     for (const std::uint64_t key : order) {
-      if (Status status = writer.Add(cells[key & 0xFFFFFFFF]); !status.ok()) return status;
+      if (Status status = file->Append(cells[key & 0xFFFFFFFF]); !status.ok()) return status;
     }
-    if (Status status = writer.Finish(); !status.ok()) return status;
+    if (Status status = file->Flush(); !status.ok()) return status;
     sorted_.emplace_back(*std::move(file));
     return Status::Ok();
   }
 
   Status Merge() {
     constexpr PointNumber kNone = ~PointNumber{0};
-    auto cells = Create<Tetrahedron>(2);
+    auto cells = Records<Tetrahedron>::Create(PathOf(spool_.folder, CellFile::kCells));
     if (!cells.ok()) return cells.status();
-    auto values = Create<float>(3);
+    auto values = Records<float>::Create(PathOf(spool_.folder, CellFile::kValues));
     if (!values.ok()) return values.status();
-    auto order = Records<PointNumber>::Create(PathOf("order"));
+    auto order = Records<PointNumber>::Create(InFolder("order"));
     if (!order.ok()) return order.status();
-    RecordWriter<Tetrahedron> cell_writer(*cells);
-    RecordWriter<float> value_writer(*values);
-    RecordWriter<PointNumber> order_writer(*order);
     std::vector<PointNumber> renumbered(std::size_t(spool_.points.size()), kNone);
     PointNumber points = 0;
     std::vector<const SortedCell*> front(sorted_.size());
@@ -230,25 +192,23 @@ class CellStorer {
       for (PointNumber& point : cell.points) {
         if (renumbered[point] == kNone) {
           renumbered[point] = points++;
-          if (Status status = order_writer.Add(point); !status.ok()) return status;
+          if (Status status = order->Append(point); !status.ok()) return status;
         }
         point = renumbered[point];
       }
-      if (Status status = cell_writer.Add(cell.points); !status.ok()) return status;
+      if (Status status = cells->Append(cell.points); !status.ok()) return status;
       if (storing_.at == ValuesAt::kCells) {
-        if (Status status = value_writer.Add(cell.value); !status.ok()) return status;
+        if (Status status = values->Append(cell.value); !status.ok()) return status;
       }
       if (Status status = take_next(chunk); !status.ok()) return status;
       if (done % part_ != 0) continue;
       if (Status status = Tell(1, double(done) / double(facts_.cells)); !status.ok()) return status;
     }
     facts_.points = points;
-    for (const Status& status : {cell_writer.Finish(), value_writer.Finish(), order_writer.Finish()}) {
-      if (!status.ok()) return status;
-    }
+    if (Status status = EndCellFile(CellFile::kCells, *cells, digests_); !status.ok()) return status;
+    if (Status status = order->Flush(); !status.ok()) return status;
     for (std::size_t chunk = 0; chunk < sorted_.size(); ++chunk) Remove(fmt::format("sorted-{}", chunk));
     sorted_.clear();
-    digests_[2] = cells->digests();
     cells_.emplace(*std::move(cells));
     values_.emplace(*std::move(values));
     order_.emplace(*std::move(order));
@@ -256,7 +216,7 @@ class CellStorer {
   }
 
   Status WritePoints() {
-    auto points = Create<Vector3<float>>(0);
+    auto points = Records<Vector3<float>>::Create(PathOf(spool_.folder, CellFile::kPoints));
     if (!points.ok()) return points.status();
     for (std::uint64_t begin = 0; begin < facts_.points; begin += part_) {
       std::vector<PointNumber> old(std::size_t(std::min(part_, facts_.points - begin)));
@@ -279,129 +239,13 @@ class CellStorer {
       }
       if (Status status = Tell(2, double(begin) / double(facts_.points)); !status.ok()) return status;
     }
-    if (Status status = End(0, *points); !status.ok()) return status;
-    if (Status status = End(3, *values_); !status.ok()) return status;
+    if (Status status = EndCellFile(CellFile::kPoints, *points, digests_); !status.ok()) return status;
+    if (Status status = EndCellFile(CellFile::kValues, *values_, digests_); !status.ok()) return status;
     order_.reset();
     Remove("order");
     Remove("spool-points");
     arrays_.emplace(CellArrays{storing_.at, *std::move(points), *std::move(cells_), *std::move(values_), std::nullopt});
     return Status::Ok();
-  }
-
-  // Calls function(part) for parts of the sorted cells, in their order.
-  template <class Function>
-  Status VisitParts(int step, double from, double to, Function&& function) const {
-    for (std::uint64_t begin = 0; begin < facts_.cells; begin += part_) {
-      const Result<CellArrays::Part> part = arrays_->Read(begin, std::min(begin + part_, facts_.cells));
-      if (!part.ok()) return part.status();
-      if (Status status = function(*part); !status.ok()) return status;
-      const double done = double(begin) / double(facts_.cells);
-      if (Status status = Tell(step, from + done * (to - from)); !status.ok()) return status;
-    }
-    return Status::Ok();
-  }
-
-  Status WriteLattice() {
-    const std::int64_t voxels = storing_.lattice.bounds().voxel_count();
-    if (Status fits = CheckFitsMemory(voxels * std::int64_t(sizeof(float)), "the lattice of a grid"); !fits.ok()) return fits;
-    Volume volume = EmptyLattice(storing_.lattice);
-    auto runs = Create<CellBounds>(4);
-    if (!runs.ok()) return runs.status();
-    std::optional<CellRanges> ranges;
-    const Status visited = VisitParts(3, 0, 1, [&](const CellArrays::Part& part) {
-      const CellRuns of_part(part.mesh);
-      FillLattice(part.mesh, of_part, volume);
-      CellRanges found = RangesOf(part.mesh, storing_.lattice.size);
-      if (ranges) {
-        ranges->Add(found);
-      } else {
-        ranges = std::move(found);
-      }
-      return runs->Append(of_part.bounds());
-    });
-    if (!visited.ok()) return visited;
-    if (Status status = End(4, *runs); !status.ok()) return status;
-    facts_.whole = ranges->whole;
-    auto bricks = Create<BrickOfCells>(5);
-    if (!bricks.ok()) return bricks.status();
-    RecordWriter<BrickOfCells> writer(*bricks);
-    for (std::size_t brick = 0; brick < ranges->bricks.size(); ++brick) {
-      if (Status status = writer.Add({ranges->bricks[brick], ranges->counts[brick]}); !status.ok()) return status;
-    }
-    if (Status status = writer.Finish(); !status.ok()) return status;
-    digests_[5] = bricks->digests();
-    auto samples = Create<float>(6);
-    if (!samples.ok()) return samples.status();
-    const Status written = samples->Append(std::span<const float>(volume.block.samples<float>(), std::size_t(voxels)));
-    return written.ok() ? End(6, *samples) : written;
-  }
-
-  // The means at all points: add(part, means) adds the cells of a part.
-  template <class Sum, class Add>
-  Result<Records<Sum>> Means(const std::string& name, double from, double to, Add&& add) const {
-    auto file = Records<Sum>::Create(PathOf(name));
-    if (!file.ok()) return file.status();
-    const std::uint64_t window = std::max(storing_.memory / (sizeof(Sum) + sizeof(double)), part_);
-    for (std::uint64_t begin = 0; begin < facts_.points; begin += window) {
-      const std::uint64_t end = std::min(begin + window, facts_.points);
-      MeansOfCells<Sum> means{PointNumber(begin), PointNumber(end)};
-      const double share = (to - from) / double(facts_.points);
-      const Status visited = VisitParts(4, from + share * double(begin), from + share * double(end),
-                                        [&](const CellArrays::Part& part) { return add(part, means); });
-      if (!visited.ok()) return visited;
-      const std::vector<Sum> taken = means.Take();
-      if (Status status = file->Append(std::span<const Sum>(taken)); !status.ok()) return status;
-    }
-    if (Status status = file->Flush(); !status.ok()) return status;
-    return file;
-  }
-
-  Status WriteGradients() {
-    std::optional<Records<double>> values;  // at points, of cells
-    if (storing_.at == ValuesAt::kCells) {
-      auto means = Means<double>("means", 0, 0.5, [](const CellArrays::Part& part, MeansOfCells<double>& sums) {
-        AddValues(part.mesh, part.numbers, sums);
-        return Status::Ok();
-      });
-      if (!means.ok()) return means.status();
-      values.emplace(*std::move(means));
-    }
-    const auto gradients = Means<Vec3>("slopes", values ? 0.5 : 0, 1, [&](const CellArrays::Part& part, MeansOfCells<Vec3>& sums) {
-      std::vector<double> at_points(part.mesh.values.begin(), part.mesh.values.end());
-      if (values) {
-        at_points.resize(part.numbers.size());
-        if (Status status = values->ReadSome(part.numbers, std::span(at_points)); !status.ok()) return status;
-      }
-      AddGradients(part.mesh, part.numbers, at_points, sums);
-      return Status::Ok();
-    });
-    if (!gradients.ok()) return gradients.status();
-    double longest = 0;
-    const auto visit = [&](auto&& function) {
-      std::vector<Vec3> block;
-      for (std::uint64_t begin = 0; begin < facts_.points; begin += part_) {
-        block.resize(std::size_t(std::min(part_, facts_.points - begin)));
-        if (Status status = gradients->Read(begin, std::span(block)); !status.ok()) return status;
-        if (Status status = function(block); !status.ok()) return status;
-      }
-      return Status::Ok();
-    };
-    const Status found = visit([&](const std::vector<Vec3>& block) {
-      for (const Vec3& gradient : block) longest = std::max(longest, Length(gradient));
-      return Status::Ok();
-    });
-    if (!found.ok()) return found;
-    auto shares = Create<Vector3<float>>(1);
-    if (!shares.ok()) return shares.status();
-    const Status written = visit([&](const std::vector<Vec3>& block) {
-      std::vector<Vector3<float>> of_block(block.size());
-      std::ranges::transform(block, of_block.begin(), [&](const Vec3& gradient) { return ShareOf(gradient, longest); });
-      return shares->Append(std::span<const Vector3<float>>(of_block));
-    });
-    if (!written.ok()) return written;
-    Remove("means");
-    Remove("slopes");
-    return End(1, *shares);
   }
 
   static constexpr double kSteps = 5;

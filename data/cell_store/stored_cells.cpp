@@ -40,7 +40,7 @@ std::uint64_t BlocksOf(std::uint64_t records) { return (records + kBlockRecords 
 std::uint64_t RunsOf(std::uint64_t cells) { return (cells + CellRuns::kCells - 1) / CellRuns::kCells; }
 
 // Records of each file.
-std::array<std::uint64_t, kCellStoreFiles.size()> CountsOf(const CellStoreFacts& facts) {
+std::array<std::uint64_t, kCellFileNames.size()> CountsOf(const CellStoreFacts& facts) {
   const Index3& size = facts.lattice.size;
   return {facts.points,
           facts.points,
@@ -193,16 +193,16 @@ Result<std::shared_ptr<StoredCells>> StoredCells::Open(const std::string& folder
   if (!header.ok()) return header.status();
   auto& [facts, digests, digest] = *header;
   const auto counts = CountsOf(facts);
-  const auto open = [&]<class T>(std::size_t file, const T*) {
-    return Records<T>::Open(fmt::format("{}/{}", folder, kCellStoreFiles[file]), counts[file], std::move(digests[file]));
+  const auto open = [&]<class T>(CellFile file, const T*) {
+    return Records<T>::Open(PathOf(folder, file), counts[std::size_t(file)], std::move(digests[std::size_t(file)]));
   };
   constexpr const Vector3<float>* kVector = nullptr;
   constexpr const float* kFloat = nullptr;
-  auto points = open(0, kVector), gradients = open(1, kVector);
-  auto cells = open(2, static_cast<const Tetrahedron*>(nullptr));
-  auto values = open(3, kFloat), voxels = open(6, kFloat);
-  auto runs = open(4, static_cast<const CellBounds*>(nullptr));
-  auto bricks = open(5, static_cast<const BrickOfCells*>(nullptr));
+  auto points = open(CellFile::kPoints, kVector), gradients = open(CellFile::kGradients, kVector);
+  auto cells = open(CellFile::kCells, static_cast<const Tetrahedron*>(nullptr));
+  auto values = open(CellFile::kValues, kFloat), voxels = open(CellFile::kVoxels, kFloat);
+  auto runs = open(CellFile::kRuns, static_cast<const CellBounds*>(nullptr));
+  auto bricks = open(CellFile::kBricks, static_cast<const BrickOfCells*>(nullptr));
   for (const Status& status :
        {points.status(), gradients.status(), cells.status(), values.status(), voxels.status(), runs.status(), bricks.status()}) {
     if (!status.ok()) return Status::DataLoss(status.message());

@@ -65,9 +65,17 @@ struct CellStoreFacts {
   std::vector<std::string> notes;                 // a sentence each of what was left out
 };
 
-// By file, in the order of kCellStoreFiles.
-inline constexpr std::array<const char*, 7> kCellStoreFiles = {"points", "gradients", "cells", "values", "runs", "bricks", "voxels"};
-using CellStoreDigests = std::array<std::vector<std::uint64_t>, kCellStoreFiles.size()>;
+enum class CellFile : std::uint8_t { kPoints, kGradients, kCells, kValues, kRuns, kBricks, kVoxels };
+inline constexpr std::array<const char*, 7> kCellFileNames = {"points", "gradients", "cells", "values", "runs", "bricks", "voxels"};
+using CellStoreDigests = std::array<std::vector<std::uint64_t>, kCellFileNames.size()>;  // by CellFile
+inline std::string PathOf(const std::string& folder, CellFile file) { return folder + "/" + kCellFileNames[std::size_t(file)]; }
+// Ends the file of this number, and keeps its digests.
+template <class T>
+Status EndCellFile(CellFile number, Records<T>& file, CellStoreDigests& digests) {
+  const Status status = file.Flush();
+  digests[std::size_t(number)] = file.digests();
+  return status;
+}
 Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& facts, const CellStoreDigests& digests);
 
 class StoredCells : public GridCells {

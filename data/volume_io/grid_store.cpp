@@ -54,17 +54,18 @@ Result<GridStore> GridStore::Of(const std::string& path, const std::vector<std::
   constexpr std::size_t kMostOfStem = 40;
   Result<StoreFolder> folder = StoreFolder::Usual();
   if (!folder.ok()) return folder.status();
-  const Result<FileStamp> stamp = StampFiles(files);
-  if (!stamp.ok()) return stamp.status();
   std::error_code error;
-  const fs::path place = fs::weakly_canonical(path, error);
+  std::vector<std::string> places;  // the same from every folder
+  for (const std::string& file : files) places.push_back(fs::weakly_canonical(file, error).string());
+  const Result<FileStamp> stamp = StampFiles(places);
+  if (!stamp.ok()) return stamp.status();
   const std::string identity = fmt::format("cells {} {:x} array {} channel {} lattice {} time {} {}", kLayout, stamp->digest, options.array,
                                            MeshOptionsOf(options).channel.value_or(0), options.lattice.value_or(0),
-                                           options.time ? options.time->first : 0, place.string());
-  std::string stem = place.stem().string().substr(0, kMostOfStem);
+                                           options.time ? options.time->first : 0, places.front());
+  std::string stem = fs::path(path).stem().string().substr(0, kMostOfStem);
   std::ranges::replace_if(
       stem, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
-  return GridStore(*std::move(folder), fmt::format("{}-{:016x}", stem, XXH3_64bits(identity.data(), identity.size())), files,
+  return GridStore(*std::move(folder), fmt::format("{}-{:016x}", stem, XXH3_64bits(identity.data(), identity.size())), std::move(places),
                    stamp->digest);
 }
 

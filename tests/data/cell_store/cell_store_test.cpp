@@ -77,7 +77,12 @@ Mesh InMemory(const Grid& grid) {
 }
 
 CellStoring StoringOf(const Grid& grid, std::uint64_t memory) {
-  return {.at = grid.at(), .bounds = grid.bounds, .lattice = grid.lattice, .kinds = {0, 7, 5}, .notes = {"a note", "another one"}, .memory = memory};
+  return {.at = grid.at(),
+          .bounds = grid.bounds,
+          .lattice = grid.lattice,
+          .kinds = {0, 7, 5},
+          .notes = {"a note", "another one"},
+          .memory = memory};
 }
 
 Status Store(const Grid& grid, const std::string& folder, const CellStoring& storing) {

@@ -153,6 +153,8 @@ TEST_F(GridStoreTest, OfOtherFormatsAndOptionsGivesTheirGrids) {
   ASSERT_TRUE(coarse.ok()) << coarse.status().message();
   EXPECT_EQ(coarse->volume->description.geometry.size.x, 9);
   EXPECT_EQ(Stores().size(), stores + 1);
+  EXPECT_TRUE(Read(fs::relative(directory_ / "g.vtu").string(), "height", false)->cells != nullptr) << "from another folder";
+  EXPECT_EQ(Stores().size(), stores + 1);
 }
 
 TEST_F(GridStoreTest, IsMadeAnewIfFilesChangeOrAPartIsMissing) {
