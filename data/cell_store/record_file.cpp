@@ -21,7 +21,8 @@ Status Failed(const std::string& path, const char* what, int error) {
 
 Result<RecordFile> RecordFile::Create(const std::string& path, std::size_t record_bytes) {
   constexpr unsigned kMode = 0600;
-  FileDescriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, kMode));
+  ::unlink(path.c_str());  // what is there may be the file of another store, too
+  FileDescriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, kMode));
   if (file.number() < 0) return Failed(path, "write", errno);
   return RecordFile(path, std::move(file), record_bytes, 0, {});
 }
@@ -37,7 +38,7 @@ Status RecordFile::WriteBlock(std::span<const std::byte> block) {
   auto at = off_t(digests_.size() * block_bytes());
   digests_.push_back(XXH3_64bits(block.data(), block.size()));
   while (!block.empty()) {
-    const ssize_t count = ::pwrite(file_.number(), block.data(), block.size(), at);
+    const ssize_t count = ::pwrite(file_->number(), block.data(), block.size(), at);
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) return Failed(path_, "write", count < 0 ? errno : ENOSPC);
     block = block.subspan(std::size_t(count));
@@ -78,7 +79,7 @@ Status RecordFile::ReadBlock(std::uint64_t block, std::vector<std::byte>& out) c
   }
   const std::uint64_t first = block * kBlockRecords;
   out.resize(std::size_t(std::min<std::uint64_t>(kBlockRecords, records_ - first)) * record_bytes_);
-  if (ReadBytesAt(file_.number(), first * record_bytes_, out) != out.size()) {
+  if (ReadBytesAt(file_->number(), first * record_bytes_, out) != out.size()) {
     if (errno != 0) return Failed(path_, "read", errno);
     return Status::DataLoss(fmt::format("'{}' is truncated at record {} of {}", path_, first, records_));
   }

@@ -1,12 +1,15 @@
 // RecordFile: a file of records of one size, which are appended and then read by their numbers. It keeps a digest of each block of
 // kBlockRecords records, so whoever opens the file later sees whether it is what was written.
 //
+// Copies read the same file.
+//
 // Errors name the path: Unavailable (cannot be made, written or read, as where the disk is full), DataLoss (other bytes than were written,
 // or fewer). One thread at a time appends, and reads what is appended; after Flush any thread reads.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -38,7 +41,11 @@ class RecordFile {
 
  private:
   RecordFile(std::string path, FileDescriptor file, std::size_t record_bytes, std::uint64_t records, std::vector<std::uint64_t> digests)
-      : path_(std::move(path)), file_(std::move(file)), record_bytes_(record_bytes), records_(records), digests_(std::move(digests)) {}
+      : path_(std::move(path)),
+        file_(std::make_shared<const FileDescriptor>(std::move(file))),
+        record_bytes_(record_bytes),
+        records_(records),
+        digests_(std::move(digests)) {}
 
   std::size_t block_bytes() const { return kBlockRecords * record_bytes_; }
   Status WriteBlock(std::span<const std::byte> block);
@@ -46,7 +53,7 @@ class RecordFile {
   Status ReadBlock(std::uint64_t block, std::vector<std::byte>& out) const;
 
   std::string path_;
-  FileDescriptor file_;
+  std::shared_ptr<const FileDescriptor> file_;  // copies share it
   std::size_t record_bytes_;
   std::uint64_t records_;
   std::vector<std::uint64_t> digests_;

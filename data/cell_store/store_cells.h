@@ -19,6 +19,7 @@ struct CellStoring {
   Bounds3 bounds;  // of all points
   VolumeGeometry lattice;
   std::array<std::uint64_t, kMostKinds> kinds{};    // CellStoreFacts
+  std::vector<std::string> others = {};             // folders of stores that stay meanwhile: one of the same mesh shares its files
   std::vector<std::string> notes = {};              // CellStoreFacts
   std::uint64_t memory = std::uint64_t{256} << 20;  // bytes that it may take, beside four bytes a point and the lattice
   // Called now and then with the share of the work that is done, ascending; an error ends the work.

@@ -29,12 +29,12 @@ struct Header {
   std::uint32_t at = 0;
   std::array<std::int32_t, 3> size = {};
   std::array<double, 3> spacing = {}, origin = {}, low = {}, high = {};
-  std::uint64_t points_read = 0;
+  std::uint64_t points_read = 0, geometry = 0;
   std::array<std::uint64_t, kMostKinds> kinds = {};
   ValueRange whole;
   std::uint64_t notes = 0;  // bytes
 };
-static_assert(sizeof(Header) == 288 && std::is_trivially_copyable_v<Header>);
+static_assert(sizeof(Header) == 296 && std::is_trivially_copyable_v<Header>);
 
 std::uint64_t BlocksOf(std::uint64_t records) { return (records + kBlockRecords - 1) / kBlockRecords; }
 std::uint64_t RunsOf(std::uint64_t cells) { return (cells + CellRuns::kCells - 1) / CellRuns::kCells; }
@@ -48,7 +48,8 @@ std::array<std::uint64_t, kCellFileNames.size()> CountsOf(const CellStoreFacts& 
           facts.at == ValuesAt::kPoints ? facts.points : facts.cells,
           RunsOf(facts.cells),
           CountIn(CubesOver(size, kBrick)),
-          std::uint64_t(Box{{0, 0, 0}, size}.voxel_count())};
+          std::uint64_t(Box{{0, 0, 0}, size}.voxel_count()),
+          facts.at == ValuesAt::kPoints ? facts.points : facts.cells};
 }
 
 bool IsSound(const Header& header) {
@@ -59,13 +60,16 @@ bool IsSound(const Header& header) {
          header.notes <= kMostNotesBytes;
 }
 
-struct ReadHeader {
-  CellStoreFacts facts;
-  CellStoreDigests digests;
-  std::string digest;
-};
+template <class T>
+Result<std::vector<T>> ReadAll(const Records<T>& file) {
+  std::vector<T> all(std::size_t(file.size()));
+  const Status read = file.Read(0, std::span(all));
+  return read.ok() ? Result(std::move(all)) : read;
+}
 
-Result<ReadHeader> HeaderIn(const std::string& folder) {
+}  // namespace
+
+Result<CellStoreHeader> ReadCellStoreHeader(const std::string& folder) {
   const std::string path = folder + "/header";
   const auto wrong = [&](const char* why) { return Status::DataLoss(fmt::format("'{}' {}", path, why)); };
   const Result<std::string> text = ReadTextFile(path, kMostHeaderBytes);
@@ -77,7 +81,7 @@ Result<ReadHeader> HeaderIn(const std::string& folder) {
   Header header;
   std::memcpy(&header, text->data(), sizeof header);
   if (XXH3_64bits(text->data(), end) != digest || !IsSound(header)) return wrong("is no header of a cell store of this version");
-  ReadHeader read;
+  CellStoreHeader read;
   read.digest = fmt::format("{:x}", digest);
   CellStoreFacts& facts = read.facts;
   facts.at = ValuesAt(header.at);
@@ -93,6 +97,7 @@ Result<ReadHeader> HeaderIn(const std::string& folder) {
   facts.lattice.orientation.world = World::kScene;
   facts.whole = header.whole;
   facts.points_read = header.points_read;
+  facts.geometry = header.geometry;
   facts.kinds = header.kinds;
   std::size_t at = sizeof header;
   const auto counts = CountsOf(facts);
@@ -112,15 +117,6 @@ Result<ReadHeader> HeaderIn(const std::string& folder) {
   return read;
 }
 
-template <class T>
-Result<std::vector<T>> ReadAll(const Records<T>& file) {
-  std::vector<T> all(std::size_t(file.size()));
-  const Status read = file.Read(0, std::span(all));
-  return read.ok() ? Result(std::move(all)) : read;
-}
-
-}  // namespace
-
 Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& facts, const CellStoreDigests& digests) {
   std::string notes;
   for (const std::string& note : facts.notes) notes += note + "\n";
@@ -128,6 +124,7 @@ Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& fac
                    .cells = facts.cells,
                    .at = std::uint32_t(facts.at),
                    .points_read = facts.points_read,
+                   .geometry = facts.geometry,
                    .kinds = facts.kinds,
                    .whole = facts.whole,
                    .notes = notes.size()};
@@ -189,7 +186,7 @@ StoredCells::StoredCells(std::string folder, CellStoreFacts facts, std::string d
       in_use_(std::move(in_use)) {}
 
 Result<std::shared_ptr<StoredCells>> StoredCells::Open(const std::string& folder, std::shared_ptr<const void> in_use) {
-  Result<ReadHeader> header = HeaderIn(folder);
+  Result<CellStoreHeader> header = ReadCellStoreHeader(folder);
   if (!header.ok()) return header.status();
   auto& [facts, digests, digest] = *header;
   const auto counts = CountsOf(facts);

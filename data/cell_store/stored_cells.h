@@ -7,6 +7,7 @@
 //   runs        float32 low x, y, z, high ...  what each run of 256 tetrahedra lies in (CellRuns)
 //   bricks      float32 min, max, uint32       by brick of the lattice: CellRanges
 //   voxels      float32                        the values on the lattice
+//   order       uint32                         by value: the number of its point or cell as the grid was read
 //   header      how many there are of all, and a digest of each block of each file
 //
 // Numbers are little-endian. It is read part by part; what is held of it are runs and bricks, about a byte for ten tetrahedra. A part is
@@ -60,13 +61,15 @@ struct CellStoreFacts {
   VolumeGeometry lattice;
   Bounds3 bounds;                                 // of all points that were read
   std::uint64_t points_read = 0;                  // also those of no cell
+  std::uint64_t geometry = 0;                     // a digest of points and cells as they were read, without values
   std::array<std::uint64_t, kMostKinds> kinds{};  // cells that were read, by number of CellKinds()
   ValueRange whole;                               // of all cells
   std::vector<std::string> notes;                 // a sentence each of what was left out
 };
 
-enum class CellFile : std::uint8_t { kPoints, kGradients, kCells, kValues, kRuns, kBricks, kVoxels };
-inline constexpr std::array<const char*, 7> kCellFileNames = {"points", "gradients", "cells", "values", "runs", "bricks", "voxels"};
+enum class CellFile : std::uint8_t { kPoints, kGradients, kCells, kValues, kRuns, kBricks, kVoxels, kOrder };
+inline constexpr std::array<const char*, 8> kCellFileNames = {"points", "gradients", "cells",  "values",
+                                                              "runs",   "bricks",    "voxels", "order"};
 using CellStoreDigests = std::array<std::vector<std::uint64_t>, kCellFileNames.size()>;  // by CellFile
 inline std::string PathOf(const std::string& folder, CellFile file) { return folder + "/" + kCellFileNames[std::size_t(file)]; }
 // Ends the file of this number, and keeps its digests.
@@ -76,6 +79,13 @@ Status EndCellFile(CellFile number, Records<T>& file, CellStoreDigests& digests)
   digests[std::size_t(number)] = file.digests();
   return status;
 }
+struct CellStoreHeader {
+  CellStoreFacts facts;
+  CellStoreDigests digests;
+  std::string digest;  // of all that
+};
+// DataLoss, naming the file: damaged, truncated, or of another version.
+Result<CellStoreHeader> ReadCellStoreHeader(const std::string& folder);
 Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& facts, const CellStoreDigests& digests);
 
 class StoredCells : public GridCells {

@@ -124,6 +124,18 @@ Status GridStore::Make(LoadedMesh loaded, const VolumeGeometry& lattice, const s
   for (const MeshFileInfo::CellCount& kind : loaded.info.kinds) {
     storing.kinds[std::size_t(kind.kind - CellKinds().data())] = std::uint64_t(kind.count);
   }
+  // Of the same mesh at another time, perhaps.
+  std::vector<StoreFolder::Lock> in_use;
+  std::error_code error;
+  for (fs::directory_iterator each(folder_.path(), error), end; !error && each != end; each.increment(error)) {
+    const std::string name = each->path().filename().string();
+    std::error_code none;
+    if (name == name_ || !fs::exists(each->path() / "header", none)) continue;
+    Result<StoreFolder::Lock> lock = TryLockFile(each->path().string() + ".lock", LockMode::kShared);
+    if (!lock.ok() || !folder_.IsWhole(name)) continue;
+    in_use.push_back(*std::move(lock));
+    storing.others.push_back(each->path().string());
+  }
   storing.progress = [&](double share) {
     TouchLock(*alone_);
     made(share);

@@ -172,7 +172,7 @@ TEST_F(CellStoreTest, HasThePartsOfTheGridInMemoryWhateverTheMemory) {
     }
     std::set<std::string> files;
     for (const auto& each : fs::directory_iterator(folder_)) files.insert(each.path().filename().string());
-    EXPECT_EQ(files, std::set<std::string>({"bricks", "cells", "gradients", "header", "points", "runs", "values", "voxels"}));
+    EXPECT_EQ(files, std::set<std::string>({"bricks", "cells", "gradients", "header", "order", "points", "runs", "values", "voxels"}));
     fs::remove_all(folder_);
   }
 }
@@ -184,7 +184,9 @@ TEST_F(CellStoreTest, NoticesEveryByteThatIsNotWhatWasWritten) {
     const Grid grid = SomeGrid(random, round % 2 == 1);
     ASSERT_TRUE(Store(grid, folder_, StoringOf(grid, 1 << 20)).ok());
     std::vector<fs::path> files;
-    for (const auto& each : fs::directory_iterator(folder_)) files.push_back(each.path());
+    for (const auto& each : fs::directory_iterator(folder_)) {
+      if (each.path().filename() != "order") files.push_back(each.path());  // which other stores read
+    }
     std::ranges::sort(files);
     const fs::path file = files[random.Integer<std::size_t>(0, files.size() - 1)];
     SCOPED_TRACE(file.string());
@@ -225,6 +227,52 @@ TEST_F(CellStoreTest, IsNoStoreBeforeItIsWhole) {
     fs::remove_all(folder_);
   }
   EXPECT_GT(until, 7);
+}
+
+TEST_F(CellStoreTest, SharesTheFilesOfAStoreOfTheSameMesh) {
+  Random random(304);
+  SCOPED_TRACE(random.trace());
+  const std::string first = directory_ / "first", second = directory_ / "second";
+  const auto links = [&](const char* file) { return fs::hard_link_count(fs::path(second) / file); };
+  for (int round = 0; round < 20; ++round) {
+    const bool of_cells = round % 2 == 1;
+    SCOPED_TRACE(fmt::format("round {}", round));
+    const Grid before = SomeGrid(random, of_cells);
+    Grid now = before;
+    for (float& value : now.values) value = float(random.Real(-5, 5));
+    for (MeshPoint& point : now.points) point[3] = of_cells ? 0 : random.Real(-5, 5);
+    const bool moves = round % 5 == 3, damaged = round % 5 == 4;
+    if (moves) now.points[1][0] = 0.5 * (now.points[0][0] + now.points[1][0]);
+    ASSERT_TRUE(Store(before, first, StoringOf(before, 0)).ok());
+    if (damaged) {
+      std::fstream bytes(fs::path(first) / (random.Chance(0.5) ? "cells" : "order"), std::ios::in | std::ios::out | std::ios::binary);
+      bytes.seekp(7);
+      bytes.put('\x55');
+    }
+    CellStoring storing = StoringOf(now, round % 3 == 0 ? 0 : 1 << 30);
+    storing.others = {directory_ / "none", first};
+    const Status status = Store(now, second, storing);
+    ASSERT_TRUE(status.ok()) << status.message();
+    for (const char* file : {"cells", "points", "order"}) EXPECT_EQ(links(file), moves || damaged ? 1U : 2U) << file;
+    for (const char* file : {"values", "gradients", "voxels"}) EXPECT_EQ(links(file), 1U) << file;
+    if (!damaged) {
+      const MeshCutter of_before(std::make_shared<const Mesh>(InMemory(before)));
+      EXPECT_TRUE(Same(StoredCells::Open(first).value()->CellsIn(before.lattice.bounds()).value(), of_before.Cut(before.lattice.bounds())));
+    }
+    fs::remove_all(first);
+    const MeshCutter cutter(std::make_shared<const Mesh>(InMemory(now)));
+    const auto stored = StoredCells::Open(second);
+    ASSERT_TRUE(stored.ok()) << stored.status().message();
+    for (int boxes = 0; boxes < 5; ++boxes) {
+      const Box box = boxes == 0 ? now.lattice.bounds() : SomeBox(random, now.lattice.size);
+      EXPECT_TRUE(Same((*stored)->CellsIn(box).value(), cutter.Cut(box)));
+    }
+    const Volume expected = Resample(InMemory(now), now.lattice), lattice = (*stored)->ReadLattice().value();
+    const auto count = std::size_t(now.lattice.bounds().voxel_count());
+    EXPECT_TRUE(Same(std::span(lattice.block.samples<float>(), count), std::span(expected.block.samples<float>(), count)));
+    EXPECT_EQ((*stored)->Ranges(now.lattice.size).bricks, cutter.Ranges(now.lattice.size).bricks);
+    fs::remove_all(second);
+  }
 }
 
 }  // namespace

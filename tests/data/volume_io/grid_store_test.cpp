@@ -192,6 +192,36 @@ TEST_F(GridStoreTest, IsMadeAnewIfFilesChangeOrAPartIsMissing) {
   EXPECT_FALSE(fs::exists(Stores().at(0) / "spool-cells"));
 }
 
+TEST_F(GridStoreTest, OfSeveralTimesHasTheMeshOnce) {
+  Random random(313);
+  SCOPED_TRACE(random.trace());
+  std::string times;
+  for (const int time : {0, 1, 2}) {
+    std::vector<std::string> names;
+    for (const int x : {0, 3}) {
+      VtuSpec piece = BoxOfHexahedra({x, 0, 0}, {x + 3, 4, 2}, [](const Vec3& n) { return n; });
+      for (double& value : piece.arrays[0].values) value *= time + 1;
+      names.push_back(fmt::format("t{}-{}.vtu", time, x));
+      Write(names.back(), VtuFile(piece));
+    }
+    Write(fmt::format("t{}.pvtu", time), VtkListFile("PUnstructuredGrid", names));
+    times += fmt::format("<DataSet timestep=\"{0}\" file=\"t{0}.pvtu\"/>", time);
+  }
+  const std::string path = Write("run.pvd", "<VTKFile type=\"Collection\"><Collection>" + times + "</Collection></VTKFile>");
+  for (const int time : {0, 1, 2}) {
+    const ReadOptions options = {.time = TimeRange{time, time}, .array = "height"};
+    ReadOptions keeping = options;
+    keeping.keep_cells = true;
+    const Result<LoadedVolume> held = ReadVolume(path, options), kept = ReadVolume(path, keeping);
+    ASSERT_TRUE(held.ok() && kept.ok()) << held.status().message() << kept.status().message();
+    EXPECT_EQ(held->volume->block.bytes, kept->volume->block.bytes);
+    const Box box = held->volume->block.box;
+    EXPECT_EQ(EncodeMesh(kept->cells->CellsIn(box).value()), EncodeMesh(MeshCutter(held->volume->cells).Cut(box)));
+  }
+  ASSERT_EQ(Stores().size(), 3U);
+  for (const fs::path& store : Stores()) EXPECT_EQ(fs::hard_link_count(store / "cells"), 3U);
+}
+
 TEST_F(GridStoreTest, SaysThatItsCellsAreDamaged) {
   const std::string path = Write("g.vtu", VtuFile(BoxOfHexahedra({}, {3, 3, 3}, [](const Vec3& n) { return n; })));
   const LoadedVolume kept = Read(path, "height", true).value();
