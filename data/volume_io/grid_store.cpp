@@ -149,34 +149,27 @@ Status GridStore::Make(LoadedMesh loaded, const VolumeGeometry& lattice, const s
   return Status::Ok();
 }
 
-// Counts bytes of files that are read, and as many for what is made of them. A grid that fits the memory counts nothing.
+// Counts bytes of files that are read, and as many for what is made of them.
 class GridProgress {
  public:
   GridProgress(const std::vector<std::string>& files, ReadProgress* progress) : progress_(progress) {
     std::error_code error;
-    for (const std::string& file : files) bytes_ += std::int64_t(std::filesystem::file_size(file, error));
+    for (const std::string& file : files) bytes_ += std::int64_t(fs::file_size(file, error));
+    if (progress_ != nullptr) progress_->Begin(2 * bytes_);
   }
 
-  void Begin() {
-    begun_ = true;
-    if (progress_ == nullptr) return;
-    progress_->Begin(2 * bytes_);
-    progress_->Add(read_);
-  }
   void Read(std::int64_t bytes) {
-    read_ += bytes;
-    if (begun_ && progress_ != nullptr) progress_->Add(bytes);
+    if (progress_ != nullptr) progress_->Add(bytes);
   }
   void Make(double share) {
     const auto made = std::int64_t(share * double(bytes_));
-    if (progress_ != nullptr) progress_->Add(made - made_);
+    Read(made - made_);
     made_ = made;
   }
 
  private:
   ReadProgress* const progress_;
-  std::int64_t bytes_ = 0, read_ = 0, made_ = 0;
-  bool begun_ = false;
+  std::int64_t bytes_ = 0, made_ = 0;
 };
 
 // Nothing: the store is there now.
@@ -188,7 +181,6 @@ Result<std::optional<LoadedMesh>> ReadOnce(const std::string& path, const ReadOp
   MeshSpill spill;
   if (!options.keep_cells) spill.most_bytes = std::uint64_t(std::max<std::int64_t>(AvailableMemoryBytes(), 0)) / kShare;
   spill.begin = [&]() -> Result<CellSpool> {
-    progress.Begin();
     Result<std::unique_ptr<CellSpool>> spool = store->Begin();
     if (!spool.ok()) return Status(spool.status().code(), path + ": " + spool.status().message());
     there = *spool == nullptr;

@@ -26,7 +26,7 @@ MeshOptions MeshOptionsOf(const ReadOptions& options);
 
 // Reads a grid. Its cells are stored if points and tetrahedra, as they are read, take more than a quarter of the available memory, or if
 // options.keep_cells; a store that is there is used in any case. If another process makes the same store, this waits for it. If there is no
-// cache folder, the grid must fit the memory. options.progress counts bytes of files that are read for a store, and as many for making it.
+// cache folder, the grid must fit the memory. options.progress counts bytes of files that are read, and as many for making a store.
 // Errors of ReadMesh, StoreCells and StoreFolder. Unavailable: there is no room, in one line that says how many bytes are needed; or the
 // files change meanwhile. Any thread.
 Result<Grid> ReadGrid(const std::string& path, const ReadOptions& options);
