@@ -1,4 +1,6 @@
 """A generated unstructured grid for benchmarks: cubes of a unit cube, each split into six tetrahedra, with jittered points and a smooth field."""
+import os
+
 import numpy as np
 
 JITTER = 0.15  # of a cube's side, to either side; more may turn tetrahedra inside out
@@ -19,15 +21,23 @@ TRANSFER = [{"Name": "waves", "ColorSpace": "RGB",
              "Points": [-1, 0.1, 0.5, 0, -0.2, 0, 0.5, 0, 0.2, 0, 0.5, 0, 1, 0.1, 0.5, 0]}]
 
 
-def make(count, seed):
-    """About `count` tetrahedra: points (n, 3) and values (n) as float32, and the points of each tetrahedron (m, 4) as int64."""
-    n = max(1, round((count / 6) ** (1 / 3)))  # cubes a side
-    z, y, x = np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij")
+def cubes_a_side(count):
+    """Of a grid of about `count` tetrahedra."""
+    return max(1, round((count / 6) ** (1 / 3)))
+
+
+def make(count, seed, layers=None):
+    """About `count` tetrahedra: points (n, 3) and values (n) as float32, and the points of each tetrahedron (m, 4) as int64. `layers`:
+    (begin, end) of the cubes along z that are made; None: all."""
+    n = cubes_a_side(count)
+    begin, end = layers or (0, n)
+    z, y, x = np.meshgrid(np.arange(begin, end + 1), np.arange(n + 1), np.arange(n + 1), indexing="ij")
     places = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     inner = (places > 0) & (places < n)  # what lies in a side of the cube stays in it
-    moved = np.random.default_rng(seed).uniform(-JITTER, JITTER, places.shape) * inner
-    points = ((places + moved) / n).astype(np.float32)
-    first = np.arange((n + 1) ** 3).reshape([n + 1] * 3)[:n, :n, :n].ravel()
+    # Each layer of points by itself, so that pieces have the same.
+    moved = np.concatenate([np.random.default_rng([seed, layer]).uniform(-JITTER, JITTER, ((n + 1) ** 2, 3)) for layer in range(begin, end + 1)])
+    points = ((places + moved * inner) / n).astype(np.float32)
+    first = np.arange((end - begin + 1) * (n + 1) ** 2).reshape([end - begin + 1, n + 1, n + 1])[:-1, :n, :n].ravel()
     corners = first[:, None] + np.array([i + j * (n + 1) + k * (n + 1) ** 2 for k in (0, 1) for j in (0, 1) for i in (0, 1)])
     tetrahedra = corners[:, SPLIT].reshape(-1, 4)
     a, b, c, d = (points[tetrahedra[:, i]].astype(np.float64) for i in range(4))
@@ -36,9 +46,25 @@ def make(count, seed):
     return points, field(points).astype(np.float32), tetrahedra
 
 
-def write(path, count, seed):
+def write_pieces(path, count, seed, pieces):
+    """A .pvtu and its pieces beside it, layers of the grid along z. Returns how many tetrahedra there are."""
+    n = cubes_a_side(count)
+    names, total = [], 0
+    for piece in range(pieces):
+        names.append(f"{os.path.splitext(os.path.basename(path))[0]}-{piece}.vtu")
+        layers = (n * piece // pieces, n * (piece + 1) // pieces)
+        total += write(os.path.join(os.path.dirname(path), names[-1]), count, seed, layers)
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write('<?xml version="1.0"?>\n<VTKFile type="PUnstructuredGrid" version="1.0" byte_order="LittleEndian">\n<PUnstructuredGrid>\n'
+                     '<PPointData Scalars="field"><PDataArray type="Float32" Name="field"/></PPointData>\n'
+                     '<PPoints><PDataArray type="Float32" Name="Points" NumberOfComponents="3"/></PPoints>\n'
+                     + "".join(f'<Piece Source="{name}"/>\n' for name in names) + "</PUnstructuredGrid>\n</VTKFile>\n")
+    return total
+
+
+def write(path, count, seed, layers=None):
     """VTK's XML format, appended raw. Returns how many tetrahedra there are."""
-    points, values, tetrahedra = make(count, seed)
+    points, values, tetrahedra = make(count, seed, layers)
     arrays = [("PointData", values, 'type="Float32" Name="field"'), ("Points", points, 'type="Float32" Name="Points" NumberOfComponents="3"'),
               ("Cells", tetrahedra.astype("<i8"), 'type="Int64" Name="connectivity"'),
               ("Cells", np.arange(4, 4 * len(tetrahedra) + 1, 4, dtype="<i8"), 'type="Int64" Name="offsets"'),

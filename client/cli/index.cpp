@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -9,6 +10,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
+#include "common/files/store_folder.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/catalogue.h"
 #include "data/open/open_source.h"
@@ -16,6 +18,7 @@
 #include "data/stores/object_cache.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace {
@@ -37,6 +40,29 @@ Result<BrickIndex> Begun(const IndexFile& file, const std::string& name, const S
   return EmptyIndex(info);  // none, or that of other files, or a damaged one: it is replaced
 }
 
+bool IsGrid(const SourceText& source) {
+  const VolumeFormat* const format = FindFormat(source.path, source.options);
+  return format != nullptr && std::ranges::find(format->options, "lattice") != format->options.end();
+}
+
+// A grid has no index, but its cells in order on disk.
+Status KeepCells(const IndexingOptions& options, SourceText source, std::uint64_t memory) {
+  ProgressBar bar(options.progress, 1);
+  ReadProgress progress([&](const ReadShare& read) {
+    bar.Show(read.percent / 100.0, fmt::format("sorting the cells of {}: {} %", source.path, read.percent));
+  });
+  source.options.headers_only = false;
+  source.options.keep_cells = true;
+  source.options.progress = &progress;
+  const Result<StoreFolder> folder = StoreFolder::Usual();
+  if (!folder.ok()) return folder.status();
+  const Result<std::shared_ptr<VolumeSource>> opened = Open(source, memory);
+  if (!opened.ok()) return opened.status();
+  bar.Clear();
+  std::cout << fmt::format("keeps the cells of {} in {}\n", options.source, folder->path());
+  return Status::Ok();
+}
+
 }  // namespace
 
 Status RunIndex(const IndexingOptions& options) {
@@ -48,6 +74,7 @@ Status RunIndex(const IndexingOptions& options) {
   if (Status status = CheckInputVolume(*source); !status.ok()) return status;
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsualMemory;
   LimitMemory(memory);
+  if (IsGrid(*source)) return KeepCells(options, *std::move(source), memory);
   const Result<std::shared_ptr<VolumeSource>> opened = Open(*source, memory);
   if (!opened.ok()) return opened.status();
   const SourceInfo& info = (*opened)->info();

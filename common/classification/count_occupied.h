@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/classification/classification_table.h"
-#include "common/mesh/mesh.h"
+#include "common/mesh/mesh_part.h"
 #include "common/volume/bricks.h"
 #include "common/volume/occupancy_grid.h"
 
@@ -16,5 +16,6 @@ OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable
 // bounding box of a cell that may be visible, because an opacity between the cell's least and greatest value is above
 // zero. A cell with a value that is not finite is invisible. Parallel, with the same result for any number of threads.
 OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table);
+Result<OccupancyGrid> CountOccupiedByCells(const GridCells& cells, const VolumeDescription& lattice, const ClassificationTable& table);
 
 }  // namespace slabstream

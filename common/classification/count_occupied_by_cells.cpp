@@ -61,16 +61,31 @@ class VoxelBits {
   std::vector<std::atomic<OccupancyLayer>> layers_;  // by cell, kOccupancyCell each
 };
 
-}  // namespace
-
-OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table) {
+// visit(add) calls add(mesh) for all parts of the grid.
+template <class Visit>
+Result<OccupancyGrid> Count(const VolumeDescription& lattice, const ClassificationTable& table, Visit&& visit) {
   CHECK(lattice.mapping == ValueMapping{});
   const VisibleRanges visible(table);
   VoxelBits voxels(lattice.geometry.size);
-  ParallelFor(0, mesh.tetrahedra.size(), [&](std::size_t cell) {
-    if (visible(ValuesIn(mesh, cell))) voxels.Set(VoxelsTouched(BoundsOf(mesh, cell), lattice.geometry.size));
+  const Status visited = visit([&](const Mesh& mesh) {
+    ParallelFor(0, mesh.tetrahedra.size(), [&](std::size_t cell) {
+      if (visible(ValuesIn(mesh, cell))) voxels.Set(VoxelsTouched(BoundsOf(mesh, cell), lattice.geometry.size));
+    });
   });
-  return voxels.Count();
+  return visited.ok() ? Result(voxels.Count()) : visited;
+}
+
+}  // namespace
+
+OccupancyGrid CountOccupiedByCells(const Mesh& mesh, const VolumeDescription& lattice, const ClassificationTable& table) {
+  return *Count(lattice, table, [&](auto&& add) {
+    add(mesh);
+    return Status::Ok();
+  });
+}
+
+Result<OccupancyGrid> CountOccupiedByCells(const GridCells& cells, const VolumeDescription& lattice, const ClassificationTable& table) {
+  return Count(lattice, table, [&](auto&& add) { return cells.Visit(add); });
 }
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "common/mesh/mesh_cell.h"
@@ -12,7 +13,12 @@ namespace slabstream {
 
 class CellRuns {
  public:
+  static constexpr std::size_t kCells = 256;  // of a run
+
   explicit CellRuns(const Mesh& mesh);  // parallel
+
+  // What the cells of each run lie in.
+  std::span<const CellBounds> bounds() const { return runs_; }
 
   // Calls function(cell, its bounds) for the cells of the mesh whose bounds touch `space`, by ascending number. The mesh is the one that
   // the runs were made of.
@@ -30,7 +36,6 @@ class CellRuns {
   std::size_t bytes() const { return runs_.capacity() * sizeof(runs_[0]); }
 
  private:
-  static constexpr std::size_t kCells = 256;
   std::vector<CellBounds> runs_;
 };
 

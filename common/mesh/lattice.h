@@ -6,12 +6,15 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "common/mesh/mesh.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
+
+class CellRuns;
 
 inline constexpr std::int32_t kMaxLatticeSide = 1024;  // voxels
 
@@ -31,6 +34,9 @@ VolumeGeometry LatticeOf(const Bounds3& bounds, std::int64_t cells, std::optiona
 // Moves points from the world, measured from bounds.low, to data space of the lattice: [-0.5, size - 0.5] along each axis.
 void MoveToLattice(const VolumeGeometry& lattice, Mesh& mesh);
 
+// Where along the curve by which SortByPlace sorts each tetrahedron lies; those with the same place keep their order. Parallel.
+std::vector<std::uint32_t> PlacesOf(const Mesh& mesh, const VolumeGeometry& lattice);
+
 // Orders tetrahedra and points so that what is near in space is near in memory. Points of no tetrahedron are dropped. Parallel, with the
 // same result for any number of threads.
 void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh);
@@ -39,5 +45,10 @@ void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh);
 // their faces; of several cells that contain a centre it is the one with the highest number that counts. Flat cells contain nothing.
 // Parallel, with the same result for any number of threads.
 Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice);
+
+// The same of a grid whose cells are given part by part: the empty lattice, then the cells of each part in the order of the whole grid.
+// `runs`: of `mesh`.
+Volume EmptyLattice(const VolumeGeometry& lattice);
+void FillLattice(const Mesh& mesh, const CellRuns& runs, Volume& volume);
 
 }  // namespace slabstream

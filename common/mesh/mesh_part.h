@@ -1,31 +1,56 @@
 // Parts of a grid: the cells that touch a box, as they are cut out and sent.
+//
+// A grid's cells are in memory (MeshCutter), or in files if they are too many for that (StoredCells, data/cell_store).
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base/status.h"
 #include "common/mesh/cell_runs.h"
 #include "common/mesh/mesh.h"
+#include "common/mesh/summarize_cells.h"
 #include "common/volume/box.h"
 
 namespace slabstream {
 
-// Cuts out the cells of boxes. Any thread.
-class MeshCutter {
+// All cells of a grid. Any thread. Errors are those of files: Unavailable, DataLoss; ResourceExhausted.
+class GridCells {
  public:
-  explicit MeshCutter(std::shared_ptr<const Mesh> mesh);
+  virtual ~GridCells() = default;
 
   // The cells whose bounding boxes touch the space of the box's voxels, [begin - 0.5, end - 0.5] along each axis, and their points. Both
   // keep their order, so what depends on the order of points or cells is the same in every part. So are the gradients at the points, which
-  // are those of the whole mesh.
-  Mesh Cut(const Box& box) const;
+  // are those of the whole grid.
+  virtual Result<Mesh> CellsIn(const Box& box) const = 0;
+  // Calls function(part) for parts that have all cells, each once. They need not have gradients.
+  virtual Status Visit(const std::function<void(const Mesh&)>& function) const = 0;
+  // Of a lattice of this size, on which the grid lies.
+  virtual CellRanges Ranges(const Index3& size) const = 0;
+  virtual std::string Digest() const = 0;   // of all that CellsIn may return
+  virtual std::uint64_t bytes() const = 0;  // memory
+};
 
-  const Mesh& mesh() const { return *mesh_; }
-  // Memory, with the mesh.
-  std::size_t bytes() const { return mesh_->bytes() + gradients_.capacity() * sizeof(gradients_[0]) + runs_.bytes(); }
+// The cells of a mesh with gradients whose bounding boxes touch a space, as of GridCells::CellsIn.
+Mesh CellsTouching(const Mesh& mesh, const CellBounds& space);
+
+// Those of a mesh in memory.
+class MeshCutter : public GridCells {
+ public:
+  explicit MeshCutter(std::shared_ptr<const Mesh> mesh);
+
+  Mesh Cut(const Box& box) const;  // CellsIn
+
+  Result<Mesh> CellsIn(const Box& box) const override { return Cut(box); }
+  Status Visit(const std::function<void(const Mesh&)>& function) const override;
+  CellRanges Ranges(const Index3& size) const override { return RangesOf(*mesh_, size); }
+  std::string Digest() const override;
+  std::uint64_t bytes() const override { return mesh_->bytes() + gradients_.capacity() * sizeof(gradients_[0]) + runs_.bytes(); }
 
  private:
   std::shared_ptr<const Mesh> mesh_;

@@ -43,50 +43,71 @@ CellGradient GradientOf(const Mesh& mesh, const Tetrahedron& t, const auto& valu
 
 bool IsSeen(const Mesh& mesh, std::size_t cell) { return ValuesIn(mesh, cell) != kNoFiniteValue; }
 
-// The mean values of points. Points of no tetrahedron that is seen have the value 0.
-std::vector<double> ValuesAtPoints(const Mesh& mesh) {
-  std::vector<double> sums(mesh.points.size()), volumes(mesh.points.size());
+// `number_of`: a point's number in the grid.
+void AddCellValues(const Mesh& mesh, const auto& number_of, MeansOfCells<double>& means) {
   for (std::size_t cell = 0; cell < mesh.tetrahedra.size(); ++cell) {
     if (!IsSeen(mesh, cell)) continue;
     const double volume = VolumeOf(mesh, mesh.tetrahedra[cell]);
-    for (const PointNumber point : mesh.tetrahedra[cell]) {
-      sums[point] += volume * double(mesh.values[cell]);
-      volumes[point] += volume;
-    }
+    for (const PointNumber point : mesh.tetrahedra[cell]) means.Add(number_of(point), volume * double(mesh.values[cell]), volume);
   }
-  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = volumes[i] > 0 ? sums[i] / volumes[i] : 0;
-  return sums;
 }
 
-AlignedVector<Vector3<float>> GradientsOf(const Mesh& mesh, const auto& values) {
-  std::vector<Vec3> gradients(mesh.points.size());
-  std::vector<double> volumes(mesh.points.size());
+void AddCellGradients(const Mesh& mesh, const auto& values, const auto& number_of, MeansOfCells<Vec3>& means) {
   for (std::size_t cell = 0; cell < mesh.tetrahedra.size(); ++cell) {
     if (!IsSeen(mesh, cell)) continue;
     const CellGradient gradient = GradientOf(mesh, mesh.tetrahedra[cell], values);
-    for (const PointNumber point : mesh.tetrahedra[cell]) {
-      gradients[point] = gradients[point] + gradient.by_volume;
-      volumes[point] += gradient.volume;
-    }
+    for (const PointNumber point : mesh.tetrahedra[cell]) means.Add(number_of(point), gradient.by_volume, gradient.volume);
   }
+}
+
+constexpr auto kOwnNumber = [](PointNumber point) { return point; };
+
+double MeanOf(double sum, double volume) { return volume > 0 ? sum / volume : 0; }
+Vec3 MeanOf(const Vec3& sum, double volume) {
+  const Vec3 mean = volume > 0 ? (1 / volume) * sum : Vec3{};
+  return std::isfinite(Length(mean)) ? mean : Vec3{};
+}
+
+}  // namespace
+
+template <class Sum>
+std::vector<Sum> MeansOfCells<Sum>::Take() {
+  for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] = MeanOf(sums_[i], volumes_[i]);
+  return std::move(sums_);
+}
+template class MeansOfCells<double>;
+template class MeansOfCells<Vec3>;
+
+namespace {
+
+AlignedVector<Vector3<float>> GradientsOf(const Mesh& mesh, const auto& values) {
+  MeansOfCells<Vec3> means(0, PointNumber(mesh.points.size()));
+  AddCellGradients(mesh, values, kOwnNumber, means);
+  const std::vector<Vec3> gradients = means.Take();
   double longest = 0;
-  for (std::size_t i = 0; i < gradients.size(); ++i) {
-    gradients[i] = volumes[i] > 0 ? (1 / volumes[i]) * gradients[i] : Vec3{};
-    if (!std::isfinite(Length(gradients[i]))) gradients[i] = {};
-    longest = std::max(longest, Length(gradients[i]));
-  }
+  for (const Vec3& gradient : gradients) longest = std::max(longest, Length(gradient));
   AlignedVector<Vector3<float>> shares(gradients.size());
-  if (!(longest > 0)) return shares;
-  std::ranges::transform(gradients, shares.begin(), [&](const Vec3& g) {
-    return Vector3<float>{float(g.x / longest), float(g.y / longest), float(g.z / longest)};
-  });
+  std::ranges::transform(gradients, shares.begin(), [&](const Vec3& gradient) { return ShareOf(gradient, longest); });
   return shares;
 }
 
 }  // namespace
 
+void AddValues(const Mesh& part, std::span<const PointNumber> numbers, MeansOfCells<double>& values) {
+  AddCellValues(
+      part, [&](PointNumber point) { return numbers[point]; }, values);
+}
+
+void AddGradients(const Mesh& part, std::span<const PointNumber> numbers, std::span<const double> values, MeansOfCells<Vec3>& gradients) {
+  AddCellGradients(
+      part, values, [&](PointNumber point) { return numbers[point]; }, gradients);
+}
+
 AlignedVector<Vector3<float>> PointGradients(const Mesh& mesh) {
-  return mesh.at == ValuesAt::kPoints ? GradientsOf(mesh, mesh.values) : GradientsOf(mesh, ValuesAtPoints(mesh));
+  if (mesh.at == ValuesAt::kPoints) return GradientsOf(mesh, mesh.values);
+  MeansOfCells<double> values(0, PointNumber(mesh.points.size()));
+  AddCellValues(mesh, kOwnNumber, values);
+  return GradientsOf(mesh, values.Take());
 }
 
 }  // namespace slabstream

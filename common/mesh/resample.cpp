@@ -129,22 +129,30 @@ void FillCell(const Mesh& mesh, std::size_t cell, const CellBounds& bounds, cons
 
 }  // namespace
 
-Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice) {
+Volume EmptyLattice(const VolumeGeometry& lattice) {
   Volume volume;
   volume.description = {lattice, ScalarType::kFloat32, {}};
   volume.block = MakeVoxelBlock(lattice.bounds(), ScalarType::kFloat32);
-  const CellRuns runs(mesh);
-  const Index3 size = lattice.size, bricks = CubesOver(size, kBrick);
+  const Index3& size = lattice.size;
+  ParallelFor(0, size.z, [&](std::int32_t z) {
+    std::fill_n(volume.block.samples<float>() + volume.block.Offset({0, 0, z}), std::size_t(size.x) * std::size_t(size.y), kNothing);
+  });
+  return volume;
+}
+
+void FillLattice(const Mesh& mesh, const CellRuns& runs, Volume& volume) {
+  const Box& bounds = volume.block.box;
+  const Index3 size = bounds.end, bricks = CubesOver(size, kBrick);
   ParallelFor(0, bricks.y * bricks.z, [&](std::int32_t row) {
     const Index3 begin = kBrick * Index3{0, row % bricks.y, row / bricks.y};
-    const Box box = Intersection({begin, {size.x, begin.y + kBrick, begin.z + kBrick}}, lattice.bounds());
-    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
-      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
-        std::fill_n(volume.block.samples<float>() + volume.block.Offset({0, y, z}), size.x, kNothing);
-      }
-    }
-    runs.Visit(mesh, SpaceOf(box), [&](std::size_t cell, const CellBounds& bounds) { FillCell(mesh, cell, bounds, box, volume.block); });
+    const Box box = Intersection({begin, {size.x, begin.y + kBrick, begin.z + kBrick}}, bounds);
+    runs.Visit(mesh, SpaceOf(box), [&](std::size_t cell, const CellBounds& of_cell) { FillCell(mesh, cell, of_cell, box, volume.block); });
   });
+}
+
+Volume Resample(const Mesh& mesh, const VolumeGeometry& lattice) {
+  Volume volume = EmptyLattice(lattice);
+  FillLattice(mesh, CellRuns(mesh), volume);
   return volume;
 }
 

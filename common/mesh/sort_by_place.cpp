@@ -58,6 +58,13 @@ void RenumberPoints(Mesh& mesh) {
 
 }  // namespace
 
+std::vector<std::uint32_t> PlacesOf(const Mesh& mesh, const VolumeGeometry& lattice) {
+  CHECK(std::max({lattice.size.x, lattice.size.y, lattice.size.z}) <= kMaxLatticeSide);
+  std::vector<std::uint32_t> places(mesh.tetrahedra.size());
+  ParallelFor(0, places.size(), [&](std::size_t cell) { places[cell] = PlaceOf(mesh, mesh.tetrahedra[cell], lattice.size); });
+  return places;
+}
+
 void SortByPlace(const VolumeGeometry& lattice, Mesh& mesh) {
   CHECK(std::max({lattice.size.x, lattice.size.y, lattice.size.z}) <= kMaxLatticeSide);
   const std::size_t count = mesh.tetrahedra.size();

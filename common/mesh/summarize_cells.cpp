@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "common/base/check.h"
@@ -15,48 +14,9 @@
 namespace slabstream {
 namespace {
 
-// Any range widens it.
-constexpr ValueRange kUnmet = {std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest()};
-
 void Widen(ValueRange& range, const ValueRange& by) {
   range.min = std::min(range.min, by.min);
   range.max = std::max(range.max, by.max);
-}
-
-// What one thread finds.
-struct MacrocellRanges {
-  ValueRange whole = kUnmet;
-  std::vector<ValueRange> bricks;
-  std::vector<std::uint32_t> cells;  // by brick
-};
-
-MacrocellRanges RangesOf(const Mesh& mesh, const Index3& size) {
-  const Index3 counts = CubesOver(size, kBrick);
-  const MacrocellRanges none{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet), std::vector<std::uint32_t>(CountIn(counts))};
-  PerThread<MacrocellRanges> parts;
-  ParallelForRanges(0, mesh.tetrahedra.size(), 1, [&](std::size_t first_cell, std::size_t end_cell) {
-    MacrocellRanges& part = parts.Mine([&] { return none; });
-    for (std::size_t cell = first_cell; cell < end_cell; ++cell) {
-      const ValueRange values = ValuesIn(mesh, cell);
-      if (values.min > values.max) continue;
-      Widen(part.whole, values);
-      const CellBounds bounds = BoundsOf(mesh, cell);
-      Index3 centre;
-      for (int axis = 0; axis < 3; ++axis) {
-        centre[axis] = std::clamp(std::int32_t(std::lround((double(bounds.low[axis]) + double(bounds.high[axis])) / 2)), 0, size[axis] - 1);
-      }
-      ++part.cells[NumberIn(counts, centre / kBrick)];
-      const Box bricks = CubesTouched(VoxelsTouched(bounds, size), kBrick);
-      for (const Index3& brick : IndicesIn(bricks)) Widen(part.bricks[NumberIn(counts, brick)], values);
-    }
-  });
-  MacrocellRanges all = none;
-  parts.ForEach([&](const MacrocellRanges& part) {
-    Widen(all.whole, part.whole);
-    for (std::size_t brick = 0; brick < all.bricks.size(); ++brick) Widen(all.bricks[brick], part.bricks[brick]);
-    std::ranges::transform(all.cells, part.cells, all.cells.begin(), std::plus<>());
-  });
-  return all;
 }
 
 using Histogram = std::array<std::uint64_t, kHistogramBins>;
@@ -82,15 +42,45 @@ VolumeSummary WithCells(VolumeSummary summary, const Volume& volume) {
 
 }  // namespace
 
-void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary) {
+void CellRanges::Add(const CellRanges& other) {
+  Widen(whole, other.whole);
+  for (std::size_t brick = 0; brick < bricks.size(); ++brick) Widen(bricks[brick], other.bricks[brick]);
+  std::ranges::transform(counts, other.counts, counts.begin(), std::plus<>());
+}
+
+CellRanges RangesOf(const Mesh& mesh, const Index3& size) {
+  const Index3 counts = CubesOver(size, kBrick);
+  const CellRanges none{kUnmetRange, std::vector<ValueRange>(CountIn(counts), kUnmetRange), std::vector<std::uint32_t>(CountIn(counts))};
+  PerThread<CellRanges> parts;
+  ParallelForRanges(0, mesh.tetrahedra.size(), 1, [&](std::size_t first_cell, std::size_t end_cell) {
+    CellRanges& part = parts.Mine([&] { return none; });
+    for (std::size_t cell = first_cell; cell < end_cell; ++cell) {
+      const ValueRange values = ValuesIn(mesh, cell);
+      if (values.min > values.max) continue;
+      Widen(part.whole, values);
+      const CellBounds bounds = BoundsOf(mesh, cell);
+      Index3 centre;
+      for (int axis = 0; axis < 3; ++axis) {
+        centre[axis] = std::clamp(std::int32_t(std::lround((double(bounds.low[axis]) + double(bounds.high[axis])) / 2)), 0, size[axis] - 1);
+      }
+      ++part.counts[NumberIn(counts, centre / kBrick)];
+      const Box bricks = CubesTouched(VoxelsTouched(bounds, size), kBrick);
+      for (const Index3& brick : IndicesIn(bricks)) Widen(part.bricks[NumberIn(counts, brick)], values);
+    }
+  });
+  CellRanges all = none;
+  parts.ForEach([&](const CellRanges& part) { all.Add(part); });
+  return all;
+}
+
+void SummarizeCells(CellRanges cells, const Volume& resampled, VolumeSummary& summary) {
   CHECK(summary.description.type == ScalarType::kFloat32 && summary.description.mapping == ValueMapping{});
-  MacrocellRanges found = RangesOf(mesh, summary.description.geometry.size);
-  if (found.whole.min <= found.whole.max) summary.range = found.whole;
-  for (std::size_t brick = 0; brick < found.bricks.size(); ++brick) {
+  if (cells.whole.min <= cells.whole.max) summary.range = cells.whole;
+  for (std::size_t brick = 0; brick < cells.bricks.size(); ++brick) {
     // All voxels have values of cells that touch them, between the values at the points.
-    if (found.bricks[brick].min <= found.bricks[brick].max) summary.bricks[brick] = found.bricks[brick];
+    if (cells.bricks[brick].min <= cells.bricks[brick].max) summary.bricks[brick] = cells.bricks[brick];
   }
-  summary.cells = std::move(found.cells);
+  summary.cells = std::move(cells.counts);
   summary.histogram = HistogramOf(resampled, summary.range);
 }
 

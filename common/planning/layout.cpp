@@ -10,6 +10,7 @@
 #include "common/planning/measured_cost.h"
 #include "common/planning/other_bricks.h"
 #include "common/planning/unread_parts.h"
+#include "common/planning/worker_memory.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
@@ -19,7 +20,7 @@ namespace {
 constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 
 // The smallest boxes that make sense hold three times as many voxels as they own, halo included: slabs of as many slices as the halo is
-// thick, cubes of this many voxels a side.
+// thick, cubes of this many voxels a side. Those of grids may be bricks: their cells count more than voxels.
 constexpr std::int64_t kSmallestCube = 36;
 
 // How many units along each axis cover so many voxels.
@@ -28,9 +29,9 @@ Index3 UnitsOver(const Index3& size, const Index3& unit) { return (size - Unifor
 int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
-  const std::int64_t boxes = policy.decomposition->one_axis
-                                 ? size[policy.axis] / std::max(request.volume->renderer()->reach(), 1)
-                                 : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
+  const std::int64_t cube = request.summary->cells.empty() ? kSmallestCube : kBrick;
+  const std::int64_t boxes = policy.decomposition->one_axis ? size[policy.axis] / std::max(request.volume->renderer()->reach(), 1)
+                                                            : Box{{0, 0, 0}, size}.voxel_count() / (cube * cube * cube);
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
 }
 
@@ -246,7 +247,8 @@ struct LayoutMaker::State {
   bool BoxesFit(const Partition& partition) {
     const auto sample_bytes = std::int64_t(BytesPerSample(request.summary->description.type));
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
-      const std::int64_t bytes = Grown(box, request.volume->renderer()->reach(), partition.bounds()).voxel_count() * sample_bytes;
+      const Box padded = Grown(box, request.volume->renderer()->reach(), partition.bounds());
+      const std::int64_t bytes = padded.voxel_count() * sample_bytes + BoxBytesOfCells(padded, *request.summary);
       return bytes <= request.box_bytes_target || !fields.Shows(box);
     });
   }

@@ -18,8 +18,10 @@ namespace slabstream {
 namespace {
 
 // A tetrahedron and its share of points: 20 as it arrives, 20 as it is kept, and 40 for what slicing makes of it (64 bytes a point, 12 a
-// tetrahedron, 8 for each tile of the picture that it reaches into).
+// tetrahedron, 8 for each tile of the picture that it reaches into). Of a box that is being read, only the first two are there: so two
+// boxes take 120, which is a third of what BoxBytesFor counts threefold.
 constexpr std::uint64_t kBytesACell = 80;
+constexpr std::uint64_t kBoxBytesACell = 40;
 
 // Bytes that the renderer derives from a byte of voxels, at most.
 double DerivedShare(const FrameSetup& setup) { return ReadsInParts(setup) ? setup.renderer->derived_from_stored() : 1; }
@@ -36,13 +38,14 @@ void VisitBricks(const Box& padded, const VolumeSummary& summary, Function&& fun
     function(NumberIn(summary.brick_counts, brick), grid.BoxOf(brick));
 }
 
-// Of the cells of an unstructured grid in the bricks that the padded box touches.
-std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) {
+// The cells of an unstructured grid in the bricks that the padded box touches.
+std::uint64_t CellsIn(const Box& padded, const VolumeSummary& summary) {
   if (padded.empty() || summary.cells.empty()) return 0;
   std::uint64_t cells = 0;
   VisitBricks(padded, summary, [&](std::size_t brick, const Box&) { cells += summary.cells[brick]; });
-  return kBytesACell * cells;
+  return cells;
 }
+std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) { return kBytesACell * CellsIn(padded, summary); }
 
 // Those of other fields, and what is derived from them.
 std::uint64_t FieldBytes(const Placement& placement, const FrameSetup& setup) {
@@ -135,15 +138,21 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double
   return bytes + BytesOfCells(padded, summary);
 }
 
+std::int64_t BoxBytesOfCells(const Box& padded, const VolumeSummary& summary) {
+  return std::int64_t(kBoxBytesACell * CellsIn(padded, summary));
+}
+
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
-  if (limit == 0) return kBoxBytesTarget;
+  // Cells are cut at borders of boxes, and drawn for both: fewer boxes draw fewer.
+  const std::int64_t most = setup.cells ? 4 * kBoxBytesTarget : kBoxBytesTarget;
+  if (limit == 0) return most;
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
   const std::uint64_t taken = IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
   const double boxes = (2 + DerivedShare(setup)) * BytesWithFields(setup);  // of that which is being read nothing is derived yet
   const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
-  return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
+  return std::min(most, std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {

@@ -32,9 +32,12 @@ std::uint64_t PictureBytes(const FrameSetup& setup);
 std::uint64_t LightBytes(const FrameSetup& setup);
 // `derived_share`: bytes that are derived from a byte of voxels.
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share);
+// What cells of an unstructured grid add to the voxels of a padded box, as BoxBytesFor counts them. 0: it is none.
+std::int64_t BoxBytesOfCells(const Box& padded, const VolumeSummary& summary);
 
-// Most bytes of the volume's voxels in a padded box with which a worker of this limit (0: none) can hold two boxes of a frame at a time,
-// those of other fields beside them, so that it reads one while it renders the other: kBoxBytesTarget or less, in few different sizes.
+// Most bytes of the volume's voxels, and BoxBytesOfCells, in a padded box with which a worker of this limit (0: none) can hold two boxes of
+// a frame at a time, those of other fields beside them, so that it reads one while it renders the other: kBoxBytesTarget or less (of grids
+// four times as much), in few different sizes.
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit);
 
 // A worker that has a part in a frame, and its limit in bytes; 0: it has stated none.

@@ -13,9 +13,7 @@ namespace slabstream {
 namespace {
 
 // The worker with the least memory decides: any box may come to it after a loss.
-std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
-  return std::min(kBoxBytesTarget, BoxBytesFor(setup, request.worker_memory));
-}
+std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) { return BoxBytesFor(setup, request.worker_memory); }
 
 // Each field as it is drawn beside the finest level.
 ShownFields AtOneLevel(ShownFields fields) {

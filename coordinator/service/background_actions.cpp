@@ -82,10 +82,11 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
   if (samples.in_parts.source != nullptr) return Status::Unavailable("the voxels of a dataset that is read in parts are not counted");
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
-  OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
-                                                     : count(samples.view(), drawn);
-  AddBricks(OtherBricks(*action.summary, action.volume), *action.summary, grid);
-  return std::make_shared<const OccupancyGrid>(std::move(grid));
+  Result<OccupancyGrid> grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(*samples.cells, action.summary->description, drawn)
+                                                             : count(samples.view(), drawn);
+  if (!grid.ok()) return grid.status();
+  AddBricks(OtherBricks(*action.summary, action.volume), *action.summary, *grid);
+  return std::make_shared<const OccupancyGrid>(*std::move(grid));
 }
 
 // Makes the event that ends an action: what names the action, then the result or the error.
@@ -142,14 +143,16 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
   const std::shared_ptr<const Volume>& volume = loaded.volume;
   VoxelServer::Samples samples;
-  VolumeSummary found = SummaryOf(*volume);
+  samples.cells = loaded.cells;
+  if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
+  VolumeSummary found = Summarize(*volume);
+  if (samples.cells != nullptr) SummarizeCells(samples.cells->Ranges(found.description.geometry.size), *volume, found);
   if (action.source.statistics != nullptr || !loaded.other_times.empty()) samples.own = std::make_shared<const VolumeSummary>(found);
   found = OverTimes(std::move(found), loaded.other_times);
   if (action.source.statistics != nullptr) found = WithStatistics(std::move(found), *action.source.statistics);
   found.labels = loaded.labels;
   auto summary = std::make_shared<const VolumeSummary>(std::move(found));
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
-  if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
   if (!held && MostBricksAreEqual(*summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
@@ -157,7 +160,7 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   }
   samples.exact = loaded.exact;
   samples.description = volume->description;
-  const DatasetId id = IdOf(action.name, *volume, loaded.labels.get(), loaded.exact.get());
+  const DatasetId id = IdOf(action.name, *volume, loaded.labels.get(), loaded.exact.get(), samples.cells.get());
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file),
                             loaded.source},

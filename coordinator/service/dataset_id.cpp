@@ -5,18 +5,12 @@
 #include <algorithm>
 #include <span>
 
-#include "common/mesh/mesh.h"
+#include "common/mesh/mesh_part.h"
 #include "common/wire/digest.h"
 
 namespace slabstream {
 
 namespace {
-
-std::string OfCells(const Mesh& mesh) {
-  const auto digest = [](const auto& array) { return Digest(std::as_bytes(std::span(array))); };
-  return fmt::format(" cells {} {} {} {:x} {:x} {:x}", mesh.points.size(), mesh.tetrahedra.size(), int(mesh.at), digest(mesh.points),
-                     digest(mesh.tetrahedra), digest(mesh.values));
-}
 
 std::string OfDescription(const VolumeDescription& description) {
   const auto& [geometry, type, mapping] = description;
@@ -35,7 +29,7 @@ DatasetId IdOf(const std::string& name, const VolumeDescription& description, co
   return IdOf(fmt::format("{} {} {} {:x} {}", OfDescription(description), stored.source, stored.level, stored.version, name));
 }
 
-DatasetId IdOf(const std::string& name, const Volume& volume, const LabelTable* labels, const ExactSamples* exact) {
+DatasetId IdOf(const std::string& name, const Volume& volume, const LabelTable* labels, const ExactSamples* exact, const GridCells* cells) {
   std::string of_labels;
   for (const Label& label : labels == nullptr ? std::vector<Label>() : labels->labels) {
     of_labels += fmt::format(" {} {} {} {} {}", label.value, label.color[0], label.color[1], label.color[2], label.name);
@@ -43,7 +37,7 @@ DatasetId IdOf(const std::string& name, const Volume& volume, const LabelTable* 
   const std::string text =
       fmt::format("{} {} {:x} {}", OfDescription(volume.description), volume.block.bytes.size(), Digest(volume.block.bytes), name) +
       (exact == nullptr ? "" : fmt::format(" {:x}", Digest(exact->bytes))) + of_labels +
-      (volume.cells == nullptr ? "" : OfCells(*volume.cells));
+      (cells == nullptr ? "" : " cells " + cells->Digest());
   return IdOf(text);
 }
 

@@ -113,26 +113,58 @@ Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& 
   return Bytes(std::move(cut));
 }
 
-Bytes VoxelServer::CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box) {
+void VoxelServer::AnswerCells(Asked asked, std::shared_ptr<const GridCells> cells) {
+  const Box box = asked.request.box;
   kept_cells_.DropIf([](const auto& entry) { return entry.value.of.expired(); });
-  if (const KeptCells* found = kept_cells_.Find({cells.get(), box})) return found->bytes;
-  Bytes bytes(EncodeMesh(cells->Cut(box)));
-  const std::size_t size = bytes.size();
-  const KeptCells& piece = kept_cells_.Put({cells.get(), box}, {cells, std::move(bytes)}, size);
-  kept_cells_.DropBeyond(kMostKept);
-  return piece.bytes;
+  if (const KeptCells* found = kept_cells_.Find({cells.get(), box})) return ReplyCells(asked, found->bytes);
+  std::vector<Asked>& waiting = awaits_cells_[{cells.get(), box}];
+  if (std::ranges::any_of(waiting, [&](const Asked& other) { return other.IsSame(asked); })) return;
+  waiting.push_back(asked);
+  if (waiting.size() > 1) return;
+  const Status begun = Guarded("cells of a box", [&] {
+    cuts_.Post(asked.request.dataset, [inbox = read_, cells, box] {
+      auto cut = Guarded("cells of a box", [&]() -> Result<Bytes> {
+        const Result<Mesh> part = cells->CellsIn(box);
+        return part.ok() ? Result(Bytes(EncodeMesh(*part))) : part.status();
+      });
+      inbox->Post(CellsCut{cells, box, std::move(cut)});
+    });
+  });
+  if (begun.ok()) return;
+  awaits_cells_.erase({cells.get(), box});
+  Reply(asked.identity, asked.request, begun);
 }
 
-Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
-  const Bytes all = CellsIn(samples.cells, request.box);
-  const std::uint64_t begin = BeginOfCellChunk(request.chunk);
-  if (begin >= all.size()) {
-    return Status::InvalidArgument(
-        fmt::format("chunk request: chunk {} of cells is not below {}", request.chunk - kFirstCellChunk, CellChunkCount(all.size())));
+void VoxelServer::OnCut(CellsCut cut) {
+  const auto waiting = awaits_cells_.extract({cut.of.get(), cut.box});
+  if (cut.bytes.ok()) {
+    kept_cells_.Put({cut.of.get(), cut.box}, {cut.of, *cut.bytes}, cut.bytes->size());
+    kept_cells_.DropBeyond(kMostKept);
   }
-  chunk.cell_bytes = all.size();
-  const auto owner = std::make_shared<const Bytes>(all);
-  return Bytes(owner, all.span().subspan(begin, BytesOfCellChunk(all.size(), request.chunk)));
+  for (const Asked& asked : waiting.mapped()) {
+    if (cut.bytes.ok()) {
+      ReplyCells(asked, *cut.bytes);
+    } else {
+      Reply(asked.identity, asked.request, cut.bytes.status());
+    }
+  }
+}
+
+void VoxelServer::ReplyCells(const Asked& asked, const Bytes& cells) {
+  const ChunkRequest& request = asked.request;
+  Reply(asked.identity, request, Guarded("a chunk of cells", [&]() -> Result<std::pair<Chunk, Bytes>> {
+          const std::uint64_t begin = BeginOfCellChunk(request.chunk);
+          if (begin >= cells.size()) {
+            return Status::InvalidArgument(fmt::format("chunk request: chunk {} of cells is not below {}", request.chunk - kFirstCellChunk,
+                                                       CellChunkCount(cells.size())));
+          }
+          Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+          chunk.cell_bytes = cells.size();
+          const auto owner = std::make_shared<const Bytes>(cells);
+          Bytes part(owner, cells.span().subspan(begin, BytesOfCellChunk(cells.size(), request.chunk)));
+          Bytes payload = PackChunk(std::move(part), codec_, chunk);
+          return std::pair(chunk, std::move(payload));
+        }));
 }
 
 Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
@@ -160,10 +192,15 @@ void VoxelServer::Run(const std::stop_token& stop) {
     guarded([&] {
       Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
       for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
-      for (ReadDone& done : read_->TakeAll()) {
-        --reads_.at(done.asked->request.dataset).begun;
-        guarded([&] { Reply(done.asked->identity, done.asked->request, std::move(done.answer)); });
-        guarded([&] { ReadNext(done.asked->request.dataset); });
+      for (Done& done : read_->TakeAll()) {
+        if (auto* const cut = std::get_if<CellsCut>(&done)) {
+          guarded([&] { OnCut(std::move(*cut)); });
+          continue;
+        }
+        auto& read = std::get<ReadDone>(done);
+        --reads_.at(read.asked->request.dataset).begun;
+        guarded([&] { Reply(read.asked->identity, read.asked->request, std::move(read.answer)); });
+        guarded([&] { ReadNext(read.asked->request.dataset); });
       }
       while (!stop.stop_requested()) {
         const std::optional<Incoming> incoming = socket_.TryReceive();
@@ -190,18 +227,16 @@ void VoxelServer::Answer(const Incoming& incoming) {
   if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
   if (samples.in_parts.source != nullptr) {
     std::deque<Asked>& waiting = reads_[request.dataset].waiting;
-    const auto is_same = [&](const Asked& asked) { return asked.identity == incoming.identity && asked.request == request; };
-    if (std::ranges::none_of(waiting, is_same)) waiting.push_back({incoming.identity, request, samples.in_parts});
+    const Asked asked = {incoming.identity, request, samples.in_parts};
+    if (std::ranges::none_of(waiting, [&](const Asked& other) { return other.IsSame(asked); })) waiting.push_back(asked);
     return ReadNext(request.dataset);
   }
+  if (IsCellChunk(request.chunk)) return AnswerCells({incoming.identity, request}, samples.cells);
   Reply(incoming.identity, request, Guarded("chunk request", [&]() -> Result<std::pair<Chunk, Bytes>> {
           Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
           if (samples.read_from != nullptr) chunk.stored_bytes = samples.read_from->TakeStoredBytes();
-          Result<Bytes> cut = IsCellChunk(request.chunk)
-                                  ? CutCells(samples, request, chunk)
-                                  : Cut(samples, request.box, PartOfChunk(request.box, samples.types().samples, request.chunk));
-          if (!cut.ok()) return cut.status();
-          Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
+          Bytes cut = Cut(samples, request.box, PartOfChunk(request.box, samples.types().samples, request.chunk));
+          Bytes payload = PackChunk(std::move(cut), codec_, chunk);
           return std::pair(chunk, std::move(payload));
         }));
 }
@@ -223,7 +258,7 @@ void VoxelServer::ReadNext(DatasetId dataset) {
         Bytes payload = PackChunk(*std::move(samples), codec, chunk);
         return std::pair(chunk, std::move(payload));
       });
-      inbox->Post({asked, std::move(answer)});
+      inbox->Post(ReadDone{asked, std::move(answer)});
     };
     const Status begun =
         Guarded("a chunk of voxels", [&] { ReadPart(asked->from.source, asked->from.level, request.box, part.begin, part.bytes, done); });

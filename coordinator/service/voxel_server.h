@@ -1,8 +1,9 @@
 // VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
 // volumes.
 //
-// Of a source that is read in parts, it reads a chunk when somebody asks for it, kReadAtOnce chunks of a dataset at a time. Other requests
-// do not wait for them, so a store that does not answer holds up its own dataset alone.
+// Of a source that is read in parts, it reads a chunk when somebody asks for it, kReadAtOnce chunks of a dataset at a time. Cells of a box
+// are cut out, or read, box by box of a dataset. Other requests do not wait for either, so a store that does not answer holds up its own
+// dataset alone.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
 // refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,
@@ -18,6 +19,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/base/check.h"
@@ -32,6 +34,7 @@
 #include "common/volume/bricks.h"
 #include "common/volume/sample_types.h"
 #include "common/wire/any_message.h"
+#include "coordinator/service/fair_tasks.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -44,7 +47,7 @@ class VoxelServer {
   struct Samples {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
-    std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
+    std::shared_ptr<const GridCells> cells = nullptr;     // the cells of an unstructured grid
     std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
     struct InParts {
@@ -104,30 +107,39 @@ class VoxelServer {
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
-  // The bytes of the cells in `box`, which is not empty, as EncodeMesh makes them.
-  Bytes CellsIn(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
-  // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
-  Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
   static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
 
   struct Asked {
     std::string identity;
     ChunkRequest request;
-    Samples::InParts from;
+    Samples::InParts from = {};
+
+    bool IsSame(const Asked& other) const { return identity == other.identity && request == other.request; }
   };
   struct ReadDone {
     std::shared_ptr<const Asked> asked;
     Result<std::pair<Chunk, Bytes>> answer;
   };
+  // The cells of a box, which is not empty, as EncodeMesh makes them.
+  struct CellsCut {
+    std::shared_ptr<const GridCells> of;
+    Box box;
+    Result<Bytes> bytes;
+  };
+  // Replies if the cells of the box are at hand, or else once they are.
+  void AnswerCells(Asked asked, std::shared_ptr<const GridCells> cells);
+  void ReplyCells(const Asked& asked, const Bytes& cells);
+  void OnCut(CellsCut cut);
+
   static constexpr std::size_t kReadAtOnce = 32;  // chunks of a dataset, which are in memory until they are sent
   struct Reads {                                  // the reads of a dataset
-    std::deque<Asked> waiting;                    // no two alike
+    std::deque<Asked> waiting;                    // no two the same
     std::size_t begun = 0;                        // and not ended
   };
 
   static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes of cells; those that were cut last stay in any case
   struct KeptCells {
-    std::weak_ptr<const MeshCutter> of;  // a dataset that is gone takes no memory
+    std::weak_ptr<const GridCells> of;  // a dataset that is gone takes no memory
     Bytes bytes;
   };
 
@@ -135,15 +147,18 @@ class VoxelServer {
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, Samples> samples_;                             // guarded by mutex_
-  std::map<DatasetId, DatasetId> light_volume_of_;                   // by LightVolumeOf; guarded by mutex_
-  std::vector<std::string> unwanted_;                                // users whose connections are to end; guarded by mutex_
-  LruMap<std::pair<const MeshCutter*, Box>, KeptCells> kept_cells_;  // a box is asked for chunk by chunk; the thread's
-  LimitedLog complaints_;                                            // the thread's
-  std::map<DatasetId, Reads> reads_;                                 // the thread's
-  const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
-  Socket socket_;                                                                          // the thread's
-  std::jthread thread_;                                                                    // last member
+  std::map<DatasetId, Samples> samples_;                                         // guarded by mutex_
+  std::map<DatasetId, DatasetId> light_volume_of_;                               // by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;                                            // users whose connections are to end; guarded by mutex_
+  LruMap<std::pair<const GridCells*, Box>, KeptCells> kept_cells_;               // a box is asked for chunk by chunk; the thread's
+  std::map<std::pair<const GridCells*, Box>, std::vector<Asked>> awaits_cells_;  // that are being cut, no two the same; the thread's
+  FairTasks cuts_{2};                                                            // by dataset, so that one box of each is cut at a time
+  LimitedLog complaints_;                                                        // the thread's
+  std::map<DatasetId, Reads> reads_;                                             // the thread's
+  using Done = std::variant<ReadDone, CellsCut>;
+  const std::shared_ptr<Mailbox<Done>> read_ = std::make_shared<Mailbox<Done>>();  // reads and cuts may outlive this
+  Socket socket_;                                                                  // the thread's
+  std::jthread thread_;                                                            // last member
 };
 
 }  // namespace slabstream

@@ -14,7 +14,7 @@
 #include <string>
 
 #include "common/base/status.h"
-#include "data/brick_store/store_folder.h"
+#include "common/files/store_folder.h"
 #include "data/sources/read_context.h"
 #include "data/sources/volume_source.h"
 

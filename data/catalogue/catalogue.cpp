@@ -293,7 +293,12 @@ Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, c
   WarnOfComponents(text, read->info);
   Result<std::shared_ptr<const LabelTable>> labels = KnownLabels(text, label_colors, read->info, read->volume.get());
   if (!labels.ok()) return labels.status();
-  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(labels), nullptr, std::move(read->exact)});
+  return ReadableSource(LoadedSource{.file = std::move(read->info),
+                                     .volume = std::move(read->volume),
+                                     .labels = *std::move(labels),
+                                     .stamp = nullptr,
+                                     .exact = std::move(read->exact),
+                                     .cells = std::move(read->cells)});
 }
 
 // Other processes may run in other folders.

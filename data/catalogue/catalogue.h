@@ -88,6 +88,7 @@ struct LoadedSource {
   std::shared_ptr<const ExactSamples> exact = {};  // the whole numbers that the volume rounds; null: it rounds none
   std::vector<VolumeSummary> other_times = {};     // SurveyOtherTimes
   std::shared_ptr<VolumeSource> source = {};       // null: it can only be read in one order or as a whole, or a function has loaded it
+  std::shared_ptr<const GridCells> cells = {};     // LevelInMemory::cells
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

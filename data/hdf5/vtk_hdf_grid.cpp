@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -89,10 +90,21 @@ class GridReader {
       : file_(std::move(file)), options_(options), context_(std::make_shared<ReadContext>(ReadContext::Limits{})) {}
 
   Result<RawVolume> Read() {
+    if (Status status = ChooseTime(); !status.ok()) return status;
+    const auto files = [this] { return std::vector{file_->path()}; };
+    Result<RawVolume> raw = GridVolume(file_->path(), options_, {files, [this](const MeshOptions& of) { return ReadMesh(of); }});
+    if (!raw.ok()) return raw;
+    raw->header.times = times_;
+    raw->header.number = step_;
+    return raw;
+  }
+
+ private:
+  Result<LoadedMesh> ReadMesh(MeshOptions options) {
     const Result<std::vector<Block>> blocks = Blocks();
     if (!blocks.ok()) return blocks.status();
-    if (Status status = ChooseTime(); !status.ok()) return status;
-    MeshOptions options = MeshOptionsOf(options_);
+    builder_ = MeshBuilder();
+    array_.reset();
     options.array = VtkHdfArrayName(options_.dataset);
     for (const Block& block : *blocks) {
       if (!array_) {
@@ -102,20 +114,17 @@ class GridReader {
         if (!chosen.ok()) return chosen.status();
         array_ = (*arrays)[*chosen];
       }
-      if (options_.headers_only) break;
+      if (options.headers_only) break;
       if (Status status = ReadBlock(block); !status.ok()) return status;
     }
-    Result<LoadedMesh> grid = options_.headers_only ? builder_.TakeHeaders() : builder_.Finish(file_->path());
-    if (!grid.ok()) return grid.status();
+    Result<LoadedMesh> grid = options.headers_only ? builder_.TakeHeaders() : builder_.Finish(file_->path());
+    if (!grid.ok()) return grid;
+    std::error_code error;
+    if (options.read) options.read(std::int64_t(std::filesystem::file_size(file_->path(), error)));
     grid->info.format = "VTKHDF";
-    Result<RawVolume> raw = GridVolume(file_->path(), *std::move(grid), options_);
-    if (!raw.ok()) return raw;
-    raw->header.times = times_;
-    raw->header.number = step_;
-    return raw;
+    return grid;
   }
 
- private:
   Result<std::vector<Block>> Blocks() const {
     const std::string root(kRoot), type = VtkHdfType(*file_);
     if (type == kGrid) return std::vector{Block(file_, root, context_)};

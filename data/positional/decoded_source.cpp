@@ -183,6 +183,7 @@ class DecodedSource : public VolumeSource {
     volume->description.mapping = {stored.mapping.scale, stored.mapping.FromStored(kept.shift)};
     volume->block = {volume->description.geometry.bounds(), kept.type, std::move(kept.bytes)};
     volume->cells = std::move(raw->cells);
+    level_in_memory.cells = std::move(raw->stored_cells);
     level_in_memory.volume = std::move(volume);
     return level_in_memory;
   } catch (const std::bad_alloc&) {

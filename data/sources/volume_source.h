@@ -33,6 +33,7 @@
 
 namespace slabstream {
 
+class GridCells;  // common/mesh/mesh_part.h
 struct FileStamp;
 
 struct SourceLevel {
@@ -96,7 +97,8 @@ struct LevelInMemory {
   std::shared_ptr<const Volume> volume;
   // As they are stored, turned as the volume's, as far as they are wanted; null: those of the volume are exact or were not wanted.
   std::shared_ptr<const ExactSamples> exact = {};
-  std::string rounding = {};  // what float32 has rounded, for people (RoundingText); "": nothing
+  std::string rounding = {};                         // what float32 has rounded, for people (RoundingText); "": nothing
+  std::shared_ptr<const GridCells> cells = nullptr;  // of an unstructured grid, if they do not fit the memory; else the volume has them
 };
 struct LevelWanted {
   bool all_exact = false;  // exact samples of each type that float32 may round; else of whole numbers of which it rounds one

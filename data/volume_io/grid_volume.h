@@ -1,4 +1,5 @@
-// Unstructured and curvilinear grids as volumes: their values on a lattice, and their cells beside them.
+// Unstructured and curvilinear grids as volumes: their values on a lattice, and their cells beside them, or if they do not fit the memory
+// in a cell store (grid_store.h).
 //
 // Any thread.
 #pragma once
@@ -6,16 +7,13 @@
 #include <string>
 
 #include "common/base/status.h"
-#include "data/volume_io/mesh_reader.h"
+#include "data/volume_io/grid_store.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 
-// How the reader of a grid is to read it. Whoever describes one takes the first component, unless there is a choice.
-MeshOptions MeshOptionsOf(const ReadOptions& options);
-
-// What VolumeFormat::read gives for the grid that was read with MeshOptionsOf(options). `path`: for errors. ResourceExhausted: it does not
-// fit the memory.
-Result<RawVolume> GridVolume(const std::string& path, LoadedMesh grid, const ReadOptions& options);
+// What VolumeFormat::read gives for the grid at `path`. Errors of ReadGrid; ResourceExhausted: it does not fit the memory.
+Result<RawVolume> GridVolume(const std::string& path, const ReadOptions& options, const GridFormat& format);
 
 }  // namespace slabstream

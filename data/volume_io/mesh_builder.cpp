@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <span>
 
@@ -25,6 +26,7 @@ Result<std::size_t> MeshBuilder::SetArrays(const std::string& path, std::vector<
   if (!chosen.ok()) return chosen.status();
   info.array = *chosen;
   info.channel = options.channel;
+  spill_ = options.spill;
   result_.mesh.at = info.arrays[*chosen].at;
   if (const int components = info.arrays[*chosen].components;
       options.channel == kMagnitude && (components == 2 || components == kMostVectorComponents)) {
@@ -47,23 +49,27 @@ float MeshBuilder::ValueOf(std::size_t element) const {
 }
 
 Status MeshBuilder::BeginPiece(const std::string& where, MeshPiece piece) {
+  if (Status status = EndPiece(); !status.ok()) return status;
   where_ = where;
   piece_ = std::move(piece);
   next_ = 0;
   const std::size_t count = piece_.places.size() / 3;
-  if (const auto all = std::int64_t(points_.all().size() + count); all > kMaxMeshPoints) {
+  if (const auto all = std::int64_t(points_.size() + count); all > kMaxMeshPoints) {
     return Status::ResourceExhausted(fmt::format("{}: with it the grid has {} points, must be at most {}", where, all, kMaxMeshPoints));
   }
   const auto bytes = std::int64_t(count * (kBytesPerMeshPoint + sizeof(PointNumber)));
   if (Status status = CheckFitsMemory(bytes, where + ": its points"); !status.ok()) return status;
-  points_.BeginPiece(count);
+  if (Status status = points_.BeginPiece(count); !status.ok()) return status;
   numbers_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double* const place = piece_.places.data() + 3 * i;
     if (!(std::isfinite(place[0]) && std::isfinite(place[1]) && std::isfinite(place[2]))) {
       return Status::InvalidArgument(fmt::format("{}: point {} is not finite", where, i));
     }
-    numbers_[i] = points_.Add({place[0], place[1], place[2], result_.mesh.at == ValuesAt::kPoints ? double(ValueOf(i)) : 0});
+    const Result<PointNumber> number =
+        points_.Add({place[0], place[1], place[2], result_.mesh.at == ValuesAt::kPoints ? double(ValueOf(i)) : 0});
+    if (!number.ok()) return number.status();
+    numbers_[i] = *number;
   }
   piece_.places = {};
   return Status::Ok();
@@ -105,9 +111,10 @@ Status MeshBuilder::Reserve(const CellKind& kind, std::int64_t cells) {
     return Status::ResourceExhausted(
         fmt::format("{}: with its cells the grid has {} tetrahedra, must be at most {}", where_, reserved_, kMaxTetrahedra));
   }
-  if (std::size_t(reserved_) <= mesh.tetrahedra.capacity()) return Status::Ok();
+  const std::size_t needed = std::size_t(reserved_) - (result_.spool ? std::size_t(result_.spool->cells.size()) : 0);
+  if (needed <= mesh.tetrahedra.capacity()) return Status::Ok();
   // More than is needed, if pieces follow each other.
-  const std::size_t count = std::max(std::size_t(reserved_), mesh.tetrahedra.size() * 3 / 2);
+  const std::size_t count = std::max(needed, mesh.tetrahedra.size() * 3 / 2);
   const Status status = CheckFitsMemory(std::int64_t(count * (sizeof(Tetrahedron) + sizeof(float))), where_ + ": tetrahedra of its cells");
   if (!status.ok()) return status;
   mesh.tetrahedra.reserve(count);
@@ -148,32 +155,62 @@ Status MeshBuilder::AddCells(const WholeNumbers& kinds, const WholeNumbers& corn
   return Status::Ok();
 }
 
+Status MeshBuilder::EndPiece() {
+  auto& [info, bounds, mesh, spool] = result_;
+  const AlignedVector<MeshPoint>& points = points_.held();
+  for (std::size_t i = counted_ - (points_.size() - points.size()); i < points.size(); ++i, ++counted_) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double place = points[i][std::size_t(axis)];
+      bounds.low[axis] = counted_ == 0 ? place : std::min(bounds.low[axis], place);
+      bounds.high[axis] = counted_ == 0 ? place : std::max(bounds.high[axis], place);
+    }
+  }
+  if (spill_ == nullptr) return Status::Ok();
+  if (!spool) {
+    constexpr std::uint64_t kBytesACell = sizeof(Tetrahedron) + sizeof(float);
+    if (points.size() * kBytesPerMeshPoint + mesh.tetrahedra.size() * kBytesACell <= spill_->most_bytes) return Status::Ok();
+    Result<CellSpool> begun = spill_->begin();
+    if (!begun.ok()) return begun.status();
+    spool = std::make_shared<CellSpool>(*std::move(begun));
+  }
+  if (Status status = points_.MoveTo(spool->points); !status.ok()) return status;
+  if (Status status = spool->cells.Append(std::span<const Tetrahedron>(mesh.tetrahedra)); !status.ok()) return status;
+  if (mesh.at == ValuesAt::kCells) {
+    if (Status status = spool->values.Append(std::span<const float>(mesh.values)); !status.ok()) return status;
+  }
+  reserved_ = std::int64_t(spool->cells.size());
+  mesh.tetrahedra.clear();
+  mesh.values.clear();
+  return Status::Ok();
+}
+
 Result<LoadedMesh> MeshBuilder::Finish(const std::string& path) {
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
-  auto& [info, bounds, mesh] = result_;
+  if (Status status = EndPiece(); !status.ok()) return status;
+  auto& [info, bounds, mesh, spool] = result_;
   const std::string left_out = fmt::format("{} cells are left out, which the file calls ghosts, refined or hidden", left_out_);
   if (left_out_ > 0) info.notes.push_back(left_out);
-  if (mesh.tetrahedra.empty()) return wrong("has no cells with a volume" + (left_out_ > 0 ? "; " + left_out : ""));
+  if (mesh.tetrahedra.empty() && (!spool || spool->cells.size() == 0))
+    return wrong("has no cells with a volume" + (left_out_ > 0 ? "; " + left_out : ""));
   piece_ = {};
   numbers_ = {};
-  const AlignedVector<MeshPoint>& points = points_.all();
-  info.points = std::int64_t(points.size());
+  const AlignedVector<MeshPoint>& points = points_.held();
+  info.points = std::int64_t(points_.size());
   for (std::size_t i = 0; i < counts_.size(); ++i) {
     info.cells += counts_[i];
     if (counts_[i] > 0) info.kinds.push_back({&CellKinds()[i], counts_[i]});
-  }
-  bounds.low = bounds.high = {points[0][0], points[0][1], points[0][2]};
-  for (const MeshPoint& point : points) {
-    for (int axis = 0; axis < 3; ++axis) {
-      bounds.low[axis] = std::min(bounds.low[axis], point[std::size_t(axis)]);
-      bounds.high[axis] = std::max(bounds.high[axis], point[std::size_t(axis)]);
-    }
   }
   const Vec3 extent = bounds.high - bounds.low;
   for (const Axis axis : kAxes) {
     if (extent[axis] >= kLeastExtent && extent[axis] <= kMostExtent) continue;
     return wrong(
         fmt::format("its points reach over {} along {}, must be in [{}, {}]", extent[axis], Letter(axis), kLeastExtent, kMostExtent));
+  }
+  if (spool) {
+    for (const Status& status : {spool->points.Flush(), spool->cells.Flush(), spool->values.Flush()}) {
+      if (!status.ok()) return status;
+    }
+    return std::move(result_);
   }
   const auto bytes = std::int64_t(points.size() * (sizeof(mesh.points[0]) + sizeof(float)));
   if (Status status = CheckFitsMemory(bytes, path + ": its points"); !status.ok()) return status;

@@ -63,18 +63,22 @@ class MeshBuilder {
   // What is known before any piece was read.
   LoadedMesh TakeHeaders() { return std::move(result_); }
   // `path`: of the whole grid, for errors. InvalidArgument: no cell has a volume; an extent that is too small or too large.
-  // ResourceExhausted.
+  // ResourceExhausted. Errors of MeshSpill.
   Result<LoadedMesh> Finish(const std::string& path);
 
  private:
   Status Damaged(const std::string& why) const { return Status::DataLoss(where_ + ": " + why); }
   float ValueOf(std::size_t element) const;  // of the piece
+  // Once a piece has ended: moves all to the spool if it is too much for the memory.
+  Status EndPiece();
 
   LoadedMesh result_;
+  const MeshSpill* spill_ = nullptr;  // null: there is none
   MeshPoints points_;
   std::vector<std::int64_t> counts_ = std::vector<std::int64_t>(CellKinds().size());  // of cells, by kind
   std::int64_t left_out_ = 0;                                                         // cells
-  std::int64_t reserved_ = 0;                                                         // tetrahedra
+  std::int64_t reserved_ = 0;                                                         // tetrahedra, those in the spool too
+  std::size_t counted_ = 0;                                                           // points within result_.bounds
   // Of the piece.
   std::string where_;
   MeshPiece piece_;

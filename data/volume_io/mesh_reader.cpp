@@ -15,6 +15,10 @@ bool LooksLikeMesh(const std::string& path) {
   return kind == "UNSTRUCTURED_GRID" || kind == "STRUCTURED_GRID";
 }
 
+Result<std::vector<std::string>> FilesOfMesh(const std::string& path) {
+  return VtkLegacyFile::KindOf(path) ? std::vector<std::string>{path} : FilesOfVtkXmlGrid(path);
+}
+
 Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options) {
   return VtkLegacyFile::KindOf(path) ? ReadVtkLegacyGrid(path, options) : ReadVtkXmlGrid(path, options);
 }

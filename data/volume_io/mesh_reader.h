@@ -10,6 +10,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +20,7 @@
 #include "common/base/status.h"
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh.h"
+#include "data/cell_store/cell_spool.h"
 #include "data/volume_io/grid_arrays.h"
 #include "data/volume_io/read_options.h"
 
@@ -38,10 +41,19 @@ struct MeshFileInfo {
   std::vector<std::filesystem::path> other_files = {};  // that were read beside the path
 };
 
+// Where a grid goes that does not fit the memory, piece by piece.
+struct MeshSpill {
+  std::uint64_t most_bytes = 0;              // of points and tetrahedra as they are read, that may be in memory after a piece
+  std::function<Result<CellSpool>()> begin;  // called once, when there are more
+};
+
 struct LoadedMesh {
   MeshFileInfo info;
-  Bounds3 bounds;  // the bounds of the points, in the world
-  Mesh mesh;       // its points are in the world, from bounds.low
+  Bounds3 bounds;                              // the bounds of the points, in the world
+  Mesh mesh;                                   // its points are in the world, from bounds.low; empty if they are in the spool
+  std::shared_ptr<CellSpool> spool = nullptr;  // null: they are in memory
+
+  std::uint64_t tetrahedra() const { return spool == nullptr ? mesh.tetrahedra.size() : spool->cells.size(); }
 };
 
 struct MeshOptions {
@@ -51,15 +63,21 @@ struct MeshOptions {
   std::optional<int> channel = {};
   // Checks what can be checked without points, cells and values; the mesh has none then, and no bounds.
   bool headers_only = false;
+  const MeshSpill* spill = nullptr;                   // null: the grid must fit the memory
+  std::function<void(std::int64_t bytes)> read = {};  // told the bytes of each file that was read; null: nobody asks
 };
 
 inline constexpr std::array<std::string_view, 8> kXmlGridEndings = {".vtu", ".pvtu", ".vts", ".pvts", ".vtm", ".vtmb", ".vtpd", ".vtpc"};
+
+// `path`, and the files that it names. Errors of ReadVtkList, and of lists that are no grids.
+Result<std::vector<std::string>> FilesOfMesh(const std::string& path);
 
 // By its ending; a legacy VTK file by what it says of its dataset.
 bool LooksLikeMesh(const std::string& path);
 
 // NotFound (no such file), InvalidArgument (no unstructured grid, no such array, cells of another kind, a point that is not finite),
 // DataLoss (truncated, damaged, cells of points that there are not), ResourceExhausted (does not fit the memory). Messages name the path.
+// Errors of `options.spill`.
 Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options = {});
 
 }  // namespace slabstream

@@ -25,6 +25,8 @@
 
 namespace slabstream {
 
+class GridCells;  // common/mesh/mesh_part.h
+
 inline constexpr int kMaxComponents = 1024;  // components of a voxel
 
 struct RawHeader {
@@ -77,8 +79,9 @@ struct RawVolume {
   AlignedVector<std::byte> bytes;  // this machine's byte order; none if only headers were read
   // The cells of an unstructured grid, in data space of the volume, which is not turned or straightened.
   std::shared_ptr<const Mesh> cells;
-  bool size_unknown = false;                       // headers alone do not tell it
-  std::vector<std::filesystem::path> other_files;  // beside the path that is read, or the folder of many
+  std::shared_ptr<const GridCells> stored_cells = nullptr;  // instead, those of a grid that does not fit the memory
+  bool size_unknown = false;                                // headers alone do not tell it
+  std::vector<std::filesystem::path> other_files;           // beside the path that is read, or the folder of many
 };
 
 // Steps along the axes themselves.

@@ -69,6 +69,7 @@ struct ReadOptions {
   // What users cannot say.
   std::shared_ptr<Store> store;      // the store at the address, opened with these options; null: the path tells
   bool describe = false;             // without `time`, a source of several volumes opens the first one
+  bool keep_cells = false;           // of a grid: its cells go to a cell store, even if they fit the memory
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
   ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };

@@ -1,5 +1,7 @@
 // Unstructured and curvilinear grids of VTK.
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "data/volume_io/formats.h"
 #include "data/volume_io/grid_volume.h"
@@ -8,10 +10,7 @@
 namespace slabstream {
 namespace {
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  Result<LoadedMesh> grid = ReadMesh(path, MeshOptionsOf(options));
-  return grid.ok() ? GridVolume(path, *std::move(grid), options) : grid.status();
-}
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) { return GridVolume(path, options, VtkGrid(path)); }
 
 }  // namespace
 

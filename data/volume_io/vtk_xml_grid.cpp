@@ -129,6 +129,8 @@ class XmlGridReader {
     for (const GridFile& file : files_.grids()) {
       if (Status status = ReadFile(file); !status.ok()) return status;
       if (options_.headers_only && array_) break;
+      std::error_code error;
+      if (options_.read) options_.read(std::int64_t(std::filesystem::file_size(file.path, error)));
     }
     if (!array_) {
       const std::string why = "has no piece with points and cells in it";
@@ -257,6 +259,12 @@ class XmlGridReader {
 };
 
 }  // namespace
+
+Result<std::vector<std::string>> FilesOfVtkXmlGrid(const std::string& path) {
+  GridFiles files(path);
+  const Status found = files.Find();
+  return found.ok() ? Result(files.paths()) : found;
+}
 
 Result<LoadedMesh> ReadVtkXmlGrid(const std::string& path, const MeshOptions& options) { return XmlGridReader(path, options).Read(); }
 

@@ -328,9 +328,10 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const Result<ChosenGrid> chosen = ChooseGrid(path, options);
   if (!chosen.ok()) return chosen.status();
   XdmfArrays arrays(std::make_shared<ReadContext>(ReadContext::Limits{}));
-  Result<LoadedMesh> grid = ReadXdmfMesh(*chosen->document, chosen->pieces, MeshOptionsOf(options), arrays);
-  if (!grid.ok()) return grid.status();
-  Result<RawVolume> raw = GridVolume(path, *std::move(grid), options);
+  Result<RawVolume> raw =
+      GridVolume(path, options,
+                 {.files = [&] { return FilesOfXdmfMesh(*chosen->document, chosen->pieces, arrays); },
+                  .read = [&](const MeshOptions& of) { return ReadXdmfMesh(*chosen->document, chosen->pieces, of, arrays); }});
   if (!raw.ok()) return raw;
   raw->header.times = chosen->at_time.times;
   raw->header.number = chosen->at_time.time;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <set>
@@ -41,8 +42,8 @@ struct Cells {
 
 class MeshPieceReader {
  public:
-  MeshPieceReader(XdmfDocument& document, const XdmfElement& grid, XdmfArrays& arrays, std::set<std::string>& files)
-      : document_(document), grid_(grid), arrays_(arrays), files_(files) {}
+  MeshPieceReader(XdmfDocument& document, const XdmfElement& grid, XdmfArrays& arrays)
+      : document_(document), grid_(grid), arrays_(arrays) {}
 
   // Reads what says how many points and cells there are.
   Status ReadSizes() {
@@ -72,6 +73,21 @@ class MeshPieceReader {
       if (item.elements() != numbers) return document_.Wrong(*geometry_, "has other numbers of x, y and z");
     }
     return IsCurvilinear() ? ReadGridPoints() : ReadCellCount();
+  }
+
+  // Of numbers that are not in the XML.
+  Status AddFiles(std::set<std::string>& files) {
+    const auto add = [&](const XdmfItem& item) {
+      if (!item.file.empty()) files.insert(item.file);
+    };
+    add(corners_);
+    std::ranges::for_each(places_, add);
+    const Result<std::vector<XdmfAttribute>> attributes = Attributes();
+    if (!attributes.ok()) return attributes.status();
+    for (const XdmfAttribute& attribute : *attributes) {
+      if (const Result<XdmfItem> item = ItemOf(document_, *attribute.element); item.ok()) add(*item);
+    }
+    return Status::Ok();
   }
 
   Result<std::vector<XdmfAttribute>> Attributes() {
@@ -182,7 +198,6 @@ class MeshPieceReader {
 
   template <class T>
   Result<AlignedVector<T>> Numbers(const XdmfItem& item, std::uint64_t most) {
-    if (!item.file.empty()) files_.insert(item.file);
     if (Status status = document_.Spend(item.text.size() / 8); item.format == XdmfItem::Format::kText && !status.ok()) return status;
     return arrays_.ReadNumbers<T>(item, most);
   }
@@ -245,7 +260,6 @@ class MeshPieceReader {
   XdmfDocument& document_;
   const XdmfElement& grid_;
   XdmfArrays& arrays_;
-  std::set<std::string>& files_;
   const XdmfElement* topology_ = nullptr;
   const XdmfElement* geometry_ = nullptr;
   std::vector<XdmfItem> places_;
@@ -264,16 +278,28 @@ Result<bool> IsXdmfMesh(XdmfDocument& document, const XdmfElement& grid) {
          std::ranges::any_of(kCells, [&](const CellName& cell) { return cell.vtk_type != 0 && cell.name == type; });
 }
 
+Result<std::vector<std::string>> FilesOfXdmfMesh(XdmfDocument& document, const std::vector<const XdmfElement*>& pieces,
+                                                 XdmfArrays& arrays) {
+  std::set<std::string> files;
+  for (const XdmfElement* piece : pieces) {
+    MeshPieceReader reader(document, *piece, arrays);
+    if (Status status = reader.ReadSizes(); !status.ok()) return status;
+    if (Status status = reader.AddFiles(files); !status.ok()) return status;
+  }
+  std::vector<std::string> all = {document.path()};
+  all.insert(all.end(), files.begin(), files.end());
+  return all;
+}
+
 Result<LoadedMesh> ReadXdmfMesh(XdmfDocument& document, const std::vector<const XdmfElement*>& pieces, const MeshOptions& options,
                                 XdmfArrays& arrays) {
   MeshBuilder builder;
-  std::set<std::string> files;
   std::optional<GridArray> array;
   for (const XdmfElement* piece : pieces) {
     const Result<bool> is_mesh = IsXdmfMesh(document, *piece);
     if (!is_mesh.ok()) return is_mesh.status();
     if (!*is_mesh) return document.Wrong(*piece, "has straight axes, but another piece has cells: pieces must be of one kind");
-    MeshPieceReader reader(document, *piece, arrays, files);
+    MeshPieceReader reader(document, *piece, arrays);
     if (Status status = reader.ReadSizes(); !status.ok()) return status;
     if (!array) {
       const Result<std::vector<XdmfAttribute>> attributes = reader.Attributes();
@@ -290,7 +316,13 @@ Result<LoadedMesh> ReadXdmfMesh(XdmfDocument& document, const std::vector<const 
   Result<LoadedMesh> loaded = builder.Finish(document.path());
   if (!loaded.ok()) return loaded;
   loaded->info.format = "XDMF";
-  loaded->info.other_files.assign(files.begin(), files.end());
+  const Result<std::vector<std::string>> files = FilesOfXdmfMesh(document, pieces, arrays);
+  if (!files.ok()) return files.status();
+  loaded->info.other_files.assign(files->begin() + 1, files->end());
+  std::error_code error;
+  for (const std::string& file : *files) {
+    if (options.read) options.read(std::int64_t(std::filesystem::file_size(file, error)));
+  }
   return loaded;
 }
 

@@ -14,6 +14,9 @@ namespace slabstream {
 // Whether a uniform grid has such a topology. Errors of XdmfDocument::Needed.
 Result<bool> IsXdmfMesh(XdmfDocument& document, const XdmfElement& grid);
 
+// The XDMF file and those in which the numbers of the pieces are. Errors of ReadXdmfMesh.
+Result<std::vector<std::string>> FilesOfXdmfMesh(XdmfDocument& document, const std::vector<const XdmfElement*>& pieces, XdmfArrays& arrays);
+
 // The uniform grids `pieces`, at least one, as one grid. Cells are in VTK's order of points, as the programs that read XDMF take them.
 // Errors of ReadMesh (mesh_reader.h). Waits.
 Result<LoadedMesh> ReadXdmfMesh(XdmfDocument& document, const std::vector<const XdmfElement*>& pieces, const MeshOptions& options,

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <future>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -316,6 +318,67 @@ TEST_F(VoxelServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
   }
   ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = whole, .chunk = kFirstCellChunk}, StatusCode::kInvalidArgument,
                 "cells of a dataset that has none");
+}
+
+// Cells that lie on a disk: which fails, or does not answer before it is told to.
+class CellsOnDisk : public GridCells {
+ public:
+  Result<Mesh> CellsIn(const Box& /*box*/) const override {
+    ++asked_;
+    answer_.wait();
+    if (fails_) return Status::DataLoss("'cells' is damaged");
+    return Mesh{.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .tetrahedra = {{0, 1, 2, 3}}, .values = {1, 2, 3, 4}};
+  }
+  Status Visit(const std::function<void(const Mesh&)>& /*function*/) const override { return Status::Ok(); }
+  CellRanges Ranges(const Index3& /*size*/) const override { return {}; }
+  std::string Digest() const override { return ""; }
+  std::uint64_t bytes() const override { return 0; }
+
+  void Answer() { may_answer_.set_value(); }
+  void Fail(bool fails) { fails_ = fails; }
+  int asked() const { return asked_; }
+
+ private:
+  std::promise<void> may_answer_;
+  const std::shared_future<void> answer_ = may_answer_.get_future();
+  std::atomic<bool> fails_ = false;
+  mutable std::atomic<int> asked_ = 0;
+};
+
+TEST_F(VoxelServerTest, CellsThatAreNotReadYetHoldUpNobodyElseAndAreReadOnce) {
+  const Box box = volume_->block.box;
+  const auto cells = std::make_shared<CellsOnDisk>();
+  server_->Publish(8, {.volume = volume_, .cells = cells});
+  const ChunkRequest of_cells{.epoch = kEpoch, .worker = 1, .dataset = 8, .box = box, .chunk = kFirstCellChunk};
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(worker_.Send({}, Encode(of_cells)).ok());
+  const AnyMessage other = Ask({.epoch = kEpoch, .worker = 1, .dataset = 5, .box = box, .chunk = 0});
+  ASSERT_TRUE(std::holds_alternative<Chunk>(other)) << NameOf(other);
+  EXPECT_EQ(std::get<Chunk>(other).dataset, 5U);
+  cells->Answer();
+  std::vector<DatasetId> answers;
+  const auto note = [&](const AnyMessage& answer) {
+    ASSERT_TRUE(std::holds_alternative<Chunk>(answer)) << NameOf(answer);
+    answers.push_back(std::get<Chunk>(answer).dataset);
+  };
+  const ChunkRequest of_voxels{.epoch = kEpoch, .worker = 1, .dataset = 5, .box = box, .chunk = 1};
+  ASSERT_TRUE(worker_.Send({}, Encode(of_voxels)).ok());
+  for (int i = 0; i < 3; ++i) note(Ask(of_voxels));  // an answer is left, and every answer of cells is before it
+  EXPECT_EQ(std::ranges::count(answers, DatasetId{8}), 1) << "for three requests that are the same";
+  EXPECT_EQ(cells->asked(), 1);
+}
+
+TEST_F(VoxelServerTest, CellsThatCannotBeReadAreRefusedAndAskedForAnew) {
+  const Box box = volume_->block.box;
+  const auto cells = std::make_shared<CellsOnDisk>();
+  cells->Answer();
+  cells->Fail(true);
+  server_->Publish(8, {.volume = volume_, .cells = cells});
+  const ChunkRequest of_cells{.epoch = kEpoch, .worker = 1, .dataset = 8, .box = box, .chunk = kFirstCellChunk};
+  ExpectRefused(of_cells, StatusCode::kDataLoss, "'cells' is damaged");
+  cells->Fail(false);
+  const AnyMessage answer = Ask(of_cells);
+  ASSERT_TRUE(std::holds_alternative<Chunk>(answer)) << NameOf(answer);
+  EXPECT_GT(std::get<Chunk>(answer).cell_bytes, 0U);
 }
 
 TEST_F(VoxelServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +18,7 @@
 #include "data/survey/make_index.h"
 #include "data/survey/survey.h"
 #include "tests/data/volume_io/volume_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/service/pictures.h"
 #include "tests/service/small_shards.h"
 #include "tests/support/random_volume.h"
@@ -32,9 +34,11 @@ using testing::HasSubstr;
 class InPartsTest : public testing::Test {
  protected:
   // One that holds no level of the ball but perhaps the coarsest ones.
-  void Start(const std::string& path, int workers = 2, std::uint64_t memory_bytes = std::uint64_t{512} << 10) {
+  void Start(const std::string& path, int workers = 2, std::uint64_t memory_bytes = std::uint64_t{512} << 10,
+             std::uint64_t worker_bytes = 0) {
     EmbeddedOptions options;
     options.workers = workers;
+    options.worker.memory_bytes = worker_bytes;
     options.coordinator.catalogue["ball"] = DataSource(path, "");
     options.coordinator.machine.memory_bytes = memory_bytes;
     auto started = EmbeddedService::Start(context_, std::move(options));
@@ -660,6 +664,46 @@ TEST_F(InPartsTest, ADamagedObjectEndsTheFrameAndIsNamed) {
   EXPECT_EQ(picture.status().code(), StatusCode::kDataLoss) << picture.status().message();
   EXPECT_THAT(picture.status().message(), HasSubstr("/0/"));
   EXPECT_EQ(std::ranges::count(picture.status().message(), '\n'), 0);
+}
+
+// ---------------------------------------------------------------- grids
+
+// Bit for bit: workers get the same cells in the same order, whether the coordinator holds them or reads them.
+TEST_F(StreamsInPartsTest, PicturesOfCellsOnDiskAreThoseOfCellsInMemory) {
+  const auto bent = [](const Vec3& n) { return Vec3{n.x + 3 * std::sin(0.2 * n.y), n.y + 2 * std::cos(0.3 * n.z), n.z}; };
+  const FileBytes grid = VtuFile(BoxOfHexahedra({}, {30, 25, 20}, bent));
+  const std::string held = (directory_ / "held.vtu").string(), kept = (directory_ / "kept.vtu").string();
+  WriteFile(held, grid);
+  WriteFile(kept, grid);
+  ASSERT_TRUE(ReadVolume(kept, {.keep_cells = true}).ok());
+  const std::shared_ptr<const Volume> volume = ReadVolume(held).value().volume;
+  ASSERT_TRUE(volume->cells != nullptr);
+  FrameRequest request = TestRequest(FindRenderer("slice"), 30, 0);
+  request.policy.decomposition = "subcube";
+  request.transfer.choice = TransferFunction{.colors = {{0, {0.2F, 0.4F, 1}}, {2300, {1, 0.7F, 0.3F}}},
+                                             .opacities = {{0, 0, 0.5, 0}, {300, 0, 0.5, 0}, {2300, 0.1, 0.5, 0}},
+                                             .opacity_distance = 1};
+  for (const int workers : {1, 3}) {
+    std::size_t reports = 0;
+    for (const std::uint64_t limit : {std::uint64_t{0}, std::uint64_t{200} << 20}) {
+      SCOPED_TRACE(testing::Message() << workers << " workers of " << (limit >> 20) << " MiB");
+      for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+        request.view.projection = projection;
+        std::vector<Picture> pictures;
+        for (const std::string& path : {held, kept}) {
+          Start(path, workers, 0, limit);
+          Result<Picture> picture = Render(request);
+          ASSERT_TRUE(picture.ok()) << picture.status().message();
+          pictures.push_back(*std::move(picture));
+        }
+        EXPECT_EQ(LargestDifference(pictures[0].image, pictures[1].image, request.size), 0);
+        EXPECT_LE(LargestDifference(pictures[1].image, RenderDirectly(request, *volume), request.size), AllowedDifference(request));
+        EXPECT_GT(HighestAlpha(pictures[1].image), 0.5);
+        if (limit == 0) reports = pictures[1].statistics.reports.size();
+        EXPECT_TRUE(limit == 0 || pictures[1].statistics.reports.size() > reports) << "in more groups, if there is a limit";
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// StoreFolder: a folder of brick stores, as the processes of one host share it. Each store is a folder beside a lock file:
+// StoreFolder: a folder of brick stores and cell stores, as the processes of one host share it. Each store is a folder beside a lock file:
 //
 //   NAME        complete, or what a process has written of it so far. A complete one is sealed: a file in it tells how many files there are
 //               and how many bytes, so that a store of which somebody has removed a part is not used

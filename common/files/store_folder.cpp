@@ -1,4 +1,4 @@
-#include "data/brick_store/store_folder.h"
+#include "common/files/store_folder.h"
 
 #include <fmt/format.h>
 #include <sys/statvfs.h>
