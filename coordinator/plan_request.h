@@ -28,6 +28,7 @@ struct PlanRequest {
   Turn turn;
   std::uint64_t share_pixels = 0;        // ClientTakes::share_pixels
   std::uint64_t worker_memory = 0;       // bytes: the least limit of the workers that stay; 0: none has stated one
+  std::uint64_t own_memory = 0;          // bytes: the coordinator's limit; 0: none
   std::vector<WorkerLimit> limits = {};  // the limits of all workers, and of those that are leaving
   // For a dataset with several levels: what the client asked for, its levels, and the level that `resolved` is of.
   // Null: the dataset has one level.

@@ -146,6 +146,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
                   .roster = std::move(team.roster),
                   .turn = team.turn,
                   .share_pixels = in_shares ? config.share_pixels : 0,
+                  .own_memory = config.memory_bytes,
                   .limits = WorkerLimits()};
   if (const OpenRequest::HasDataset& dataset = *request.dataset(); dataset.levels != nullptr) {
     FrameRequest frame = request.submit.frame;

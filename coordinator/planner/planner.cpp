@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <limits>
 #include <utility>
 
 #include "common/planning/levels.h"
@@ -13,7 +14,13 @@ namespace slabstream {
 namespace {
 
 // The worker with the least memory decides: any box may come to it after a loss.
-std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) { return BoxBytesFor(setup, request.worker_memory); }
+std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
+  // The coordinator cuts out the cells of a box, and has them three times meanwhile, with half of the bytes that BoxBytesOfCells says: half
+  // of its limit.
+  const bool limited = setup.cells && request.own_memory > 0;
+  const std::int64_t most = limited ? std::int64_t(request.own_memory / 3) : std::numeric_limits<std::int64_t>::max();
+  return std::min(most, BoxBytesFor(setup, request.worker_memory));
+}
 
 // Each field as it is drawn beside the finest level.
 ShownFields AtOneLevel(ShownFields fields) {

@@ -11,6 +11,7 @@
 #include "common/memory/pooled_vector.h"
 #include "common/threads/guarded.h"
 #include "common/volume/light_volume.h"
+#include "common/volume/memory_budget.h"
 #include "common/wire/payload.h"
 #include "coordinator/service/box_samples.h"
 #include "data/sources/read_part.h"
@@ -139,7 +140,8 @@ void VoxelServer::OnCut(CellsCut cut) {
   const auto waiting = awaits_cells_.extract({cut.of.get(), cut.box});
   if (cut.bytes.ok()) {
     kept_cells_.Put({cut.of.get(), cut.box}, {cut.of, *cut.bytes}, cut.bytes->size());
-    kept_cells_.DropBeyond(kMostKept);
+    const auto room = std::uint64_t(std::max<std::int64_t>(AvailableMemoryBytes(), 0));
+    kept_cells_.DropBeyond(std::min<std::uint64_t>(kMostKept, room / 2));
   }
   for (const Asked& asked : waiting.mapped()) {
     if (cut.bytes.ok()) {

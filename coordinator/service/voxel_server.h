@@ -137,7 +137,8 @@ class VoxelServer {
     std::size_t begun = 0;                        // and not ended
   };
 
-  static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes of cells; those that were cut last stay in any case
+  // Bytes of cells, or half of what the process can still take; those that were cut last stay in any case.
+  static constexpr std::size_t kMostKept = std::size_t{256} << 20;
   struct KeptCells {
     std::weak_ptr<const GridCells> of;  // a dataset that is gone takes no memory
     Bytes bytes;

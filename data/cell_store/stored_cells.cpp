@@ -147,16 +147,15 @@ Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& fac
 }
 
 Result<CellArrays::Part> CellArrays::Read(std::span<const std::uint32_t> numbers) const {
-  constexpr std::size_t kMostPointsACell = 4, kBytesAPoint = sizeof(PointNumber) + 2 * sizeof(Vector3<float>) + sizeof(float);
-  const std::size_t most_points = std::min<std::size_t>(kMostPointsACell * numbers.size(), std::size_t(points.size()));
-  const std::size_t bytes = numbers.size() * (sizeof(Tetrahedron) + sizeof(float)) + most_points * kBytesAPoint;
-  if (Status fits = CheckFitsMemory(std::int64_t(bytes), "a part of a grid"); !fits.ok()) return fits;
+  const auto fits = [](std::size_t bytes) { return CheckFitsMemory(std::int64_t(bytes), "a part of a grid"); };
+  if (Status status = fits(numbers.size() * (sizeof(Tetrahedron) + sizeof(float))); !status.ok()) return status;
   Part part;
   Mesh& mesh = part.mesh;
   mesh.at = at;
   mesh.tetrahedra.resize(numbers.size());
   if (Status read = cells.ReadSome(numbers, std::span(mesh.tetrahedra)); !read.ok()) return read;
   part.numbers = NumberAnew(mesh.tetrahedra, std::size_t(points.size()));
+  if (Status status = fits(part.numbers.size() * (2 * sizeof(Vector3<float>) + sizeof(float))); !status.ok()) return status;
   const std::span<const std::uint32_t> of_values = at == ValuesAt::kPoints ? std::span<const std::uint32_t>(part.numbers) : numbers;
   mesh.points.resize(part.numbers.size());
   mesh.values.resize(of_values.size());
@@ -241,6 +240,8 @@ Result<Mesh> StoredCells::CellsIn(const Box& box) const {
   }
   Result<CellArrays::Part> part = arrays_.Read(numbers);
   if (!part.ok()) return Told(part.status());
+  // Then as bytes.
+  if (Status fits = CheckFitsMemory(2 * std::int64_t(part->mesh.bytes()), "the cells of a box"); !fits.ok()) return fits;
   return CellsTouching(part->mesh, space);
 }
 

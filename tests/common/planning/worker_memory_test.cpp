@@ -7,6 +7,7 @@
 #include "common/planning/frame_window.h"
 #include "common/volume/memory_budget.h"
 #include "tests/common/planning/plan_support.h"
+#include "tests/support/random.h"
 #include "tests/support/renderers.h"
 
 namespace slabstream {
@@ -123,6 +124,31 @@ TEST(WorkerMemory, TwoBoxesOfAFrameFitAWorkerBesideItsImages) {
     }
   }
   EXPECT_GT(before, 0);
+}
+
+// The cells of a grid count, not only the voxels of its lattice: boxes are as many as they need.
+TEST(WorkerMemory, BoxesOfAGridFitAWorkerWithTheirCells) {
+  Random random(8);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 20; ++round) {
+    VolumeSummary summary = FullSummary({128, 96, 80});
+    for (std::size_t brick = 0; brick < summary.bricks.size(); ++brick) summary.cells.push_back(std::uint32_t(random.Integer(0, 20'000)));
+    const int workers = random.Integer(1, 5);
+    const std::uint64_t limit = std::uint64_t(random.Integer(220, 2000)) * kMebi;
+    SCOPED_TRACE(testing::Message() << workers << " workers of " << (limit >> 20) << " MiB");
+    FrameRequest request = SomeRequest();
+    request.renderer = "slice";
+    request.policy.decomposition = "subcube";
+    request.policy.groups = 0;
+    const std::int64_t target = BoxBytesFor(Plan(request, summary, FullRoster(workers)).setup, limit);
+    const FramePlan plan = PlanFrame(request, 1, summary, FullRoster(workers), target).value();
+    const Box whole = summary.description.geometry.bounds();
+    EXPECT_TRUE(plan.groups.size() > 1 || whole.voxel_count() + BoxBytesOfCells(whole, summary) <= target * workers);
+    std::vector<WorkerLimit> limits;
+    for (int worker = 1; worker <= workers; ++worker) limits.push_back({WorkerId(worker), limit});
+    const Result<int> fit = FramesThatFit(plan, summary, limits);
+    EXPECT_TRUE(fit.ok()) << fit.status().message();
+  }
 }
 
 }  // namespace
