@@ -169,10 +169,7 @@ Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summar
     return std::ranges::any_of(fields.others, is_rectilinear) ? refused("overlays and labels are") : Status::Ok();
   }
   if (!fields.others.empty()) return refused("several fields are");
-  if (!request.transfer.isosurfaces.empty()) return refused("isosurfaces are");
-  if (request.shading.needs_light_volume()) return refused("shadows and ambient occlusion are");
-  const Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
-  return transfer.ok() && !transfer->regions.empty() ? refused("two-dimensional transfer functions are") : Status::Ok();
+  return request.shading.needs_light_volume() ? refused("shadows and ambient occlusion are") : Status::Ok();
 }
 
 }  // namespace

@@ -107,7 +107,6 @@ void CheckStretch(const FrameSetup& setup, Checker& check) {
   check.That(setup.renderer->Can(Ability::kRectilinear), "renderer", "one that draws no rectilinear grid");
   const bool alone = setup.coarser.empty() && setup.fields.empty() && !setup.light;
   check.That(alone, "description", "a rectilinear grid beside levels, fields or a light volume");
-  check.That(setup.transfer.isosurfaces.empty() && setup.transfer.regions.empty(), "transfer", "of even grids alone");
 }
 
 // `m` names every worker of the group and the display worker, nobody twice.

@@ -88,8 +88,6 @@ TEST_F(RectilinearTest, WhatCannotDrawItSaysWhatHelps) {
     ExpectRefused({"render", "grid.vtk", "--local", "--renderer", renderer, "-o", "a.png"},
                   "a rectilinear grid that --resample even does not resample needs one of: raycast, mip");
   }
-  ExpectRefused({"render", "grid.vtk", "--local", "--isovalue", "3", "-o", "a.png"},
-                "isosurfaces are not shown on a rectilinear grid; --resample");
   ExpectRefused({"render", "grid.vtk", "--local", "--shadows", "1", "-o", "a.png"},
                 "shadows and ambient occlusion are not shown on a rectilinear");
   ExpectRefused({"render", "grid.vtk", "--local", "--jitter", "1", "-o", "a.png"}, "jitter");

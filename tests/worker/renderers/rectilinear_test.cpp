@@ -252,12 +252,57 @@ TEST(Rectilinear, ThinLayersHaveTheOpacityOfTheirIntegral) {
   EXPECT_LE(error_at(8, 50), 1e-3);
 }
 
+// A ray has the opacities of as many crossings as what lies between the voxels has along it.
+TEST(Rectilinear, RaysCrossIsosurfacesOfTheInterpolatedValue) {
+  Random random(16);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(16);
+  int rays = 0, crossed = 0, wrong = 0;
+  for (int round = 0; round < 8; ++round) {
+    const VolumeGeometry grid = RandomGrid(random);
+    const Volume volume = MakeBlobs(grid, ScalarType::kFloat32, unsigned(round));
+    SetupOptions options{.view = RandomView(kProjections[round % 2], views)};
+    options.transfer.opacities = {{0, 0}};
+    options.transfer.isosurfaces = {{random.Real(60, 140), {1, 1, 1}, 0.6}};
+    const FrameSetup setup = RaycastSetup(volume, options);
+    const LocalImage image = RenderWhole(volume, setup);
+    for (int y = 1; y < setup.camera.height; y += 3) {
+      for (int x = 1; x < setup.camera.width; x += 3) {
+        const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
+        const Depths inside = Inside(setup, ray);
+        if (!(inside.enter < inside.leave)) continue;
+        constexpr int kSteps = 4000;
+        double transmitted = 1;
+        for (int i = 0, above = -1; i <= kSteps; ++i) {
+          const double value = ValueAt(volume, ray.origin + std::lerp(inside.enter, inside.leave, double(i) / kSteps) * ray.direction);
+          const int is_above = value >= options.transfer.isosurfaces[0].value ? 1 : 0;
+          if (above >= 0 && is_above != above) transmitted *= 0.4;
+          above = is_above;
+        }
+        ++rays;
+        crossed += transmitted < 1 ? 1 : 0;
+        wrong += std::abs(double(PixelOf(image, x, y)[3]) - (1 - transmitted)) > 1e-3 ? 1 : 0;  // touched, or crossed at the border
+      }
+    }
+    for (int count = 2; count <= 4; ++count) {
+      EXPECT_LE(LargestDifference(image, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, count, views))), 2e-5F) << round;
+    }
+    options.transfer = Ramp(0.2);
+    options.transfer.isosurfaces = {{100, {1, 1, 1}, 0.5}};
+    const FrameSetup with_matter = RaycastSetup(volume, options);
+    const LocalImage many = RenderByBoxes(volume, with_matter, CutAtRandom(volume.block.box, 5, views));
+    EXPECT_LE(LargestDifference(RenderWhole(volume, with_matter), many), 2e-5F) << round;
+  }
+  EXPECT_GT(crossed, rays / 4);
+  EXPECT_LE(wrong, rays / 100);
+}
+
 // The gradient of a linear function is the same everywhere, and so is its light.
 TEST(Rectilinear, ALinearFieldHasOneGradient) {
   Random random(12);
   SCOPED_TRACE(random.trace());
-  // Of light, and of opacity by the gradient's magnitude.
-  const auto colors = [](const VolumeGeometry& grid, const Vec3& slope, bool by_gradient) {
+  enum class Of { kLight, kGradientOpacity, kRegion };
+  const auto colors = [](const VolumeGeometry& grid, const Vec3& slope, Of of) {
     const Vec3 centre = grid.centre();
     const Volume volume = MakeVolume(grid, ScalarType::kFloat32, [&](const Index3& v) {
       return 100 + Dot(slope, (grid.stretch.ToData(ToVec3(v)) - centre) * grid.spacing);
@@ -266,7 +311,12 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
     options.transfer.colors = {{0, {1, 1, 1}}};
     options.transfer.opacities = {{95, 0}, {97, 0.6}, {103, 0.6}, {105, 0}};  // far from the borders
     options.shading.lights = {{0.3, -0.8, 0.5}};
-    if (by_gradient) options.transfer.gradient_opacities = {{Length(slope) - 0.5, 0}, {Length(slope) + 0.5, 1}};
+    const double steep = Length(slope);
+    if (of == Of::kGradientOpacity) options.transfer.gradient_opacities = {{steep - 0.5, 0}, {steep + 0.5, 1}};
+    if (of == Of::kRegion) {
+      options.transfer.regions = {{{{95, steep - 1}, {105, steep - 1}, {105, steep + 1}, {95, steep + 1}}, {1, 1, 1}, 0.6}};
+      options.transfer = WithCurvesOfRegions(options.transfer);
+    }
     const FrameSetup setup = RaycastSetup(volume, options, 16);
     const LocalImage image = RenderWhole(volume, setup);
     std::vector<double> straight;
@@ -274,7 +324,7 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
       for (int x = 28; x < 36; ++x) {
         const std::array<float, 4> pixel = PixelOf(image, x, y);
         EXPECT_GT(pixel[3], 0.3);
-        straight.push_back(double(by_gradient ? pixel[3] : pixel[0] / pixel[3]));
+        straight.push_back(double(of == Of::kLight ? pixel[0] / pixel[3] : pixel[3]));
       }
     }
     return straight;
@@ -282,13 +332,16 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
   for (int round = 0; round < 5; ++round) {
     VolumeGeometry grid{.size = {40, 36, 44}, .spacing = {1, 1.2, 0.9}};
     const Vec3 slope = {random.Real(2, 4), random.Real(-4, -2), random.Real(2, 4)};
-    const double light = colors(grid, slope, false).front();
-    const std::vector<double> opacities = colors(grid, slope, true);
+    const double light = colors(grid, slope, Of::kLight).front();
+    const std::vector<double> opacities = colors(grid, slope, Of::kGradientOpacity), of_region = colors(grid, slope, Of::kRegion);
     grid.stretch =
         Stretch::Make({{RandomPlaces(40, 6, random), RandomPlaces(36, 6, random), RandomPlaces(44, 6, random)}}, grid.size).value();
-    for (const double of : colors(grid, slope, false)) EXPECT_NEAR(of, light, 1e-3) << round;
-    const std::vector<double> stretched = colors(grid, slope, true);
-    for (std::size_t i = 0; i < opacities.size(); ++i) EXPECT_NEAR(stretched[i], opacities[i], 0.01) << round;
+    for (const double of : colors(grid, slope, Of::kLight)) EXPECT_NEAR(of, light, 1e-3) << round;
+    const std::vector<double> stretched = colors(grid, slope, Of::kGradientOpacity), by_region = colors(grid, slope, Of::kRegion);
+    for (std::size_t i = 0; i < opacities.size(); ++i) {
+      EXPECT_NEAR(stretched[i], opacities[i], 0.01) << round;
+      EXPECT_NEAR(by_region[i], of_region[i], 0.02) << round;
+    }
   }
 }
 

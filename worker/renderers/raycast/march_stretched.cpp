@@ -93,14 +93,19 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   } else {
     entry.Set(EntryOf(look, value));
   }
-  const Entries entries = EntriesAt(look.entries.data(), entry);
+  Entries entries = EntriesAt(look.entries.data(), entry);
   auto visible = hn::And(sampled, hn::Gt(entries.part[3], hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return 0;
-  const bool by_gradient = look.by_gradient();
   Gradient gradient = {Set(0), Set(0), Set(0)};
-  if (look.phong || by_gradient) gradient = GradientAt(neighbours, place, DifferencesAt(*work.box, place));
-  const auto opacity = by_gradient ? OpacityByGradient(look, entries.part[3], gradient, hn::Mul(Set(look.step_exponent), length))
-                                   : hn::Sub(Set(1), ExpOfMinus(hn::Mul(entries.part[3], length)));
+  if (look.phong || look.by_gradient()) gradient = GradientAt(neighbours, place, DifferencesAt(*work.box, place));
+  if (look.regions != nullptr) {
+    LaneNumbers region;
+    region.Set(RegionOf(look, hn::IfThenElseZero(sampled, value), gradient));
+    entries = EntriesAt(look.regions->entries.data(), region);
+  }
+  const auto opacity = look.gradient_factors.empty()
+                           ? hn::Sub(Set(1), ExpOfMinus(hn::Mul(entries.part[3], length)))
+                           : OpacityByGradient(look, entries.part[3], gradient, hn::Mul(Set(look.step_exponent), length));
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong) {
@@ -108,6 +113,24 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   }
   sums.AddChannels(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
   return hn::CountTrue(df, visible);
+}
+
+// Adds the crossings of rays with isosurfaces up to `before`, in units. Returns how many.
+template <class T>
+HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, const StretchedSteps& steps, Floats before, SurfaceWalk<T, true>& walk,
+                                       Sums& sums) {
+  const RayLook& look = *work.look;
+  return AddCrossingsUpTo(before, 16 * steps.most, work.termination, walk, sums, [&](Mask rays, const Crossing& crossing) HWY_ATTR {
+    const FloatTag df;
+    const SamplePlace place = crossing.Place();
+    Light light = {Set(1), hn::Zero(df)};
+    if (look.phong) {
+      light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place, DifferencesAt(*work.box, place)));
+    }
+    const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
+    const float* const colors = look.surface_looks.data();
+    sums.Add(rays, hn::GatherIndex(df, colors + 3, entry), colors, entry, light);
+  });
 }
 
 // The samples of a part of the rays. Returns how many were shaded.
@@ -132,6 +155,10 @@ HWY_NOINLINE std::uint64_t MarchPart(const MarchWork& work, const StretchedSteps
   const Ints octant_start = OctantStart(*work.to_samples, packet);
   Sums sums = gathered;
   std::uint64_t shaded = 0;
+  const bool has_surfaces = work.to_surfaces != nullptr;
+  SurfaceWalk<T, true> surfaces(work, packet, has_surfaces ? OctantStart(*work.to_surfaces, packet) : hn::Zero(IntTag()));
+  if (has_surfaces) surfaces.Start(part);
+  if (!work.look->volume_shows) alive = hn::Lt(one, zero);
   while (!hn::AllFalse(df, alive)) {
     auto next = hn::Add(block, LengthOfBlocks(steps, packet, scales, block));
     const auto begins = hn::Max(block, enter), ends = hn::Min(next, leave);
@@ -153,11 +180,16 @@ HWY_NOINLINE std::uint64_t MarchPart(const MarchWork& work, const StretchedSteps
       }
       sampled = hn::AndNot(empty, sampled);
       const auto length = hn::Mul(Set(0.5F), hn::Sub(ends, begins));
-      if (!hn::AllFalse(df, sampled)) shaded += AddSamples<T>(work, part, place, k, length, sampled, sums);
+      if (!hn::AllFalse(df, sampled)) {
+        if (has_surfaces) shaded += AddSurfaces<T>(work, steps, k, surfaces, sums);
+        sampled = hn::And(sampled, hn::Lt(sums.alpha, opaque));
+        shaded += AddSamples<T>(work, part, place, k, length, sampled, sums);
+      }
     }
     block = hn::IfThenElse(alive, next, block);
     alive = hn::And(alive, hn::And(hn::Lt(block, end), hn::Lt(sums.alpha, opaque)));
   }
+  if (has_surfaces) shaded += AddSurfaces<T>(work, steps, Set(kRayEnd), surfaces, sums);
   gathered = sums;
   return shaded;
 }
@@ -222,11 +254,10 @@ double StretchedSteps::StepsPerVoxel(const VolumeGeometry& geometry, double samp
 }
 
 void MakeExtinctions(RayLook& look) {
-  constexpr double kOpaque = 1e9;
-  if (look.by_gradient()) return;
+  if (!look.gradient_factors.empty()) return;
   for (std::size_t i = 3; i < look.entries.size(); i += 4) {
     float& entry = look.entries[i];
-    entry = float(entry < 1 ? -std::log1p(-double(entry)) : kOpaque);
+    entry = float(entry < 1 ? -std::log1p(-double(entry)) : kOpaqueExtinction);
   }
 }
 

@@ -27,10 +27,11 @@ struct StretchedSteps {
   static double StepsPerVoxel(const VolumeGeometry& geometry, double samples_per_voxel);
 };
 
-// Unless opacities depend on gradients, replaces the opacity of a step in each entry by its extinction, which times take.
+// Without gradient opacity, replaces the opacity of a step in each entry by its extinction.
 void MakeExtinctions(RayLook& look);
+inline constexpr double kOpaqueExtinction = 1e9;  // of an opacity of 1
 
-// As MarchTile. `work`: with the rays of `steps`, and without surfaces, labels, fields and light; its box has the tables of `steps`.
+// As MarchTile. `work`: with the rays of `steps`, and without labels, fields and light; its box has the tables of `steps`.
 std::uint64_t MarchStretchedTile(const MarchWork& work, const StretchedSteps& steps, const PixelBounds& tile, float* rgba,
                                  std::size_t floats_a_row);
 

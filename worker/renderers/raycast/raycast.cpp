@@ -143,7 +143,7 @@ class VisibilityCache : public BoxCache {
 // The table of the transfer function's regions, kept until another one is asked for.
 class RegionCache : public BoxCache {
  public:
-  // Null: it has none.
+  // Null: it has none. With extinctions of a step in place of opacities in a rectilinear grid, as of MakeExtinctions.
   const RegionTable* Of(const FrameSetup& setup, const ClassificationTable& classification, const RayLook& look) {
     const TransferFunction& transfer = setup.transfer;
     if (transfer.regions.empty()) return nullptr;
@@ -151,7 +151,11 @@ class RegionCache : public BoxCache {
                setup.range,      setup.description.mapping, look.step_exponent};
     if (key != key_) {
       table_ = MakeRegionTable(transfer, classification, setup.description.mapping);
-      table_.ReplaceOpacities([&](double opacity) { return -std::expm1(double(look.step_exponent) * std::log1p(-opacity)); });
+      const bool stretched = setup.description.geometry.rectilinear();
+      table_.ReplaceOpacities([&](double opacity) {
+        const double log = double(look.step_exponent) * std::log1p(-opacity);
+        return stretched ? std::min(-log, kOpaqueExtinction) : -std::expm1(log);
+      });
       key_ = std::move(key);
     }
     return &table_;
