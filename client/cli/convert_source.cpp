@@ -14,6 +14,10 @@ Result<SourceToConvert> OpenToConvert(const ConvertOptions& options, const Sourc
   Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
   if (!opened.ok()) return opened.status();
   const SourceInfo& info = (*opened)->info();
+  if (info.finest().geometry.rectilinear()) {
+    return Status::InvalidArgument(
+        fmt::format("'{}' has a rectilinear grid, which is written on even voxels: --resample even", source.path));
+  }
   const std::size_t held = info.whole ? CountIn(info.finest().geometry.size) * BytesPerSample(info.exact.type) : 0;
   if (!options.converts_part()) return SourceToConvert{*std::move(opened), held};
   const std::vector<SourceLevel>& levels = info.levels;

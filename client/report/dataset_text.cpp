@@ -30,7 +30,8 @@ std::vector<VolumeDescription> LevelsOf(const DatasetStatus& dataset) {
 }
 
 Json LevelJson(const VolumeDescription& level) {
-  const auto& [size, spacing, unused] = level.geometry;
+  const Index3& size = level.geometry.size;
+  const Vec3& spacing = level.geometry.spacing;
   return {{"size", {size.x, size.y, size.z}}, {"spacing", {spacing.x, spacing.y, spacing.z}}, {"voxel_bytes", level.voxel_bytes()}};
 }
 
@@ -127,7 +128,8 @@ std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
   for (const DatasetStatus& dataset : datasets) {
     Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-", "-"};
     if (dataset.state == DatasetState::kReady) {
-      const auto& [size, spacing, unused] = dataset.description.geometry;
+      const Index3& size = dataset.description.geometry.size;
+      const Vec3& spacing = dataset.description.geometry.spacing;
       row[3] = fmt::format("{} x {} x {}", size.x, size.y, size.z);
       row[4] = NameOf(dataset.description.type);
       row[5] = fmt::format("{:.4g} x {:.4g} x {:.4g}", spacing.x, spacing.y, spacing.z);

@@ -50,7 +50,7 @@ class Partition {
 
 // Boxes nearest first: no ray of the camera enters a later box before an earlier one. One traversal of the tree: at each plane the eye's
 // side comes first; an orthographic eye lies at infinity against the view direction. Where the eye lies in the plane itself, or the rays
-// are parallel to it, no ray crosses from one side to the other, and the lower side comes first.
-std::vector<BoxId> VisibilityOrder(const Partition& partition, const Camera& camera);
+// are parallel to it, no ray crosses from one side to the other, and the lower side comes first. `stretch`: of the volume.
+std::vector<BoxId> VisibilityOrder(const Partition& partition, const Camera& camera, const Stretch& stretch = {});
 
 }  // namespace slabstream

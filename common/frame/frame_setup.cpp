@@ -39,7 +39,8 @@ FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t befor
   }
   // Voxels are cells half a voxel to each side of their centres.
   const Vec3 half = {0.5, 0.5, 0.5};
-  const Camera::ImageExtent extent = setup.camera.ProjectBetween(ToVec3(box.begin) - half, ToVec3(box.end) - half);
+  const Box place = setup.description.geometry.InDataSpace(box);
+  const Camera::ImageExtent extent = setup.camera.ProjectBetween(ToVec3(place.begin) - half, ToVec3(place.end) - half);
   return {extent.x_begin, extent.y_begin, extent.x_end, extent.y_end};
 }
 

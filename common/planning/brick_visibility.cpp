@@ -41,7 +41,7 @@ std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
     if (!AnyVisible(i)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
     const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, all);
-    if (clip.MayKeep(box)) visible.push_back(box);
+    if (clip.MayKeep(summary_.description.geometry.InDataSpace(box))) visible.push_back(box);
   }
   return visible;
 }

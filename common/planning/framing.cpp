@@ -97,8 +97,10 @@ std::optional<Ball> BallOfCut(const FrameRequest& request, const std::vector<Box
 std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
                                const VolumeGeometry& geometry) {
   if (bricks.empty()) return std::nullopt;
-  const std::optional<Ball> cut = BallOfCut(request, bricks, clip, geometry);
-  return cut ? *cut : BallRound(bricks, geometry);
+  std::vector<Box> places = bricks;
+  for (Box& place : places) place = geometry.InDataSpace(place);
+  const std::optional<Ball> cut = BallOfCut(request, places, clip, geometry);
+  return cut ? *cut : BallRound(places, geometry);
 }
 
 }  // namespace slabstream

@@ -58,14 +58,14 @@ class WorkFields {
     if (request_.known.occupied != nullptr && clip_.empty()) return *request_.known.occupied;
     if (!drawn_) {
       drawn_.emplace(request_.known.occupied != nullptr ? *request_.known.occupied : visibility_.VisibleCells());
-      EmptyClippedCells(clip_, *drawn_);
+      EmptyClippedCells(clip_, request_.summary->description.geometry, *drawn_);
     }
     return *drawn_;
   }
 
   // Whether any sample that `box` owns may show something.
   bool Shows(const Box& box) {
-    if (!clip_.MayKeep(box)) return false;
+    if (!clip_.MayKeep(request_.summary->description.geometry.InDataSpace(box))) return false;
     const Box with_halo = Grown(box, request_.volume->renderer()->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr || request_.summary->stored) return visibility_.AnyVisible(with_halo);
     return !Of(BalanceBy::kOccupied).Hull(with_halo).empty();
@@ -228,7 +228,8 @@ struct LayoutMaker::State {
     }
     const auto shows = [&](const Box& box, BoxId id) {
       const LevelBox at(box, made.levels[id]);
-      return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(at.box) && visible[at.level].AnyVisible(PaddedBoxOf(at));
+      const Box place = request.summary->description.geometry.InDataSpace(box);
+      return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(place) && visible[at.level].AnyVisible(PaddedBoxOf(at));
     };
     // Parts of boxes are known of one level alone.
     const std::optional<UnreadParts> unread = request.coarser.empty() ? FindUnread() : std::nullopt;
@@ -455,11 +456,12 @@ Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
   return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(metric), state_->request.resized), policy);
 }
 
-void EmptyClippedCells(const ClipRegion& clip, OccupancyGrid& grid) {
+void EmptyClippedCells(const ClipRegion& clip, const VolumeGeometry& geometry, OccupancyGrid& grid) {
   if (clip.empty()) return;
   const Index3 cells = OccupancyCells(grid.size);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
-    if (grid.cells[i].voxels != 0 && !clip.MayKeep(OccupancyCellBox(PlaceIn(cells, i), grid.size))) grid.cells[i] = {};
+    const Box place = geometry.InDataSpace(OccupancyCellBox(PlaceIn(cells, i), grid.size));
+    if (grid.cells[i].voxels != 0 && !clip.MayKeep(place)) grid.cells[i] = {};
   }
 }
 

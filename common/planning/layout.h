@@ -66,7 +66,7 @@ struct LayoutRequest {
 Layout MakeLayout(const LayoutRequest& request);
 
 // Empties the cells of which clipping leaves nothing. Cells that are clipped in part keep all their voxels.
-void EmptyClippedCells(const ClipRegion& clip, OccupancyGrid& grid);
+void EmptyClippedCells(const ClipRegion& clip, const VolumeGeometry& geometry, OccupancyGrid& grid);
 
 // Makes layouts by several policies; computes what they share once.
 class LayoutMaker {

@@ -39,8 +39,9 @@ std::vector<float> Extinctions(const ClassificationTable& table) {
 bool OpacityIsOfValues(const VolumeSummary& summary, const ClassifiedVolume& volume) {
   const TransferFunction& transfer = volume.transfer();
   return volume.renderer()->opacity_by_value() && volume.renderer()->format() == PixelFormat::kRgba && volume.clip().empty() &&
-         volume.fields().empty() && transfer.gradient_opacities.empty() && transfer.regions.empty() && !summary.stored &&
-         summary.cells.empty() && summary.non_finite == 0 && summary.bricks.size() <= kMostBricks;
+         !summary.description.geometry.rectilinear() && volume.fields().empty() && transfer.gradient_opacities.empty() &&
+         transfer.regions.empty() && !summary.stored && summary.cells.empty() && summary.non_finite == 0 &&
+         summary.bricks.size() <= kMostBricks;
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ template <class Function>
 void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetup& setup, Function&& function) {
   const GridMap to_camera = MapBetween(grid, WorldGeometryOf(setup));
   for (const Index3& zone : IndicesIn(map.counts)) {
-    const Box box = map.BoxOf(zone, grid.size);
+    const Box box = grid.InDataSpace(map.BoxOf(zone, grid.size));
     const Camera::ImageExtent extent = ExtentOf(box, to_camera, setup.camera);
     const bool shown =
         InPicture(extent, setup.camera) && setup.clip.MayKeep(CoveringVoxels(box, to_camera, setup.description.geometry.size));
@@ -184,7 +184,10 @@ void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& l
 void MoveSlab(ClipSlab& slab, const VolumeGeometry& finest) {
   if (slab.through) return;
   Vec3 middle = finest.centre();
-  if (slab.index) middle[AxisAcross(slab, finest)] = *std::exchange(slab.index, std::nullopt);
+  if (slab.index) {
+    const Axis axis = AxisAcross(slab, finest);
+    middle[axis] = finest.stretch.ToData(*std::exchange(slab.index, std::nullopt), axis);
+  }
   slab.through = finest.ToWorld(middle);
 }
 

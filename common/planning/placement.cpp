@@ -131,7 +131,7 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool 
 
 void PlaceBoxes(FramePlan& plan) {
   plan.groups.clear();
-  for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera)) {
+  for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera, plan.setup.description.geometry.stretch)) {
     if (plan.layout->owners[id] == kNoSlot) continue;
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
     const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];

@@ -158,6 +158,20 @@ Result<std::vector<ClassifiedField>> ResolveFields(const FrameRequest& request, 
   return resolved;
 }
 
+// What is drawn of even grids alone.
+Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summary, const ShownFields& fields) {
+  const auto refused = [&](std::string_view what) {
+    return Status::InvalidArgument(
+        fmt::format("dataset \"{}\": {} not shown on a rectilinear grid; --resample even resamples it", request.dataset, what));
+  };
+  const auto is_rectilinear = [](const FieldVolume& field) { return field.levels.front().summary->description.geometry.rectilinear(); };
+  if (!summary.description.geometry.rectilinear()) {
+    return std::ranges::any_of(fields.others, is_rectilinear) ? refused("overlays and labels are") : Status::Ok();
+  }
+  if (!fields.others.empty()) return refused("several fields are");
+  return request.shading.needs_light_volume() ? refused("shadows and ambient occlusion are") : Status::Ok();
+}
+
 }  // namespace
 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
@@ -180,8 +194,9 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   }
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
   const Result<std::vector<const RendererKind*>> able =
-      RenderersFor(request, {fields.values(), std::ranges::any_of(request.fields, weighted)});
+      RenderersFor(request, {fields.values(), std::ranges::any_of(request.fields, weighted), geometry.rectilinear()});
   if (!able.ok()) return able.status();
+  if (Status status = CheckRectilinear(request, *summary, fields); !status.ok()) return status;
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;

@@ -34,7 +34,7 @@ class ShownParts {
   void Find(const Box& parts) {
     const Box voxels = Intersection({parts.begin * side_, parts.end * side_}, bounds_);
     // Voxels show in the picture as far as they reach, and boxes may end so much before the part does (Partition::OfBlocks).
-    const Box reached = Grown(voxels, setup_.renderer->reach(), bounds_);
+    const Box reached = setup_.description.geometry.InDataSpace(Grown(voxels, setup_.renderer->reach(), bounds_));
     if (!setup_.clip.MayKeep(reached) || !InPicture(ExtentOf(reached, {}, setup_.camera), setup_.camera)) return;
     if (parts.voxel_count() == 1) return found_(parts.begin, voxels);
     const auto length = [&](Axis axis) { return parts.size()[axis] > 1 ? voxels.size()[axis] : 0; };

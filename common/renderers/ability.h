@@ -22,12 +22,13 @@ enum class Ability : std::uint8_t {
   kRegions = 10,         // shows TransferFunction::regions
   kFields = 11,          // shows several fields of a dataset in one picture
   kSmoothLabels = 12,    // draws LabelSurface::kSmooth
+  kRectilinear = 13,     // draws voxels at uneven distances (common/volume/stretch.h)
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 13> kAbilityNames = {"perspective", "isosurfaces",   "gradient-opacity", "labels", "cells",
-                                                                   "lights",      "depth-shading", "transfer",         "levels", "shadows",
-                                                                   "regions",     "fields",        "smooth-labels"};
+inline constexpr std::array<std::string_view, 14> kAbilityNames = {
+    "perspective", "isosurfaces", "gradient-opacity", "labels",  "cells",  "lights",        "depth-shading",
+    "transfer",    "levels",      "shadows",          "regions", "fields", "smooth-labels", "rectilinear"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

@@ -51,6 +51,7 @@ std::vector<Need> NeedsOf(const FrameRequest& request, const FieldsKnown& fields
   need(labels != nullptr && labels->surface == LabelSurface::kSmooth, Ability::kSmoothLabels, "label-surface 'smooth'");
   need(fields.weighted, Ability::kFields, "channel-opacity");
   need(fields.count > 1, Ability::kFields, fmt::format("a picture of {} fields", fields.count));
+  need(fields.rectilinear, Ability::kRectilinear, "a rectilinear grid that --resample even does not resample");
   for (const auto& [name, text] : request.parameters) {
     add(name, [&](const RendererKind* kind) { return FindParameter(*kind, name) != nullptr; });
   }

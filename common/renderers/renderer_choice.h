@@ -13,7 +13,8 @@ namespace slabstream {
 // What is known of the fields that show, once their dataset is.
 struct FieldsKnown {
   std::size_t count = 1;
-  bool weighted = false;  // some have a weight below 1
+  bool weighted = false;     // some have a weight below 1
+  bool rectilinear = false;  // the volume's grid is rectilinear
 };
 
 // The renderer that the request names, or if that is kAutomatic, all that have what it needs, in order of preference (Renderers()); never

@@ -44,8 +44,9 @@ void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<Half
         sides.push_back(FromWorld({normal, -sign * bound}, geometry));
         continue;
       }
-      // Voxel i fills [i - 0.5, i + 0.5).
-      const double position = (box.unit == ClipUnit::kPercent ? bound / 100 * geometry.size[axis] : bound) - 0.5;
+      // Voxel i fills [i - 0.5, i + 0.5) of voxel coordinates.
+      const double position =
+          box.unit == ClipUnit::kPercent ? bound / 100 * geometry.size[axis] - 0.5 : geometry.stretch.ToData(bound - 0.5, axis);
       sides.push_back({geometry.spacing[axis] * normal, -sign * geometry.spacing[axis] * position});
     }
   }
@@ -54,8 +55,11 @@ void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<Half
 constexpr double kFarVoxels = 1e9;
 static_assert(kFarVoxels > 4.0 * kMaxVolumeSide);
 
-// Of a slice, in least spacings: positions of samples are rounded by far less.
+// Of a slice, in least distances of voxels: positions of samples are rounded by far less.
 constexpr double kSliceThickness = 1.0 / 64;
+// Of one of a rectilinear grid, in diagonals of the volume: less than the steps of rays (worker/rays/view_rays.h), more than their
+// rounding.
+constexpr double kLeastThickness = 0x1p-18;
 
 // InvalidArgument: there is no slice with its index.
 Status CheckIndex(const ClipSlab& slab, const VolumeGeometry& geometry) {
@@ -69,9 +73,14 @@ Status CheckIndex(const ClipSlab& slab, const VolumeGeometry& geometry) {
 void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<HalfSpace>& sides) {
   const Vec3 normal = Normalized(slab.normal);
   Vec3 middle = geometry.centre();
-  if (slab.index) middle[AxisAcross(slab, geometry)] = *slab.index;
+  if (slab.index) {
+    const Axis axis = AxisAcross(slab, geometry);
+    middle[axis] = geometry.stretch.ToData(*slab.index, axis);
+  }
   const Vec3 through = slab.through.value_or(geometry.ToWorld(middle));
-  const double half = 0.5 * std::max(slab.thickness, kSliceThickness * Least(geometry.spacing));
+  double thickness = kSliceThickness * geometry.least_distance();
+  if (geometry.rectilinear()) thickness = std::max(thickness, kLeastThickness * Length(ToVec3(geometry.size) * geometry.spacing));
+  const double half = 0.5 * std::max(slab.thickness, thickness);
   for (const double sign : {1.0, -1.0}) sides.push_back(FromWorld({sign * normal, half - sign * Dot(normal, through)}, geometry));
 }
 

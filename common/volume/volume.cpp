@@ -1,10 +1,22 @@
 #include "common/volume/volume.h"
 
+#include <cmath>
 #include <cstring>
 
 #include "common/base/check.h"
 
 namespace slabstream {
+
+Box VolumeGeometry::InDataSpace(const Box& box) const {
+  if (!rectilinear() || box.empty()) return box;
+  constexpr double kRounding = 1e-9;
+  Box held;
+  for (const Axis axis : kAxes) {
+    held.begin[axis] = std::int32_t(std::floor(stretch.ToData(box.begin[axis] - 0.5, axis) + 0.5 + kRounding));
+    held.end[axis] = std::int32_t(std::ceil(stretch.ToData(box.end[axis] - 0.5, axis) + 0.5 - kRounding));
+  }
+  return held;
+}
 
 VoxelBlock MakeVoxelBlock(const Box& box, ScalarType type) {
   VoxelBlock block{box, type, {}};

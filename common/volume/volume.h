@@ -1,7 +1,8 @@
 // What a volume is: geometry (dimensions, spacing, orientation), how stored samples map to data values, and the voxels of a box.
 //
-// Order: x fastest, then y, then z. A voxel's centre has integer data-space coordinates; the volume fills
-// [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the world (mm for scans).
+// Order: x fastest, then y, then z. The volume fills [-0.5, size - 0.5) of data space along each axis. A voxel's centre has integer
+// coordinates there, unless the grid is rectilinear (stretch.h). Spacing is the distance of neighbouring centres, or the mean of them, in
+// the unit of the world (mm for scans).
 #pragma once
 
 #include <array>
@@ -13,6 +14,7 @@
 #include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 #include "common/volume/orientation.h"
+#include "common/volume/stretch.h"
 
 namespace slabstream {
 
@@ -36,11 +38,17 @@ struct VolumeGeometry {
   Index3 size;               // voxels, each in [1, kMaxVolumeSide]
   Vec3 spacing = {1, 1, 1};  // > 0, finite
   Orientation orientation = {};
+  Stretch stretch = {};
 
+  bool rectilinear() const { return !stretch.even(); }
   Box bounds() const { return {{0, 0, 0}, size}; }
   Vec3 centre() const { return 0.5 * (ToVec3(size) - Vec3{1, 1, 1}); }  // data space
   // A point of data space, in the world.
   Vec3 ToWorld(const Vec3& p) const { return orientation.origin + orientation.ToWorld(spacing * p); }
+  // The least distance of neighbouring voxels, in the unit of the spacing.
+  double least_distance() const { return Least(rectilinear() ? stretch.LeastSteps() * spacing : spacing); }
+  // The box of data space that holds the voxels of `box`, with whole corners: of an even grid, `box`.
+  Box InDataSpace(const Box& box) const;
   friend bool operator==(const VolumeGeometry&, const VolumeGeometry&) = default;
 };
 

@@ -23,6 +23,37 @@ void Read(const v1::Status& in, Status& out, Checker& check) {
   out = {code, check.Text("message", in.message(), 0, kMaxTextBytes)};
 }
 
+void Write(const VolumeDescription& in, v1::VolumeDescription& out) {
+  WriteFields(in, out);
+  const auto write = [&](Axis axis, auto& places) {
+    const std::vector<double>& knots = in.geometry.stretch.knots(axis);
+    if (!knots.empty()) places.Add(knots.begin() + 1, knots.end() - 1);
+  };
+  write(Axis::kX, *out.mutable_x_places());
+  write(Axis::kY, *out.mutable_y_places());
+  write(Axis::kZ, *out.mutable_z_places());
+}
+void Read(const v1::VolumeDescription& in, VolumeDescription& out, Checker& check) {
+  ReadFields(in, out, check);
+  if (check.ok()) Rules(out, check);
+  Stretch::Places places;
+  const auto read = [&](Axis axis, std::string_view field, const auto& of) {
+    std::vector<double>& its = places[std::size_t(Number(axis))];
+    ReadNumbers(field, of, its, kMaxVolumeSide, check);
+    for (std::size_t i = 0; i < its.size(); ++i) {
+      const auto scope = check.In(field, i);
+      its[i] = check.Finite("", its[i]);
+    }
+    if (Status status = check.ok() ? Stretch::Check(its, out.geometry.size[axis]) : Status::Ok(); !status.ok()) {
+      check.Fail(field, status.message());
+    }
+  };
+  read(Axis::kX, "x_places", in.x_places());
+  read(Axis::kY, "y_places", in.y_places());
+  read(Axis::kZ, "z_places", in.z_places());
+  if (check.ok()) out.geometry.stretch = Stretch::Make(places, out.geometry.size).value();
+}
+
 // The corners of empty bounds mean nothing.
 void Write(const PixelBounds& in, v1::PixelBounds& out) {
   if (in.empty()) return;

@@ -98,6 +98,17 @@ void CheckFields(const FrameSetup& setup, Checker& check) {
   }
 }
 
+// The volume alone may be rectilinear, and then there is nothing else (CheckRectilinear, common/planning/resolved_request.cpp).
+void CheckStretch(const FrameSetup& setup, Checker& check) {
+  const auto is_even = [](const CoarserLevel& level) { return !level.description.geometry.rectilinear(); };
+  check.That(std::ranges::all_of(setup.coarser, is_even), "coarser", "a rectilinear grid");
+  for (const FieldSetup& field : setup.fields) check.That(std::ranges::all_of(field.levels, is_even), "fields", "a rectilinear grid");
+  if (!setup.description.geometry.rectilinear()) return;
+  check.That(setup.renderer->Can(Ability::kRectilinear), "renderer", "one that draws no rectilinear grid");
+  const bool alone = setup.coarser.empty() && setup.fields.empty() && !setup.light;
+  check.That(alone, "description", "a rectilinear grid beside levels, fields or a light volume");
+}
+
 // `m` names every worker of the group and the display worker, nobody twice.
 void CheckPeers(const GroupAssignment& m, Checker& check) {
   std::vector<WorkerId> known;
@@ -184,6 +195,7 @@ void Rules(const FrameSetup& m, Checker& check) {
   CheckLight(m.light, m.description, m, check);
   CheckCellsAndLabels(m, check);
   CheckFields(m, check);
+  CheckStretch(m, check);
   if (check.ok()) check.Adopt(Validate(m.transfer));
   if (check.ok()) check.Adopt(Validate(m.shading));
 }

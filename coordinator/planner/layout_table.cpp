@@ -85,7 +85,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   if (request.occupied != nullptr && learnt_.Find(key.volume) == nullptr) {
     lock.unlock();
     OccupancyGrid drawn = *request.occupied;
-    EmptyClippedCells(key.volume.clip(), drawn);
+    EmptyClippedCells(key.volume.clip(), request.summary->description.geometry, drawn);
     MeasuredCost cost(drawn);
     lock.lock();
     if (learnt_.Find(key.volume) == nullptr) {

@@ -66,7 +66,8 @@ VolumeLevels LevelsToMake(const std::shared_ptr<const VolumeSummary>& summary) {
 
 // The finest of the levels that are coarser than what the request draws and that fit.
 std::optional<int> LevelThatFits(const PlanRequest& request) {
-  if (!request.resolved->summary->cells.empty()) return std::nullopt;  // cells have none
+  const VolumeSummary& summary = *request.resolved->summary;
+  if (!summary.cells.empty() || summary.description.geometry.rectilinear()) return std::nullopt;  // they have none
   const VolumeLevels levels = request.levels != nullptr ? *request.levels : LevelsToMake(request.resolved->summary);
   const FrameRequest& frame = request.levels != nullptr ? *request.frame : request.resolved->frame;
   for (std::size_t level = std::size_t(request.level) + 1; level < levels.levels.size(); ++level) {

@@ -117,10 +117,16 @@ decltype(auto) WithSamples(const MeasuredVolume& volume, const auto& measure) {
   });
 }
 
+Result<ClipRegion> RegionOf(const MeasuredVolume& volume, const ClipBox& box) {
+  const VolumeGeometry& geometry = volume.description.geometry;
+  if (!geometry.rectilinear()) return MakeClipRegion({.box = box}, geometry);
+  return Status::InvalidArgument("statistics count voxels, which differ in size on a rectilinear grid; --resample even resamples it");
+}
+
 }  // namespace
 
 Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& box) {
-  const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.description.geometry);
+  const Result<ClipRegion> region = RegionOf(volume, box);
   if (!region.ok()) return region.status();
   return WithSamples(volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) {
     Moments moments;
@@ -134,7 +140,7 @@ Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& 
 
 Result<std::map<std::uint64_t, BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box,
                                                                  const ReadLabels& labels) {
-  const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.description.geometry);
+  const Result<ClipRegion> region = RegionOf(volume, box);
   if (!region.ok()) return region.status();
   return WithSamples(
       volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) -> Result<std::map<std::uint64_t, BoxStatistics>> {

@@ -55,6 +55,9 @@ void AddPairs(const VoxelBlock& block, const Box& box, const Vec3& spacing, std:
 }  // namespace
 
 Result<JointHistogram> CountJointly(const VolumeDescription& volume, ValueRange range, const ReadJointBox& read) {
+  if (volume.geometry.rectilinear()) {
+    return Status::InvalidArgument("values are counted with slopes on even grids alone; --resample even resamples a rectilinear one");
+  }
   const Index3 size = volume.geometry.size;
   std::vector<Pair> pairs;
   for (const Box& box : SpreadBoxes(size)) {

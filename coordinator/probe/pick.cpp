@@ -14,25 +14,25 @@ namespace slabstream {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kStep = 0.25;  // least spacings
+constexpr double kStep = 0.25;  // least distances of voxels
 constexpr int kParts = 64;      // of the step in which the point lies
 
 // Depths [begin, end] of a ray.
-struct Stretch {
+struct DepthRange {
   double begin, end;
 };
 
 // What clipping leaves of the ray in the volume, nearest first.
-std::vector<Stretch> DrawnStretches(const FrameSetup& setup, const Camera::Ray& ray) {
-  Stretch whole = {0, kInfinity};
-  const auto cut = [&ray](Stretch& stretch, const Vec3& normal, double offset) {  // keeps Dot(normal, p) + offset >= 0
+std::vector<DepthRange> DrawnRanges(const FrameSetup& setup, const Camera::Ray& ray) {
+  DepthRange whole = {0, kInfinity};
+  const auto cut = [&ray](DepthRange& range, const Vec3& normal, double offset) {  // keeps Dot(normal, p) + offset >= 0
     const double at_origin = Dot(normal, ray.origin) + offset, slope = Dot(normal, ray.direction);
     if (slope > 0) {
-      stretch.begin = std::max(stretch.begin, -at_origin / slope);
+      range.begin = std::max(range.begin, -at_origin / slope);
     } else if (slope < 0) {
-      stretch.end = std::min(stretch.end, -at_origin / slope);
+      range.end = std::min(range.end, -at_origin / slope);
     } else if (at_origin < 0) {
-      stretch.end = -kInfinity;
+      range.end = -kInfinity;
     }
   };
   for (const Axis axis : kAxes) {
@@ -43,11 +43,11 @@ std::vector<Stretch> DrawnStretches(const FrameSetup& setup, const Camera::Ray& 
   }
   if (whole.begin >= whole.end) return {};
   if (setup.clip.empty()) return {whole};
-  Stretch region = whole;
+  DepthRange region = whole;
   for (const HalfSpace& side : setup.clip.sides) cut(region, side.normal, side.offset);
-  if (setup.clip.mode == ClipMode::kKeep) return region.begin < region.end ? std::vector{region} : std::vector<Stretch>{};
+  if (setup.clip.mode == ClipMode::kKeep) return region.begin < region.end ? std::vector{region} : std::vector<DepthRange>{};
   if (region.begin >= region.end) return {whole};
-  std::vector<Stretch> rest;
+  std::vector<DepthRange> rest;
   if (whole.begin < region.begin) rest.push_back({whole.begin, region.begin});
   if (region.end < whole.end) rest.push_back({region.end, whole.end});
   return rest;
@@ -61,7 +61,7 @@ struct Entry {
 
 // The ray through opaque cells of voxels, [v - 0.5, v + 0.5) (J. Amanatides, A. Woo: A fast voxel traversal algorithm, 1987).
 std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
-                                      const std::vector<Stretch>& stretches) {
+                                      const std::vector<DepthRange>& ranges) {
   const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
   const FieldSetup* const labels = LabelsOf(setup);
   const auto is_opaque = [&](const Index3& voxel) {
@@ -72,10 +72,10 @@ std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume
     return std::isfinite(stored) && table.opacity[std::size_t(table.BinOf(stored))] > 0;
   };
   const Box bounds = setup.description.geometry.bounds();
-  for (const Stretch& stretch : stretches) {
-    double depth = stretch.begin;
+  for (const DepthRange& range : ranges) {
+    double depth = range.begin;
     Index3 voxel = Max(bounds.begin, Min(VoxelAt(ray.origin + depth * ray.direction), bounds.end - Uniform(1)));
-    while (bounds.Contains(voxel) && depth < stretch.end) {
+    while (bounds.Contains(voxel) && depth < range.end) {
       if (is_opaque(voxel)) return Entry{depth, voxel};
       double next = kInfinity;
       int axis = 0;
@@ -97,14 +97,15 @@ std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume
 
 // The nearest sample with the largest value of `sign` * value.
 std::optional<double> Extreme(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
-                              const std::vector<Stretch>& stretches, double step, double sign) {
+                              const std::vector<DepthRange>& ranges, double step, double sign) {
   std::optional<double> at;
   double best = -kInfinity;
-  for (const Stretch& stretch : stretches) {
-    const auto count = std::int64_t(std::ceil((stretch.end - stretch.begin) / step));
+  for (const DepthRange& range : ranges) {
+    const auto count = std::int64_t(std::ceil((range.end - range.begin) / step));
     for (std::int64_t i = 0; i <= count; ++i) {
-      const double depth = std::min(stretch.begin + double(i) * step, stretch.end);
-      const double value = sign * setup.description.mapping.FromStored(volume.Interpolated(ray.origin + depth * ray.direction));
+      const double depth = std::min(range.begin + double(i) * step, range.end);
+      const Vec3 voxel = setup.description.geometry.stretch.ToVoxel(ray.origin + depth * ray.direction);
+      const double value = sign * setup.description.mapping.FromStored(volume.Interpolated(voxel));
       if (!(value > best)) continue;  // also not finite
       best = value;
       at = depth;
@@ -130,7 +131,7 @@ class Matter {
     double stored, opacity;
   };
   const std::vector<Surface>& surfaces() const { return surfaces_; }
-  double StoredAt(const Vec3& p) const { return volume_.Interpolated(p); }
+  double StoredAt(const Vec3& p) const { return volume_.Interpolated(stretch().ToVoxel(p)); }
 
   // Of a least spacing at p, where the interpolated sample is `stored`; infinite: opaque.
   double Extinction(const Vec3& p, double stored) const {
@@ -167,13 +168,18 @@ class Matter {
     return SmoothLabel(around, p - ToVec3(floor)).opacity;
   }
 
+  const Stretch& stretch() const { return setup_.description.geometry.stretch; }
+
   // Data values per unit of the world.
   double Slope(const Vec3& p) const {
+    const Vec3 voxel = stretch().ToVoxel(p);
     Vec3 gradient;
     for (int i = 0; i < 3; ++i) {
       Vec3 offset;
       offset[i] = 1;
-      gradient[i] = (volume_.Interpolated(p + offset) - volume_.Interpolated(p - offset)) / 2 * per_world_[i];
+      const Axis axis = kAxes[std::size_t(i)];
+      const double length = stretch().ToData(voxel[i] + 1, axis) - stretch().ToData(voxel[i] - 1, axis);
+      gradient[i] = (volume_.Interpolated(voxel + offset) - volume_.Interpolated(voxel - offset)) / length * per_world_[i];
     }
     const double slope = Length(gradient) * std::abs(setup_.description.mapping.scale);
     return std::isfinite(slope) ? slope : 0;
@@ -192,11 +198,11 @@ class HalfLightWalk {
   HalfLightWalk(const Matter& matter, const Camera::Ray& ray, double least_per_depth)
       : matter_(matter), ray_(ray), least_per_depth_(least_per_depth) {}
 
-  std::optional<double> Along(const Stretch& stretch, double step) {
-    const auto count = std::int64_t(std::ceil((stretch.end - stretch.begin) / step));
-    double stored = StoredAt(stretch.begin);
+  std::optional<double> Along(const DepthRange& range, double step) {
+    const auto count = std::int64_t(std::ceil((range.end - range.begin) / step));
+    double stored = StoredAt(range.begin);
     for (std::int64_t i = 0; i < count; ++i) {
-      const Stretch part = {stretch.begin + double(i) * step, std::min(stretch.begin + double(i + 1) * step, stretch.end)};
+      const DepthRange part = {range.begin + double(i) * step, std::min(range.begin + double(i + 1) * step, range.end)};
       const double before = left_, first = stored;
       Pass(part, stored);
       if (left_ > kHalf) continue;
@@ -205,7 +211,7 @@ class HalfLightWalk {
       stored = first;
       for (int k = 0; k < kParts; ++k) {
         const double width = (part.end - part.begin) / kParts;
-        const Stretch small = {part.begin + k * width, part.begin + (k + 1) * width};
+        const DepthRange small = {part.begin + k * width, part.begin + (k + 1) * width};
         Pass(small, stored);
         if (left_ <= kHalf) return 0.5 * (small.begin + small.end);
       }
@@ -220,7 +226,7 @@ class HalfLightWalk {
   double StoredAt(double depth) const { return matter_.StoredAt(ray_.origin + depth * ray_.direction); }
 
   // `stored`: the sample at its begin, then that at its end.
-  void Pass(const Stretch& part, double& stored) {
+  void Pass(const DepthRange& part, double& stored) {
     const double middle = 0.5 * (part.begin + part.end), next = StoredAt(part.end);
     const Vec3 p = ray_.origin + middle * ray_.direction;
     left_ *= std::exp(-matter_.Extinction(p, StoredAt(middle)) * (part.end - part.begin) * least_per_depth_);
@@ -240,30 +246,31 @@ class HalfLightWalk {
 
 std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, double x, double y) {
   const Camera::Ray ray = setup.camera.RayAt(x * setup.camera.supersample, y * setup.camera.supersample);
-  const std::vector<Stretch> stretches = DrawnStretches(setup, ray);
+  const std::vector<DepthRange> ranges = DrawnRanges(setup, ray);
   const Vec3& spacing = setup.description.geometry.spacing;
-  const double least_per_depth = Length(ray.direction * spacing) / Least(spacing), step = kStep / least_per_depth;
+  const double length_per_depth = Length(ray.direction * spacing), least_per_depth = length_per_depth / Least(spacing);
+  const double step = kStep * setup.description.geometry.least_distance() / length_per_depth;
 
   const auto picked = [&](double depth, double deeper) {
     const Box bounds = setup.description.geometry.bounds();
-    const Index3 voxel = VoxelAt(ray.origin + (depth + deeper) * ray.direction);
+    const Index3 voxel = VoxelAt(setup.description.geometry.stretch.ToVoxel(ray.origin + (depth + deeper) * ray.direction));
     return Picked{ray.origin + depth * ray.direction, depth, Max(bounds.begin, Min(voxel, bounds.end - Uniform(1)))};
   };
   const auto extreme = [&](double sign) -> std::optional<Picked> {
-    const std::optional<double> depth = Extreme(setup, volume, ray, stretches, step, sign);
+    const std::optional<double> depth = Extreme(setup, volume, ray, ranges, step, sign);
     return depth ? std::optional(picked(*depth, 0)) : std::nullopt;
   };
   switch (setup.renderer->PickRuleOf(setup.parameters)) {
     case PickRule::kHalfOpacity: {
       const Matter matter(setup, volume);
       HalfLightWalk walk(matter, ray, least_per_depth);
-      for (const Stretch& stretch : stretches) {
-        if (const std::optional<double> depth = walk.Along(stretch, step)) return picked(*depth, 1 / least_per_depth);
+      for (const DepthRange& range : ranges) {
+        if (const std::optional<double> depth = walk.Along(range, step)) return picked(*depth, step / kStep);
       }
       return std::nullopt;
     }
     case PickRule::kSurface: {
-      const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, stretches);
+      const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, ranges);
       if (!entry) return std::nullopt;
       return Picked{ray.origin + entry->depth * ray.direction, entry->depth, entry->voxel};
     }

@@ -5,8 +5,8 @@
 
 namespace slabstream {
 
-Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at) {
-  return geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing;
+Vec3 VoxelPoint(const VolumeGeometry& geometry, const Vec3& at) {
+  return geometry.stretch.ToVoxel(geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing);
 }
 
 double ProbedVoxels::At(const Index3& voxel) const { return held_ ? SampleOf<double>(*held_, voxel) : find_(voxel); }
@@ -41,7 +41,7 @@ Index3 VoxelAt(const Vec3& p) {
 }
 
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at) {
-  return SampleAtVoxel(volume, summary, at, VoxelAt(DataPoint(summary.description.geometry, at)));
+  return SampleAtVoxel(volume, summary, at, VoxelAt(VoxelPoint(summary.description.geometry, at)));
 }
 
 VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at, const Index3& voxel) {
@@ -55,7 +55,7 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
   sample.value = finite(value.value);
   sample.rest = value.rest;
   if (!IsOfLabels(summary.description.type))
-    sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
+    sample.interpolated = finite(mapping.FromStored(volume.Interpolated(VoxelPoint(summary.description.geometry, at))));
   if (volume.label) sample.label = LabelAt{volume.label(voxel), {}};
   return sample;
 }

@@ -48,15 +48,15 @@ struct ProbeVolume {
 
   double StoredAt(const Index3& voxel) const { return voxels.At(voxel); }  // the stored sample of a voxel inside the volume
 
-  // Trilinear between the voxels around p (data space); beyond the outermost centres the nearest voxel counts. NaN: one of them is.
+  // Trilinear between the voxels around p (voxel coordinates); beyond the outermost centres the nearest voxel counts. NaN: one of them is.
   double Interpolated(const Vec3& p) const;
 };
 
-// The voxel whose cell, [v - 0.5, v + 0.5), holds p (data space).
+// The voxel whose cell, [v - 0.5, v + 0.5), holds p (voxel coordinates).
 Index3 VoxelAt(const Vec3& p);
 
-// Where a point of the world lies in data space.
-Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at);
+// The voxel coordinates of a point of the world.
+Vec3 VoxelPoint(const VolumeGeometry& geometry, const Vec3& at);
 
 // `at` is a point of the world. `summary` is that of the dataset. A label gets its name later: the labels' own summary has it.
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at);

@@ -336,7 +336,8 @@ Status AddFields(const AnswerQuestion& asked, const std::vector<VoxelServer::Sam
       if (!sample.inside) continue;
       FieldSample& found = sample.fields.emplace_back(FieldSample{TitleOf(fields, field.number)});
       const Vec3 voxel = ToVec3(sample.voxel);
-      const Vec3 p = of.geometry == volume.geometry ? voxel : DataPoint(of.geometry, volume.geometry.ToWorld(voxel));
+      const Vec3 p =
+          of.geometry == volume.geometry ? voxel : VoxelPoint(of.geometry, volume.geometry.ToWorld(volume.geometry.stretch.ToData(voxel)));
       if (!of.geometry.bounds().Contains(VoxelAt(p))) continue;
       const double value = of.mapping.FromStored(voxels.Interpolated(p));
       if (std::isfinite(value)) found.value = value;
@@ -351,8 +352,9 @@ ReadLabels LabelsBesideVolume(const AnswerQuestion& asked, const VoxelServer::Sa
   const VolumeGeometry &grid = asked.summary->description.geometry, &labels = asked.labels.summary->description.geometry;
   const AffineMap map = AffineMapBetween(grid, labels);
   const auto read = of.in_parts.source != nullptr ? std::make_shared<ReadVoxels>(of.in_parts) : nullptr;
-  const bool same_voxels = map.is_identity() && grid.size == labels.size;
-  return [map, read, same_voxels, &of, &status, bounds = labels.bounds()](const Index3& first, std::span<std::uint64_t> row) {
+  const bool same_voxels = map.is_identity() && grid.size == labels.size && !grid.rectilinear();
+  return [map, stretch = grid.stretch, read, same_voxels, &of, &status, bounds = labels.bounds()](const Index3& first,
+                                                                                                  std::span<std::uint64_t> row) {
     if (read == nullptr && same_voxels) {
       const VoxelBricks held = of.view();
       return VisitLabelType(held.type(), [&]<class T>(const T*) {
@@ -361,7 +363,7 @@ ReadLabels LabelsBesideVolume(const AnswerQuestion& asked, const VoxelServer::Sa
       });
     }
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const Index3 voxel = VoxelAt(map.To(ToVec3(first + Index3{std::int32_t(i), 0, 0})));
+      const Index3 voxel = VoxelAt(map.To(stretch.ToData(ToVec3(first + Index3{std::int32_t(i), 0, 0}))));
       row[i] = !bounds.Contains(voxel) ? 0 : read != nullptr ? read->LabelAt(voxel) : SampleOf<std::uint64_t>(of.view(), voxel);
     }
     if (read != nullptr && status.ok()) status = read->status();

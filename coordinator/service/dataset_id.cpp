@@ -12,13 +12,22 @@ namespace slabstream {
 
 namespace {
 
+std::string OfStretch(const Stretch& stretch) {
+  std::string text;
+  for (const Axis axis : kAxes) {
+    const std::vector<double>& knots = stretch.knots(axis);
+    if (!knots.empty()) text += fmt::format(" {} {:x}", Letter(axis), Digest(std::as_bytes(std::span(knots))));
+  }
+  return text;
+}
+
 std::string OfDescription(const VolumeDescription& description) {
   const auto& [geometry, type, mapping] = description;
-  const auto& [size, spacing, orientation] = geometry;
+  const auto& [size, spacing, orientation, stretch] = geometry;
   const auto numbers = [](const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", size.x, size.y, size.z, numbers(spacing), int(orientation.world),
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}{}", size.x, size.y, size.z, numbers(spacing), int(orientation.world),
                      numbers(orientation.origin), numbers(orientation.axes[0]), numbers(orientation.axes[1]), numbers(orientation.axes[2]),
-                     int(type), mapping.scale, mapping.offset);
+                     int(type), mapping.scale, mapping.offset, OfStretch(stretch));
 }
 
 DatasetId IdOf(const std::string& text) { return std::max<DatasetId>(Digest(std::as_bytes(std::span(text))), 1); }

@@ -58,7 +58,8 @@ Result<StoredStream> OpenStore(const std::string& path, SourceInfo stream, const
   if (stored.type != whole.type || stored.geometry.size != whole.geometry.size) {
     return Status::DataLoss(fmt::format("'{}' is damaged: remove it", path));
   }
-  if (whole.voxel_bytes() <= kExactBytes) stream.levels.resize(1);
+  // Levels are those of even grids.
+  if (whole.voxel_bytes() <= kExactBytes || whole.geometry.rectilinear()) stream.levels.resize(1);
   // The numbers of the file itself, before a writer has rounded them.
   stream.levels.front().description = whole;
   for (SourceLevel& level : stream.levels) level.description.mapping = whole.mapping;

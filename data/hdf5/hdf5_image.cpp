@@ -127,20 +127,20 @@ Result<RawHeader> HeaderOf(const std::string& named, const ImageDescription& ima
   return header;
 }
 
-// What becomes of axes whose coordinates are not even.
+// What becomes of axes whose coordinates are not even. Labels, and coordinates that go up and down, have no rectilinear grid.
 void PlaceUneven(const std::string& path, const ReadOptions& options, ImageDescription& image) {
   for (ImageAxis& axis : image.axes) {
     if (axis.uneven.empty()) continue;
-    if (options.resample) {
+    const bool values = !image.labels && !options.labels;
+    if (options.resample || (values && UnevenAxisOf(axis.uneven_named, axis.uneven, ValuesAt::kPoints).ok())) {
       image.world = World::kScene;
       axis.start = axis.uneven.front();
       axis.step = (axis.uneven.back() - axis.start) / double(axis.uneven.size() - 1);
       image.notes.push_back(fmt::format("coordinates {} place its axis", axis.uneven_named));
       continue;
     }
-    image.notes.push_back(fmt::format(
-        "coordinates {} are not evenly spaced: {}; voxels along it are shown at a distance of 1, unless --resample even resamples them",
-        axis.uneven_named, WhyUneven(axis.uneven)));
+    image.notes.push_back(fmt::format("coordinates {} are not evenly spaced: {}; {} along it are shown at a distance of 1",
+                                      axis.uneven_named, WhyUneven(axis.uneven), values ? "voxels" : "labels"));
     LogWarning(fmt::format("{}: {}", path, image.notes.back()));
     axis.uneven.clear();
     axis.unit.reset();

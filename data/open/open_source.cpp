@@ -18,6 +18,7 @@
 #include "data/sources/hollow_source.h"
 #include "data/sources/label_source.h"
 #include "data/sources/magnitude_source.h"
+#include "data/sources/rectilinear_source.h"
 #include "data/survey/survey.h"
 #include "data/tiles/tiled_tiff.h"
 #include "data/volume_io/chosen_channel.h"
@@ -51,7 +52,8 @@ Result<std::shared_ptr<VolumeSource>> OpenAs(const VolumeFormat& format, const s
   Result<std::shared_ptr<VolumeSource>> source = std::shared_ptr<VolumeSource>();
   if (format.open != nullptr) source = format.open(path, options, context);
   if (source.ok() && *source == nullptr) source = OpenFile(format, path, options, context);
-  if (!source.ok() || !options.resample) return source;
+  if (!source.ok()) return source;
+  if (!options.resample) return AsRectilinear(path, *std::move(source));
   if (options.labels) return Status::InvalidArgument(path + ": --ids says that values are labels, which are not resampled");
   return MakeEven(path, *std::move(source), *options.resample);
 } catch (const std::bad_alloc&) {

@@ -77,7 +77,7 @@ class PackedArray : public ChunkedArray, public std::enable_shared_from_this<Pac
 }  // namespace
 
 Result<std::shared_ptr<VolumeSource>> OpenPacked(const std::string& path, LocatedVolume volume, const SourceContext& context) {
-  const auto& [size, spacing, orientation] = volume.info.finest().geometry;
+  const auto& [size, spacing, orientation, stretch] = volume.info.finest().geometry;
   PyramidLevel level{.array = std::make_shared<PackedArray>(path, volume.header, std::move(volume.packed), context),
                      .mirrored = volume.turn.flipped,
                      .at = {0, 0, 0, std::uint64_t(volume.component)},

@@ -81,16 +81,11 @@ Result<std::int32_t> VoxelsAlong(const std::string& name, const UnevenAxis& axis
 
 // For people.
 std::string NoteOf(const UnevenAxis& axis, Axis letter, std::int32_t voxels, double spacing) {
-  double shortest = axis.centres[1] - axis.centres[0], longest = shortest;
   std::size_t shorter = 0;
   for (std::size_t i = 1; i < axis.centres.size(); ++i) {
-    const double step = axis.centres[i] - axis.centres[i - 1];
-    shortest = std::min(shortest, step);
-    longest = std::max(longest, step);
-    if (step < spacing * (1 - 1e-6)) ++shorter;
+    if (axis.centres[i] - axis.centres[i - 1] < spacing * (1 - 1e-6)) ++shorter;
   }
-  return fmt::format("the {} voxels along {}, {:g} to {:g} apart, are resampled linearly to {} even ones {:g} apart{}", axis.centres.size(),
-                     Letter(letter), shortest, longest, voxels, spacing,
+  return fmt::format("{} are resampled linearly to {} even ones {:g} apart{}", DistancesText(axis, letter), voxels, spacing,
                      shorter > 0 ? fmt::format("; {} of the distances are shorter", shorter) : "");
 }
 

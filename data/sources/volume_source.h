@@ -81,8 +81,8 @@ struct SourceInfo {
   std::shared_ptr<const FileStamp> growth = {};
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
-  // Of a rectilinear grid: its coordinates along each uneven axis of the world, rising. The level's spacing is then their mean distance,
-  // so whoever opens such a source makes it even (even_source.h).
+  // Of a rectilinear grid, before its voxels are placed (rectilinear_source.h) or made even (even_source.h): its coordinates along each
+  // uneven axis of the world, rising. The level's spacing is then their mean distance.
   UnevenAxes uneven = {};
   // Boxes are read fast only in this order, since what lies in front of a box is read, too (data/positional/slice_stream.h).
   std::optional<SliceOrder> slices = {};

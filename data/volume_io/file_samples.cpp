@@ -90,6 +90,9 @@ std::string DataValue(const Volume& volume, const ExactSamples* exact, std::size
 
 Result<FileSamples> FileSamples::Of(const Volume& volume, const ExactSamples* exact, std::optional<SampleType> type,
                                     WriteProgress progress) {
+  if (volume.description.geometry.rectilinear()) {
+    return Status::InvalidArgument("its grid is rectilinear, and files of voxels hold even grids alone; --resample even makes one");
+  }
   if (type == SampleType::kFloat16) return Status::InvalidArgument("float16 samples are read, but not written; float32 holds them");
   if (type) {
     if (const std::optional<std::size_t> misfit = FirstMisfit(volume, exact, *type)) {

@@ -24,7 +24,7 @@ class FileSamples {
   // The volume and its exact samples, if any (else null), must outlive what is made. Without `type`: the type that the samples were read
   // from if that is known to hold the data values, else the smallest integer type that holds them, else float32, or float64 of exact
   // samples. With it InvalidArgument, naming the value and the voxel: the type does not hold a data value (floats hold rounded ones), or is
-  // float16.
+  // float16. InvalidArgument: the grid is rectilinear.
   static Result<FileSamples> Of(const Volume& volume, const ExactSamples* exact, std::optional<SampleType> type,
                                 WriteProgress progress = {});
 

@@ -192,7 +192,7 @@ std::array<double, 3> QuaternionOf(const std::array<Vec3, 3>& axes) {
 }
 
 std::string HeaderOf(const FileSamples& samples) {
-  const auto& [size, spacing, orientation] = samples.geometry();
+  const auto& [size, spacing, orientation, stretch] = samples.geometry();
   std::string bytes(std::size_t{kUsualOffset}, '\0');
   const auto put = [&]<class T>(std::size_t offset, T value) { std::memcpy(bytes.data() + offset, &value, sizeof value); };
   put(0, kNifti1Bytes);

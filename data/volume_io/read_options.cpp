@@ -178,8 +178,8 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},
       {"resample", "even|VOXELS",
-       "Puts a rectilinear grid on even voxels by linear interpolation: none longer than the shortest distance, or so many along each "
-       "uneven axis",
+       "Puts a rectilinear grid on even voxels by linear interpolation, for all renderers: none longer than the shortest distance, or so "
+       "many along each uneven axis",
        SetResample, IsGiven<&ReadOptions::resample>},
       {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
       {"follow-links", "", "Follow links that lead out of a folder of Zarr, N5 or precomputed, such as those of git-annex and DataLad",

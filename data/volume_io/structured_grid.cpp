@@ -34,8 +34,7 @@ Status SetGrid(RawHeader& header, const std::string& path, const PointGrid& grid
   return SetSize(header, path, std::move(sizes), {});
 }
 
-Result<PointGrid> GridOfCoordinates(const std::string& path, const std::array<std::vector<double>, 3>& coordinates,
-                                    const ReadOptions& options) {
+PointGrid GridOfCoordinates(const std::array<std::vector<double>, 3>& coordinates) {
   PointGrid grid{.matrix = "coordinates"};
   Vec3 steps;
   double smallest = std::numeric_limits<double>::infinity();
@@ -46,12 +45,6 @@ Result<PointGrid> GridOfCoordinates(const std::string& path, const std::array<st
     for (std::size_t i = 0; i < places.size(); ++i) {
       const double even = first + double(i) * step;
       if (std::abs(places[i] - even) <= kMostUneven * std::abs(step) + rounding && (step != 0 || places.size() == 1)) continue;
-      if (!options.resample) {
-        return Status::InvalidArgument(
-            fmt::format("{}: its coordinates along {} are not even: number {} is {}, must be within {} of a mean spacing of {}; --resample "
-                        "even puts it on even voxels",
-                        path, Letter(axis), i, places[i], kMostUneven, even));
-      }
       grid.uneven[std::size_t(Number(axis))] = places;
       break;
     }

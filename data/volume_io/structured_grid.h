@@ -29,10 +29,8 @@ struct PointGrid {
 Status SetGrid(RawHeader& header, const std::string& path, const PointGrid& grid, ValuesAt at);
 
 // The grid of points at these coordinates along x, y and z, at least one each; an axis with one point has the smallest spacing of the
-// others. They are uneven if they are off by more than kMostUneven of the mean spacing and what rounding to float32 makes. InvalidArgument,
-// naming `path`, axis and coordinate: they are uneven, and options.resample does not say what becomes of them.
+// others. They are uneven if they are off by more than kMostUneven of the mean spacing and what rounding to float32 makes.
 inline constexpr double kMostUneven = 0.01;
-Result<PointGrid> GridOfCoordinates(const std::string& path, const std::array<std::vector<double>, 3>& coordinates,
-                                    const ReadOptions& options);
+PointGrid GridOfCoordinates(const std::array<std::vector<double>, 3>& coordinates);
 
 }  // namespace slabstream

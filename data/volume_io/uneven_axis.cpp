@@ -33,6 +33,16 @@ Result<UnevenAxis> UnevenAxisOf(const std::string& named, const std::vector<doub
   return axis;
 }
 
+std::string DistancesText(const UnevenAxis& axis, Axis letter) {
+  double shortest = axis.centres[1] - axis.centres[0], longest = shortest;
+  for (std::size_t i = 2; i < axis.centres.size(); ++i) {
+    const double step = axis.centres[i] - axis.centres[i - 1];
+    shortest = std::min(shortest, step);
+    longest = std::max(longest, step);
+  }
+  return fmt::format("the {} voxels along {}, {:g} to {:g} apart,", axis.centres.size(), Letter(letter), shortest, longest);
+}
+
 double VoxelsForShortest(const UnevenAxis& axis) {
   constexpr double kRounding = 1e-6;  // of a voxel
   double shortest = std::numeric_limits<double>::infinity();

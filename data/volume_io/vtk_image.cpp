@@ -103,8 +103,7 @@ Status AddCoordinatesOfFile(const VtkXmlFile& file, const Piece& piece, const Ex
   return Status::Ok();
 }
 
-Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& path, const std::vector<Piece>& pieces, const Extent& bounds,
-                                  const ReadOptions& options) {
+Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::vector<Piece>& pieces, const Extent& bounds) {
   Coordinates coordinates;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     constexpr std::int64_t kMost = kMaxVolumeSide + 1;  // around kMaxVolumeSide cells
@@ -117,7 +116,7 @@ Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& pat
     const Status status = (file.parallel() ? AddCoordinatesOfFile : AddCoordinates)(file, piece, bounds, coordinates);
     if (!status.ok()) return status;
   }
-  return GridOfCoordinates(path, coordinates, options);
+  return GridOfCoordinates(coordinates);
 }
 
 // An array of each piece: that of pieces[i] is arrays[i].
@@ -173,8 +172,8 @@ Result<std::shared_ptr<ImageFile>> OpenImage(const std::string& path, std::strin
   if (!pieces.ok()) return pieces.status();
   const auto image = std::make_shared<ImageFile>(ImageFile{*std::move(file), *std::move(pieces)});  // which arrays are part of
   image->bounds = BoundsOf(image->pieces);
-  const Result<PointGrid> grid = kind.ends_with(kImage) ? ImageGrid(image->file, image->bounds)
-                                                        : RectilinearGrid(image->file, path, image->pieces, image->bounds, options);
+  const Result<PointGrid> grid =
+      kind.ends_with(kImage) ? ImageGrid(image->file, image->bounds) : RectilinearGrid(image->file, image->pieces, image->bounds);
   if (!grid.ok()) return grid.status();
   if (Status status = FindArrays(*image, path, options); !status.ok()) return status;
   if (Status status = SetGrid(image->header, path, *grid, image->at); !status.ok()) return status;
@@ -238,7 +237,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 
 // Appended raw and not compressed: what every reader takes, and the quickest to write.
 Status Write(const FileSamples& samples, const std::string& path) {
-  const auto& [size, spacing, orientation] = samples.geometry();
+  const auto& [size, spacing, orientation, stretch] = samples.geometry();
   const auto& axes = orientation.axes;
   const std::string extent = fmt::format("0 {} 0 {} 0 {}", size.x - 1, size.y - 1, size.z - 1);
   std::string header = fmt::format(

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kImage = "STRUCTURED_POINTS", kRectilinear = "RECTILINEAR_GRID";
 
-Result<PointGrid> GridOf(VtkLegacyFile& file, const std::string& path, const ReadOptions& options) {
+Result<PointGrid> GridOf(VtkLegacyFile& file) {
   const Vec3 points = file.Three("DIMENSIONS", {});
   if (file.kind() == kImage) {
     return PointGrid{.points = {points.x, points.y, points.z},
@@ -35,7 +35,7 @@ Result<PointGrid> GridOf(VtkLegacyFile& file, const std::string& path, const Rea
     if (!numbers.ok()) return numbers.status();
     coordinates[axis].assign(numbers->begin(), numbers->end());
   }
-  return GridOfCoordinates(path, coordinates, options);
+  return GridOfCoordinates(coordinates);
 }
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
@@ -45,7 +45,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   const Result<std::size_t> chosen = ChooseArray(path, offered.arrays, options.array);
   if (!chosen.ok()) return chosen.status();
   const VtkLegacyArray& array = file->arrays()[offered.numbers[*chosen]];
-  const Result<PointGrid> grid = GridOf(*file, path, options);
+  const Result<PointGrid> grid = GridOf(*file);
   if (!grid.ok()) return grid.status();
   RawHeader header;
   if (Status status = SetGrid(header, path, *grid, offered.arrays[*chosen].at); !status.ok()) return status;

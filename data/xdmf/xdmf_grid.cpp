@@ -18,7 +18,7 @@ class GridReader {
       : document_(document), element_(element), arrays_(arrays), grid_{.named = document.Named(element)} {}
 
   Result<XdmfGrid> Read(const ReadOptions& options, const XdmfGrid* like) {
-    const Result<PointGrid> points = ReadPoints(options);
+    const Result<PointGrid> points = ReadPoints();
     if (!points.ok()) return points.status();
     const Result<const XdmfElement*> attribute = like == nullptr ? Choose(*points, options) : FindLike(*like);
     if (!attribute.ok()) return attribute.status();
@@ -55,7 +55,7 @@ class GridReader {
   }
 
   // Their dimensions, coordinates, origin and spacing are in the order z, y, x; arrays of coordinates in that of x, y, z.
-  Result<PointGrid> ReadPoints(const ReadOptions& options) {
+  Result<PointGrid> ReadPoints() {
     const Result<const XdmfElement*> topology = document_.Needed(element_, "Topology");
     if (!topology.ok()) return topology.status();
     const std::string type = (*topology)->Word({"TopologyType", "Type"});
@@ -97,7 +97,7 @@ class GridReader {
       return document_.Wrong(**geometry, fmt::format("has {} coordinates along x, y and z, but Dimensions is '{}'", fmt::join(counts, ", "),
                                                      Printable(dimensions)));
     }
-    return GridOfCoordinates(grid_.named, {(*coordinates)[0], (*coordinates)[1], (*coordinates)[2]}, options);
+    return GridOfCoordinates({(*coordinates)[0], (*coordinates)[1], (*coordinates)[2]});
   }
 
   Result<const XdmfElement*> Choose(const PointGrid& points, const ReadOptions& options) {

@@ -127,13 +127,12 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
     if (values.size() < 2) continue;
     const bool falls = values.front() > values.back();
     if (!EvenStepsOf(values)) {
-      if (!options.resample) {
-        pyramid.info.notes.push_back(Printable(
-            fmt::format("the coordinates of {} are not evenly spaced ({}), so its spacing is 1, unless --resample even resamples it", name,
-                        WhyUneven(values))));
+      const Result<UnevenAxis> uneven = UnevenAxisOf(Printable(node.path + ": coordinates " + name), values, ValuesAt::kPoints);
+      if (!options.resample && (options.labels || !uneven.ok())) {
+        pyramid.info.notes.push_back(
+            Printable(fmt::format("the coordinates of {} are not evenly spaced ({}), so its spacing is 1", name, WhyUneven(values))));
         continue;
       }
-      const Result<UnevenAxis> uneven = UnevenAxisOf(Printable(node.path + ": coordinates " + name), values, ValuesAt::kPoints);
       if (!uneven.ok()) return uneven.status();
       pyramid.info.uneven[std::size_t(axis)] = falls ? uneven->Reversed() : *uneven;
     }

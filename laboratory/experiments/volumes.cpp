@@ -48,7 +48,7 @@ std::string DigestOf(std::span<const std::byte> bytes) { return DigestText({rein
 
 Json FileJson(const std::string& path, const Volume& volume) {
   const auto& [geometry, type, mapping] = volume.description;
-  const auto& [size, spacing, orientation] = geometry;
+  const auto& [size, spacing, orientation, stretch] = geometry;
   const auto& [scale, offset] = mapping;
   const auto numbers = [](const Vec3& v) { return Json::array({v.x, v.y, v.z}); };
   const AlignedVector<std::byte>& bytes = volume.block.bytes;

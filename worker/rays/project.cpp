@@ -10,7 +10,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "worker/rays/ray_packet-inl.h"
+#include "worker/rays/stretched_place-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream {
@@ -103,6 +103,18 @@ struct Findings {
   Mask any;
 };
 
+// Of a rectilinear grid if kStretched.
+template <bool kStretched>
+HWY_INLINE SamplePlace PlaceAt(const RayPacket& packet, const RayBox& box, Floats k) {
+  if constexpr (kStretched) return PlaceStretched(packet, box, k);
+  return PlaceSample(packet, box, k);
+}
+template <bool kStretched, int kShift>
+HWY_INLINE Floats StepsToLeave(const RayBox& box, const LeapScales& scales, const SamplePlace& place) {
+  if constexpr (kStretched) return StretchedStepsWithin<kShift>(box, scales, place, Set(1));
+  return StepsWithin<kShift>(box, scales, place, Set(1));
+}
+
 // A search along the rays of a packet, which advance separately.
 struct Search {
   Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
@@ -111,7 +123,7 @@ struct Search {
 };
 
 // Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
-template <class T, bool kNearest>
+template <class T, bool kNearest, bool kStretched>
 HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
   const RayBox& box = *work.box;
@@ -119,7 +131,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   const auto inside = hn::And(hn::Ge(search.k, owned.begin), hn::Lt(search.k, owned.end));
   const auto alive = hn::And(inside, hn::Lt(found.best, Set(bounds.most)));
   if (hn::AllFalse(df, alive)) return false;
-  const SamplePlace place = PlaceSample(packet, box, search.k);
+  const SamplePlace place = PlaceAt<kStretched>(packet, box, search.k);
   // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
   auto sampled = alive;
   auto steps = Set(1);
@@ -128,12 +140,12 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   } else {
     const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
     const auto dull_block = hn::Le(block, found.best);
-    steps = hn::IfThenElse(dull_block, StepsWithin<kBlockShift>(box, search.leaps, place, Set(1)), steps);
+    steps = hn::IfThenElse(dull_block, StepsToLeave<kStretched, kBlockShift>(box, search.leaps, place), steps);
     sampled = hn::AndNot(dull_block, sampled);
     if (!hn::AllFalse(df, sampled)) {
       const auto cell = hn::GatherIndex(df, bounds.cells.data(), CellOf<kCellShift>(place, box.cells, alive));
       const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
-      steps = hn::IfThenElse(dull_cell, StepsWithin<kCellShift>(box, search.leaps, place, Set(1)), steps);
+      steps = hn::IfThenElse(dull_cell, StepsToLeave<kStretched, kCellShift>(box, search.leaps, place), steps);
       sampled = hn::AndNot(dull_cell, sampled);
     }
     // Where no ray leaps, none will on the next few samples: they are mostly in the same cells.
@@ -157,7 +169,7 @@ struct Hint {
   Floats ahead, behind;
 };
 
-template <class T, bool kNearest>
+template <class T, bool kNearest, bool kStretched>
 HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
                               Findings& found) {
   const auto one = Set(1);
@@ -167,25 +179,25 @@ HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, 
   Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
   // In turns: while one waits for memory, the other goes on.
   for (bool ahead = true, behind = true; ahead || behind;) {
-    ahead = ahead && Advance<T, kNearest>(work, packet, owned, forwards, found);
-    behind = behind && Advance<T, kNearest>(work, packet, owned, backwards, found);
+    ahead = ahead && Advance<T, kNearest, kStretched>(work, packet, owned, forwards, found);
+    behind = behind && Advance<T, kNearest, kStretched>(work, packet, owned, backwards, found);
   }
 }
 
 // Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
 // its rays, the more is leapt over. It becomes their mean place, for the next packet.
-template <class T, bool kNearest>
+template <class T, bool kNearest, bool kStretched>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const auto [among, owned] = RaysAmongVoxels(work, packet);
   const auto one = Set(1);
   Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   if (work.rays->clip.empty()) {
-    SearchSamples<T, kNearest>(work, among, owned, hint, found);
+    SearchSamples<T, kNearest, kStretched>(work, among, owned, hint, found);
   } else {
     PacketPart parts[2];
     PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) SearchSamples<T, kNearest>(work, among, part.Of(owned), hint, found);
+    for (const PacketPart& part : parts) SearchSamples<T, kNearest, kStretched>(work, among, part.Of(owned), hint, found);
   }
   // One hint for all: rays that stay together read the same memory.
   const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
@@ -198,7 +210,7 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   return true;
 }
 
-template <class T, bool kNearest>
+template <class T, bool kNearest, bool kStretched>
 HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const IntTag di;
@@ -213,7 +225,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
     for (float k = begin; k < end; k += 1) {
       const auto sample = Set(k);
       const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceSample(among, box, sample), active);
+      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceAt<kStretched>(among, box, sample), active);
       const auto valid = hn::RebindMask(di, samples.valid);
       const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
       const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
@@ -235,21 +247,24 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
   return true;
 }
 
-template <class T, bool kNearest>
+template <class T, bool kNearest, bool kStretched>
 HWY_INLINE void ProjectPackets(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
   Hint hint = {hn::Zero(FloatTag()), Set(1e9F)};  // none: the first packet searches from both ends
   ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
-    return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest>(work, packet, hint, result)
-                                  : SumOfPacket<T, kNearest>(work, packet, result);
+    return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest, kStretched>(work, packet, hint, result)
+                                  : SumOfPacket<T, kNearest, kStretched>(work, packet, result);
   });
 }
 
 template <class T>
 HWY_INLINE void Project(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
-  if (work.nearest) {
-    ProjectPackets<T, true>(work, tile, pixels, floats_a_row);
+  if (work.box->stretch != nullptr) {
+    work.nearest ? ProjectPackets<T, true, true>(work, tile, pixels, floats_a_row)
+                 : ProjectPackets<T, false, true>(work, tile, pixels, floats_a_row);
+  } else if (work.nearest) {
+    ProjectPackets<T, true, false>(work, tile, pixels, floats_a_row);
   } else {
-    ProjectPackets<T, false>(work, tile, pixels, floats_a_row);
+    ProjectPackets<T, false, false>(work, tile, pixels, floats_a_row);
   }
 }
 

@@ -8,17 +8,20 @@
 
 namespace slabstream {
 
+struct StretchTables;  // worker/rays/stretch_tables.h
+
 struct RayBox {
   ScalarType type = ScalarType::kUint8;
-  const std::byte* samples = nullptr;  // points to voxel origin - 1: PaddedVoxels::samples
-  Index3 origin;                       // the origin of the voxels' box, less 1: no sample has a floor below
-  Index3 padded;                       // voxels that have samples, along each axis
-  std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
-  Index3 cells;                        // MacrocellRanges::counts
-  Float3 low{}, high{};                // the box owns the positions p of the frame with low <= p < high on every axis
-  Float3 scale{1, 1, 1}, offset{};     // p lies at scale * p + offset among the voxels
-  RayReach reach;                      // the reach of the positions that may matter
-  bool at_border = false;              // the box touches the volume's border
+  const std::byte* samples = nullptr;      // points to voxel origin - 1: PaddedVoxels::samples
+  Index3 origin;                           // the origin of the voxels' box, less 1: no sample has a floor below
+  Index3 padded;                           // voxels that have samples, along each axis
+  std::int32_t row = 0, slice = 0;         // samples from voxel to voxel along y and z
+  Index3 cells;                            // MacrocellRanges::counts
+  Float3 low{}, high{};                    // the box owns the positions p of the frame with low <= p < high on every axis
+  Float3 scale{1, 1, 1}, offset{};         // p lies at scale * p + offset among the voxels
+  RayReach reach;                          // the reach of the positions that may matter
+  bool at_border = false;                  // the box touches the volume's border
+  const StretchTables* stretch = nullptr;  // of a rectilinear grid, whose scale is 1 and whose offset 0
 };
 
 // The largest array of padded samples that kernels can address, in bytes.
@@ -28,10 +31,14 @@ inline constexpr std::size_t kMostRayBytes = (std::size_t{1} << 31) - 1;
 struct SampledRegion {
   Vec3 low, high;
 };
-// All positions that a box owns.
+// All positions that a box owns; of a rectilinear grid, in voxel coordinates.
 inline SampledRegion WholeBox(const Box& box) {
   const Vec3 half = {0.5, 0.5, 0.5};
   return {ToVec3(box.begin) - half, ToVec3(box.end) - half};
+}
+// A region of voxel coordinates, in data space.
+inline SampledRegion InDataSpace(const SampledRegion& region, const Stretch& stretch) {
+  return {stretch.ToData(region.low), stretch.ToData(region.high)};
 }
 inline constexpr SampledRegion kEverywhere = {{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
 

@@ -49,7 +49,7 @@ std::size_t RayVolume::bytes() const {
   return total;
 }
 
-std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map) {
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map, const Stretch& stretch) {
   std::vector<std::size_t> order(pieces.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (camera.projection == Projection::kOrthographic) {
@@ -57,7 +57,7 @@ std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Ca
     return order;
   }
   // A ray meets only pieces on one side of the eye, so the order between pieces on different sides does not matter.
-  const double eye = map.To(camera.eye.z, Axis::kZ);
+  const double eye = stretch.ToVoxel(map.To(camera.eye.z, Axis::kZ), Axis::kZ);
   const auto distance = [&](std::size_t piece) {
     const Box& box = pieces[piece].voxels.box;
     return std::abs(std::clamp(eye, box.begin.z - 0.5, box.end.z - 0.5) - eye);

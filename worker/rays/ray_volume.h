@@ -36,10 +36,12 @@ Status TooLargeForRays(std::size_t field);
 // Cuts `box` into layers along z. The padded samples of each take at most `most_bytes`, but each has at least one slice.
 std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most_bytes);
 
-// Indices of the pieces in visibility order, nearest first. `map`: from the camera's grid to that of the voxels.
-std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map = {});
+// Indices of the pieces in visibility order, nearest first. `map`: from the camera's grid to that of the voxels. `stretch`: theirs.
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map = {},
+                                      const Stretch& stretch = {});
 
-// What a piece has of a box: positions of the frame. Two pieces that touch share one plane, bit for bit.
+// What a piece has of a box: positions of the frame, or voxel coordinates of a rectilinear grid. Two pieces that touch share one plane, bit
+// for bit.
 SampledRegion PartIn(const RayPiece& piece, std::span<const RayPiece> pieces, const Box& box, const GridMap& map);
 
 }  // namespace slabstream

@@ -19,6 +19,7 @@ struct RayFrame {
   const OcclusionMask& hidden;
   const RenderControl& control;
   RankReport& report;
+  const StretchTables* stretch = nullptr;  // of a rectilinear grid
 };
 
 // Renders the box's part in each piece and combines their images. region_of(number of the piece): the positions among the voxels whose
@@ -28,12 +29,14 @@ template <class RegionOf, class Render>
 LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame, RegionOf&& region_of, Render&& render) {
   const FrameSetup& setup = frame.setup;
   const GridMap map = MapTo(setup, frame.at.level);
+  const Stretch& stretch = setup.description.geometry.stretch;
   LocalImage image = MakeLocalImage(setup.format, {});
-  for (const std::size_t number : NearestFirst(pieces, setup.camera, map)) {
+  for (const std::size_t number : NearestFirst(pieces, setup.camera, map, stretch)) {
     const RayPiece& piece = pieces[number];
-    const SampledRegion part = PartIn(piece, pieces, frame.at.box, map);
+    const SampledRegion part = InDataSpace(PartIn(piece, pieces, frame.at.box, map), stretch);
     if (!(part.low.z < part.high.z)) continue;
-    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera, map);
+    RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, InDataSpace(region_of(number), stretch), frame.rays, setup.camera, map);
+    box.stretch = frame.stretch;
     LocalImage layer = MakeLocalImage(setup.format, box.reach.pixels);
     RenderTiles(layer, frame.hidden, frame.control, frame.report,
                 [&](const PixelBounds& tile, std::uint8_t steps, float* pixels, std::size_t floats_a_row) {

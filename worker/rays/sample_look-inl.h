@@ -35,8 +35,13 @@ struct Gradient {
   Floats x, y, z;
 };
 
-template <class T>
-HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place) {
+// Differences as they are: those of an even grid.
+struct Unscaled {
+  HWY_INLINE Floats operator()(std::size_t /*axis*/, std::size_t /*side*/, Floats difference) const { return difference; }
+};
+// `scale` turns a difference over two voxels along an axis, round the lower (0) or upper (1) voxel beside the sample, to one of data space.
+template <class T, class Scale = Unscaled>
+HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place, const Scale& scale = {}) {
   const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
   // Row y, z of 0 ... 3, interpolated along x.
   const auto inner = [&](int y, int z) SLABSTREAM_INLINED { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
@@ -46,13 +51,13 @@ HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place)
   };
   const auto slope = [&](int y, int z) SLABSTREAM_INLINED {
     const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
-    return Lerp(u, slopes.at_a, slopes.at_b);
+    return Lerp(u, scale(0, 0, slopes.at_a), scale(0, 1, slopes.at_b));
   };
   const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
   const auto along_y = [&](Floats first, Floats a, Floats b, Floats last)
-                           SLABSTREAM_INLINED { return Lerp(v, hn::Sub(b, first), hn::Sub(last, a)); };
+                           SLABSTREAM_INLINED { return Lerp(v, scale(1, 0, hn::Sub(b, first)), scale(1, 1, hn::Sub(last, a))); };
   const auto along_z = [&](Floats first, Floats a, Floats b, Floats last)
-                           SLABSTREAM_INLINED { return Lerp(w, hn::Sub(b, first), hn::Sub(last, a)); };
+                           SLABSTREAM_INLINED { return Lerp(w, scale(2, 0, hn::Sub(b, first)), scale(2, 1, hn::Sub(last, a))); };
   return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
           Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
           Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
@@ -73,12 +78,16 @@ HWY_INLINE Floats SlopeOf(const RayLook& look, const Gradient& g) {
   return hn::IfThenElseZero(hn::Le(magnitude, Set(std::numeric_limits<float>::max())), magnitude);
 }
 
-// The opacity of a step, of samples with this gradient. `opacity`: as in RayLook::entries if there are gradient factors.
-HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g) {
+// The opacity of a way, of samples with this gradient. `opacity`: as in RayLook::entries if there are gradient factors; `exponent`: as
+// RayLook::step_exponent of a step.
+HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g, Floats exponent) {
   const FloatTag df;
   const auto number = hn::Min(hn::MulAdd(SlopeOf(look, g), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
   const auto factor = hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
-  return hn::Sub(Set(1), PowerOfFraction(hn::Sub(Set(1), hn::Mul(opacity, factor)), Set(look.step_exponent)));
+  return hn::Sub(Set(1), PowerOfFraction(hn::Sub(Set(1), hn::Mul(opacity, factor)), exponent));
+}
+HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g) {
+  return OpacityByGradient(look, opacity, g, Set(look.step_exponent));
 }
 
 // The entry of a RegionTable, times four, by which samples look; values are finite.

@@ -24,9 +24,15 @@ std::optional<double> MiddleOfSlab(const Camera& camera, const ClipRegion& clip)
 
 }  // namespace
 
+double StepOf(const VolumeGeometry& geometry, double samples_per_voxel) {
+  if (!geometry.rectilinear()) return Least(geometry.spacing) / samples_per_voxel;
+  const double diagonal = Length(ToVec3(geometry.size) * geometry.spacing);
+  return std::max(geometry.least_distance() / samples_per_voxel, diagonal / kMostInDiagonal);
+}
+
 ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip) {
   const Vec3 spacing = geometry.spacing;
-  const double step = Least(spacing) / samples_per_voxel;
+  const double step = StepOf(geometry, samples_per_voxel);
   const double radius = 0.5 * Length(ToVec3(geometry.size) * spacing);
   const Vec3 middle = geometry.centre();
   const double centre_depth = camera.Project(middle).depth;

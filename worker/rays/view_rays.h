@@ -58,7 +58,12 @@ struct ViewRays {
   RayClip clip;
 };
 
-// `samples_per_voxel`: samples along a ray per least voxel spacing of the volume, > 0.
+// The distance of samples along a ray: `samples_per_voxel` to the least spacing of the volume. In a rectilinear grid, to the least distance
+// of its voxels, but at most kMostInDiagonal to the volume's diagonal.
+inline constexpr double kMostInDiagonal = 65536;
+double StepOf(const VolumeGeometry& geometry, double samples_per_voxel);
+
+// `samples_per_voxel`: samples along a ray, as StepOf has them, > 0.
 ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip = {});
 // The same rays, jittered; not where a clipped slab faces the view, whose samples lie in its middle. `jitter`: [0, 1].
 ViewRays Jittered(ViewRays rays, const Camera& camera, const ClipRegion& clip, double jitter);

@@ -64,7 +64,7 @@ class MipKind : public ProjectionKind {
                         .format = PixelFormat::kMaximum,
                         .reach = kRayReach,
                         .derived_from_stored = kRayDerived,
-                        .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels, Ability::kFields},
+                        .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels, Ability::kFields, Ability::kRectilinear},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",
                                         .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",

@@ -1,4 +1,6 @@
 // The ray caster's planning half: the frame is the picture, supersampled where it is minified; images blend front to back.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -72,7 +74,7 @@ class RaycastKind : public RendererKind {
                       .opacity_by_value = true,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
                                     Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions,
-                                    Ability::kFields, Ability::kSmoothLabels},
+                                    Ability::kFields, Ability::kSmoothLabels, Ability::kRectilinear},
                       .parameters = {SamplingRate(kSamplesAVoxel),
                                      {.name = "jitter",
                                       .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "
@@ -85,6 +87,14 @@ class RaycastKind : public RendererKind {
     return InterpolatedTable(transfer, summary);
   }
   AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
+
+  Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
+    const double jitter = setup.parameters.at(1);
+    if (setup.description.geometry.rectilinear() && jitter > 0) {
+      return Status::InvalidArgument(fmt::format("jitter is {}, must be 0 on a rectilinear grid; --resample even resamples it", jitter));
+    }
+    return RendererKind::SetView(view, size, setup);
+  }
 };
 
 }  // namespace

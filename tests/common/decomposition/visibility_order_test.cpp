@@ -16,7 +16,7 @@
 namespace slabstream {
 namespace {
 
-constexpr VolumeGeometry kGeometry = {{24, 17, 31}, {1, 2, 0.5}};
+const VolumeGeometry kGeometry = {{24, 17, 31}, {1, 2, 0.5}};
 
 // The part of the ray's half line t >= 0 that lies in the box, if it is longer than rounding.
 struct Stretch {

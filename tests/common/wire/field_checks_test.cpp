@@ -133,6 +133,16 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { setup(e)->set_termination(-1e-9); }, "GroupAssignment.setup.termination: -1e-09 is not in [0, 0.5]"},
       {[&](E& e) { setup(e)->mutable_description()->mutable_size()->set_x(0); },
        "GroupAssignment.setup.description.size.x: 0 is not in [1, 65535]"},
+      {[&](E& e) { setup(e)->mutable_description()->add_x_places(1); },
+       "GroupAssignment.setup.description.x_places: 1 places of 301 voxels"},
+      {[&](E& e) {
+         for (int i = 0; i < 301; ++i) setup(e)->mutable_description()->add_x_places(i == 7 ? 5.5 : i);
+       },
+       "GroupAssignment.setup.description.x_places: place 7 is 5.5, must lie 1e-05 or more above the one before and below 300.5"},
+      {[&](E& e) {
+         for (int i = 0; i < 301; ++i) setup(e)->mutable_description()->add_x_places(i == 7 ? 7.5 : i);
+       },
+       "GroupAssignment.setup.renderer: one that draws no rectilinear grid"},
       {[&](E& e) { setup(e)->mutable_description()->mutable_orientation()->clear_unit(); }, ""},
       {[&](E& e) { setup(e)->mutable_description()->mutable_orientation()->set_unit(v1::LENGTH_UNIT_FILE); },
        "setup.description.orientation.unit: none that a file states"},

@@ -233,6 +233,9 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"bars", kMaxShownFields},
       {"path", 1024},
       {"at", 1024},
+      {"x_places", kMaxVolumeSide},
+      {"y_places", kMaxVolumeSide},
+      {"z_places", kMaxVolumeSide},
   };
   std::map<std::string, bool> seen;
   AlterEachField(

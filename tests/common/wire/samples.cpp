@@ -43,6 +43,12 @@ VolumeDescription Description() {
   return {{{301, 370, 316}, {0.5, 1, 2.25}, {.unit = LengthUnit::kAngstrom}}, ScalarType::kUint16, {-0.125, 1e300}};
 }
 
+VolumeDescription RectilinearDescription() {
+  VolumeDescription description{{{3, 2, 4}}, ScalarType::kFloat32, {}};
+  description.geometry.stretch = Stretch::Make({{{-0.25, 0.5, 2.25}, {}, {0, 1, 1.5, 3.25}}}, description.geometry.size).value();
+  return description;
+}
+
 TransferFunction Curve() {
   return {{{-1e308, {0, 0.25F, 1}}, {0, {1, 1, 1}}, {0, {0, 0, 0}}, {1e308, {0.5F, 0.5F, 0.5F}}},
           {{-1, 0, 0.5, 0}, {7, 1, 0.001, 1}},
@@ -483,7 +489,7 @@ std::vector<StatusReply> SamplesOf() {
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
-  full.datasets[2].levels = {Description(), Description()};
+  full.datasets[2].levels = {Description(), RectilinearDescription()};
   full.datasets[2].fields = DatasetFields{.fields = {{.name = kUmlaut, .color = std::array{1.0F, 0.5F, 0.0F}, .window = ValueRange{-1, 2}},
                                                      {.shown = false},
                                                      {.channel = false}},

@@ -363,7 +363,7 @@ TEST_F(Hdf5ImageTest, LengthsOfSeveralUnitsAreThoseOfX) {
   EXPECT_DOUBLE_EQ(geometry.spacing.z, 2000);
 }
 
-TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOneOrAreResampled) {
+TEST_F(Hdf5ImageTest, UnevenCoordinatesPlaceVoxelsOrAreResampled) {
   const std::vector<std::int16_t> samples = Ascending(3 * 2 * 2);
   {
     Hdf5Writer writer(path_);
@@ -373,14 +373,22 @@ TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOneOrAreResampled) {
     writer.Doubles("/x", {2}, {0, 5});
     writer.Scales("/data", {"/lev", "/y", "/x"});
   }
-  testing::internal::CaptureStderr();
+  // The axis runs down.
   const auto source = Open();
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("the 3 voxels along z, 400 to 500 apart, lie at their own places")));
+  const VolumeGeometry& uneven = source->info().finest().geometry;
+  EXPECT_EQ(uneven.spacing, (Vec3{5, 4, 450}));
+  for (const auto& [z, at] : {std::pair{0.0, 100.0}, {1.0, 500.0}, {2.0, 1000.0}}) {
+    EXPECT_DOUBLE_EQ(uneven.ToWorld(uneven.stretch.ToData(Vec3{0, 0, z})).z, at);
+  }
+
+  testing::internal::CaptureStderr();
+  const auto labels = Open({.labels = true});
   const std::string why = "coordinates lev are not evenly spaced: number 1 is 500, an even one would be 550";
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr(why));
-  EXPECT_THAT(source->info().notes, Contains(HasSubstr(why)));
-  EXPECT_EQ(source->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
+  EXPECT_THAT(labels->info().notes, Contains(HasSubstr(why)));
+  EXPECT_EQ(labels->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
 
-  // The axis runs down.
   const auto even = Open({.resample = 0});
   EXPECT_EQ(even->info().finest().geometry.spacing, (Vec3{5, 4, 1350.0 / 4}));
   EXPECT_THAT(even->info().notes, Contains(HasSubstr("the 3 voxels along z, 400 to 500 apart, are resampled linearly to 4 even ones")));

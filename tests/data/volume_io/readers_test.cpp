@@ -193,7 +193,7 @@ TEST_F(ReadersTest, VtkImagesLieWhereTheirDirectionSays) {
   // Their x runs along the world's y, their y along -x.
   const VtiOptions turned{.direction = "0 -1 0 1 0 0 0 0 1", .extent = "10 13 20 22 -1 0", .origin = {100, 200, 300}};
   const LoadedVolume loaded = Read("v.vti", VtiFile({.spacing = {0.5, 2, 3}}, samples, turned));
-  const auto& [size, spacing, orientation] = loaded.info.finest().geometry;
+  const auto& [size, spacing, orientation, stretch] = loaded.info.finest().geometry;
   EXPECT_EQ(size, (Index3{3, 4, 2}));
   EXPECT_EQ(spacing, (Vec3{2, 0.5, 3}));
   EXPECT_EQ(orientation.world, World::kScene);

@@ -113,7 +113,7 @@ TEST_F(VtkTest, ValuesOfCellsLieBetweenThePoints) {
   EXPECT_EQ(ValuesOf("v.vti", file), Counted(24));
   const ReadOptions of_cells{.array = "c"};
   EXPECT_EQ(ValuesOf("v.vti", file, of_cells), Counted(6, 50));
-  const auto [size, spacing, orientation] = GeometryOf("v.vti", file, of_cells);
+  const auto [size, spacing, orientation, stretch] = GeometryOf("v.vti", file, of_cells);
   EXPECT_EQ(size, (Index3{3, 2, 1}));
   EXPECT_EQ(spacing, (Vec3{2, 3, 4}));
   ExpectNear(orientation.origin, {100 + 20 + 1, 200 - 60 + 1.5, 300 + 2}, 1e-12);
@@ -199,12 +199,23 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
   };
   const std::string even = file({1, 1.5, 2, 2.5}, {-3, 0, 3}, {8, 9});
   EXPECT_EQ(ValuesOf("v.vtr", even), Counted(24));
-  const auto [size, spacing, orientation] = GeometryOf("v.vtr", even);
+  const auto [size, spacing, orientation, stretch] = GeometryOf("v.vtr", even);
   EXPECT_EQ(size, (Index3{4, 3, 2}));
   EXPECT_EQ(spacing, (Vec3{0.5, 3, 1}));
   EXPECT_EQ(orientation.origin, (Vec3{1, -3, 8}));
-  EXPECT_THAT(WhyNot("v.vtr", file({1, 2, 4}, {0, 1}, {0, 1})),
-              HasSubstr("coordinates along x are not even: number 1 is 2, must be within 0.01 of a mean spacing of 2.5"));
+  // Uneven ones stay where they are, also those that run down.
+  for (const Values& x : {Values{1, 2, 4}, Values{4, 2, 1}}) {
+    const VolumeGeometry uneven = GeometryOf("v.vtr", file(x, {0, 1}, {0, 1}));
+    EXPECT_EQ(uneven.size, (Index3{3, 2, 2}));
+    for (const double at : {1, 2, 4}) {
+      const double voxel = at == 4 ? 2 : at - 1;
+      EXPECT_DOUBLE_EQ(uneven.ToWorld(uneven.stretch.ToData(Vec3{voxel, 1, 0})).x, at);
+    }
+    EXPECT_EQ(ValuesOf("v.vtr", file(x, {0}, {0})), (x[0] == 1 ? Values{0, 1, 2} : Values{2, 1, 0}));
+  }
+  EXPECT_THAT(Read("v.vtr", file({1, 2, 4}, {0, 1}, {0, 1}))->info.notes,
+              testing::Contains("the 3 voxels along x, 1 to 2 apart, lie at their own places; the spacing is their mean distance"));
+  EXPECT_THAT(WhyNot("v.vtr", file({0, 1e-9, 4}, {0, 1}, {0, 1})), HasSubstr("along x, place 0 is "));
   // From 0.5 to 5, or, run backwards, from -5 to -0.5; the points of cells: from 1 to 4.
   const ReadOptions resampled = {.resample = 9};
   const Values line = {0, 0.25, 0.75, 1.125, 1.375, 1.625, 1.875, 2, 2};
@@ -221,8 +232,8 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
     EXPECT_DOUBLE_EQ(geometry.ToWorld({5.5, 0, 0}).x, 10);
   }
   EXPECT_THAT(WhyNot("v.vtr", file({0, 1, 1}, {0, 1}, {0, 1}), resampled), HasSubstr("along x: number 2 is 1, must be finite and above"));
-  EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, 0}, {0, 1})), HasSubstr("coordinates along y are not even"));
-  EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, NAN}, {0, 1})), HasSubstr("coordinates along y are not even: number 0"));
+  EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, 0}, {0, 1})), HasSubstr("coordinates along y: number 1 is 0, must be finite and above"));
+  EXPECT_THAT(WhyNot("v.vtr", file({0, 1}, {0, NAN}, {0, 1})), HasSubstr("coordinates along y: number 1 is nan"));
   EXPECT_THAT(WhyNot("v.vtr", Replaced(even, "<Coordinates>", "<Places>").replace(even.find("</Coordinates>") - 5, 14, "</Places>")),
               HasSubstr("has coordinates along 0 axes, must have 3"));
   // One layer; coordinates that run down.
@@ -236,7 +247,7 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
   EXPECT_EQ(ValuesOf("v.vtk", legacy), Counted(24));
   EXPECT_EQ(GeometryOf("v.vtk", legacy).spacing, (Vec3{1, 2, 3}));
   const std::string uneven = Replaced(legacy, "0 2 4", "0 2 6");
-  EXPECT_THAT(WhyNot("v.vtk", uneven), HasSubstr("coordinates along y are not even"));
+  EXPECT_TRUE(GeometryOf("v.vtk", uneven).rectilinear());
   EXPECT_EQ(GeometryOf("v.vtk", uneven, {.resample = 0}).size, (Index3{4, 5, 2}));
   EXPECT_THAT(WhyNot("v.vtk", uneven, {.resample = 0, .labels = true}), HasSubstr("labels, which are not resampled"));
   EXPECT_THAT(WhyNot("v.vtk", Replaced(legacy, "Z_COORDINATES 2 int\n5 8", "Z_COORDINATES 3 int\n5 8 11")),
@@ -247,9 +258,9 @@ TEST_F(VtkTest, EvenRectilinearGridsAreVolumes) {
 TEST(GridOfCoordinatesTest, AllowsForTheRoundingOfFloats) {
   Values floats;
   for (int i = 0; i < 100; ++i) floats.push_back(float(1000 + 0.001 * i));
-  const Result<PointGrid> grid = GridOfCoordinates("f", {floats, {0, 1}, {0, 1}}, {});
-  ASSERT_TRUE(grid.ok()) << grid.status().message();
-  EXPECT_NEAR(grid->steps[0].x, 0.001, 1e-6);
+  const PointGrid grid = GridOfCoordinates({floats, {0, 1}, {0, 1}});
+  EXPECT_TRUE(grid.uneven[0].empty());
+  EXPECT_NEAR(grid.steps[0].x, 0.001, 1e-6);
 }
 
 TEST_F(VtkTest, LegacyKeywordsMayBeSmallAndWhatIsNotReadIsPassedBy) {

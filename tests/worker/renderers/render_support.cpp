@@ -197,7 +197,8 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
 
 LocalImage CombinedBoxes(const FrameSetup& setup, const Partition& partition, const std::function<LocalImage(const Box&)>& render) {
   LocalImage frame = MakeLocalImage(setup.format, {});
-  for (const BoxId id : VisibilityOrder(partition, setup.camera)) Combine(frame, render(partition.boxes()[id]), Side::kBack);
+  for (const BoxId id : VisibilityOrder(partition, setup.camera, setup.description.geometry.stretch))
+    Combine(frame, render(partition.boxes()[id]), Side::kBack);
   return frame;
 }
 

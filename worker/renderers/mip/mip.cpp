@@ -9,6 +9,7 @@
 #include "common/renderers/mip/projection_mode.h"
 #include "worker/rays/project.h"
 #include "worker/rays/render_pieces.h"
+#include "worker/rays/stretch_tables.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 
@@ -70,6 +71,8 @@ class MipRenderer : public Renderer {
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
+    std::optional<StretchTables> stretch;
+    if (setup.description.geometry.rectilinear()) stretch.emplace(setup.description.geometry.stretch);
     const auto work_of = [&](const Projected& field, const RayBox& box, std::size_t piece) {
       return ProjectWork{.rays = &rays,
                          .box = &box,
@@ -81,7 +84,8 @@ class MipRenderer : public Renderer {
                          .nearest = TakesNearestVoxel(setup)};
     };
     LocalImage image = RenderPieces(
-        *volume.pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
+        *volume.pieces, {at, setup, rays, hidden, control, report, stretch ? &*stretch : nullptr},
+        [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
             std::size_t floats_a_row) {
           ProjectTile(work_of(volume, ray_box, piece), tile, pixels, floats_a_row);

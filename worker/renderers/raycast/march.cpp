@@ -51,24 +51,9 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
 // Adds the crossings of rays with isosurfaces up to `before`, in samples. Returns how many.
 template <class T>
 HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Floats before, SurfaceWalk<T>& walk, Sums& sums) {
-  constexpr float kAhead = 32;  // samples: a packet walks so far at once
-  const FloatTag df;
-  const auto opaque = Set(1 - work.termination);
-  std::uint64_t count = 0;
-  for (;;) {
-    const auto alive = hn::Lt(sums.alpha, opaque);
-    const auto unknown = hn::And(alive, walk.MayCross(before));
-    if (!hn::AllFalse(df, unknown)) {
-      const auto last = hn::MaxOfLanes(df, hn::IfThenElseZero(unknown, before));
-      walk.Find(alive, hn::Add(last, Set(kAhead)));
-    }
-    const auto at = walk.nearest().at;
-    const auto crossing = hn::And(alive, hn::And(hn::Le(at, before), hn::Lt(at, Set(kRayEnd))));
-    if (hn::AllFalse(df, crossing)) return count;
-    count += hn::CountTrue(df, crossing);
-    AddCrossings<T>(work, crossing, walk.nearest(), sums);
-    walk.Leave(crossing);
-  }
+  constexpr float kAhead = 32;
+  return AddCrossingsUpTo(before, kAhead, work.termination, walk, sums,
+                          [&](Mask rays, const Crossing& crossing) HWY_ATTR { AddCrossings<T>(work, rays, crossing, sums); });
 }
 
 // The light on samples with labels. `gradient`: of the volume, or a face's normal if `on_face`.

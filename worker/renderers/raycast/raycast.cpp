@@ -17,6 +17,7 @@
 #include "worker/renderers/raycast/field_cells.h"
 #include "worker/renderers/raycast/frame_fields.h"
 #include "worker/renderers/raycast/march.h"
+#include "worker/renderers/raycast/march_stretched.h"
 #include "worker/renderers/raycast/surface_cells.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
@@ -142,7 +143,7 @@ class VisibilityCache : public BoxCache {
 // The table of the transfer function's regions, kept until another one is asked for.
 class RegionCache : public BoxCache {
  public:
-  // Null: it has none.
+  // Null: it has none. With extinctions of a step in place of opacities in a rectilinear grid, as of MakeExtinctions.
   const RegionTable* Of(const FrameSetup& setup, const ClassificationTable& classification, const RayLook& look) {
     const TransferFunction& transfer = setup.transfer;
     if (transfer.regions.empty()) return nullptr;
@@ -150,7 +151,11 @@ class RegionCache : public BoxCache {
                setup.range,      setup.description.mapping, look.step_exponent};
     if (key != key_) {
       table_ = MakeRegionTable(transfer, classification, setup.description.mapping);
-      table_.ReplaceOpacities([&](double opacity) { return -std::expm1(double(look.step_exponent) * std::log1p(-opacity)); });
+      const bool stretched = setup.description.geometry.rectilinear();
+      table_.ReplaceOpacities([&](double opacity) {
+        const double log = double(look.step_exponent) * std::log1p(-opacity);
+        return stretched ? std::min(-log, kOpaqueExtinction) : -std::expm1(log);
+      });
       key_ = std::move(key);
     }
     return &table_;
@@ -171,18 +176,24 @@ class RaycastRenderer : public Renderer {
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
+    const VolumeGeometry& geometry = setup.description.geometry;
+    std::optional<StretchedSteps> stretched;
+    if (geometry.rectilinear()) stretched.emplace(setup, samples_per_voxel);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     const ClassificationTable& classification = data.Classification(setup);
+    const double steps_per_voxel = stretched ? StretchedSteps::StepsPerVoxel(geometry, samples_per_voxel) : samples_per_voxel;
     RayLook look = MakeRayLook(classification, setup.transfer, setup.description, setup.camera, setup.shading,
-                               samples_per_voxel / setup.weight, GeometryOf(setup, at.level).spacing);
+                               steps_per_voxel / setup.weight, GeometryOf(setup, at.level).spacing);
+    if (stretched) MakeExtinctions(look);
     look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
     const Result<std::optional<RayLabels>> labels = LabelsFor(data, at, setup, samples_per_voxel);
     if (!labels.ok()) return labels.status();
     const RayLabels* const shown_labels = *labels ? &**labels : nullptr;
     const Result<FrameFields> fields = FrameFields::Make(data, at, setup, samples_per_voxel);
     if (!fields.ok()) return fields.status();
-    const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
-                                   setup.clip, setup.parameters.at(1));
+    const ViewRays rays = stretched ? stretched->rays
+                                    : Jittered(MakeViewRays(setup.camera, geometry, samples_per_voxel, setup.clip), setup.camera,
+                                               setup.clip, setup.parameters.at(1));
     const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, shown_labels, *fields, OctantsOf(rays));
     clock.Charge(Stage::kPrepare);
 
@@ -194,7 +205,8 @@ class RaycastRenderer : public Renderer {
     for (const RayPiece& piece : pieces) fields_of_pieces.push_back(fields->Of(piece, look));
     PerThread<std::vector<GradientBricks>> bricks;
     LocalImage image = RenderPieces(
-        pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
+        pieces, {at, setup, rays, hidden, control, report, stretched ? &stretched->tables : nullptr},
+        [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
           const RayFields ray_fields = {fields_of_pieces[piece], visible[piece].shown.data(), setup.flat};
           const MarchWork work = {.rays = &rays,
@@ -207,10 +219,14 @@ class RaycastRenderer : public Renderer {
                                   .labels = shown_labels,
                                   .fields = fields->empty() ? nullptr : &ray_fields,
                                   .light = light ? &*light : nullptr};
+          if (stretched) {
+            shaded += MarchStretchedTile(work, *stretched, tile, rgba, floats_a_row);
+            return;
+          }
           std::vector<GradientBricks>& of_thread = bricks.Mine([&] { return std::vector<GradientBricks>(ray_fields.fields.size()); });
           shaded += MarchTile(work, tile, of_thread, rgba, floats_a_row);
         });
-    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
+    report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, geometry)));
     return clock.Finish(std::move(image), control);
   }
 };

@@ -8,6 +8,9 @@
 // A crossing depends on its ray and on its cell's voxels alone, and belongs to the box that owns its position: boxes agree on crossings.
 // Two cells agree on the value at the face between them, bit for bit, so that a surface has no holes there.
 //
+// In a rectilinear grid (kStretched) fractions are linear along a ray within a cell, too. Cells are numbers of voxels, planes lie where the
+// voxels do.
+//
 // Positions are within 2^-20 times the side of the volume in voxels, or 1e-4 voxel if that is more.
 #include <hwy/highway.h>
 
@@ -15,7 +18,7 @@
 #include <limits>
 #include <vector>
 
-#include "worker/rays/ray_packet-inl.h"
+#include "worker/rays/stretched_place-inl.h"
 #include "worker/renderers/raycast/march.h"
 
 #if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_SURFACE_WALK_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -108,7 +111,7 @@ struct Crossing {
 
 // Finds crossings of all rays of a packet together, some ahead of where they are asked for, and keeps them: rays that lie side by side
 // cross a surface within a few steps of each other, and share the work.
-template <class T>
+template <class T, bool kStretched = false>
 class SurfaceWalk {
  public:
   // `octant_start`: OctantStart in work.to_surfaces.
@@ -128,17 +131,17 @@ class SurfaceWalk {
       const auto first = packet_.first[i], move = packet_.move[i];
       still_[i] = hn::Lt(hn::Abs(move), Set(1e-9F));
       inverse_[i] = hn::Div(Set(1), hn::IfThenElse(still_[i], Set(1), move));
-      const auto a = PlaneAt(i, hn::Sub(low, margin)), b = PlaneAt(i, hn::Add(high, margin));
+      const auto a = Passes(i, hn::Sub(low, margin)), b = Passes(i, hn::Add(high, margin));
       const auto beside = hn::Or(hn::Lt(first, low), hn::Ge(first, high));
       enter = hn::Max(enter, hn::IfThenElse(still_[i], hn::IfThenElse(beside, far, hn::Neg(far)), hn::Min(a, b)));
       leave = hn::Min(leave, hn::IfThenElse(still_[i], far, hn::Max(a, b)));
-      lowest_[i] = Set(std::floor(box_.low[i]));
-      highest_[i] = Set(std::ceil(box_.high[i]) - 1);
+      lowest_[i] = CellAt(i, low);
+      highest_[i] = kStretched ? CellAt(i, high) : Set(std::ceil(box_.high[i]) - 1);
     }
     walking_ = hn::And(packet_.valid, hn::Le(enter, leave));
     enter = hn::IfThenElseZero(walking_, enter);
     for (std::size_t i = 0; i < 3; ++i) {
-      cell_[i] = hn::Min(hn::Max(hn::Floor(PositionOf(packet_, i, enter)), lowest_[i]), highest_[i]);
+      cell_[i] = hn::Min(hn::Max(CellAt(i, PositionOf(packet_, i, enter)), lowest_[i]), highest_[i]);
     }
     last_ = hn::Neg(far);
     surface_ = zero;
@@ -211,7 +214,7 @@ class SurfaceWalk {
       way.leave = hn::Min(way.leave, out[i]);
     }
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto fraction = [&](Floats at) HWY_ATTR { return hn::Min(hn::Max(hn::Sub(PositionOf(packet_, i, at), cell_[i]), zero), one); };
+      const auto fraction = [&](Floats at) HWY_ATTR { return hn::Min(hn::Max(FractionIn(i, PositionOf(packet_, i, at)), zero), one); };
       const auto backward = hn::Lt(packet_.move[i], zero);
       const auto near_face = hn::IfThenElseZero(backward, one), far_face = hn::Sub(one, near_face);
       way.begin[i] = hn::IfThenElse(hn::Eq(in[i], way.enter), near_face, fraction(way.enter));
@@ -266,7 +269,7 @@ class SurfaceWalk {
     auto counts = hn::And(hn::Ge(at, from_), hn::Le(at, to_));
     counts = hn::And(counts, hn::Or(hn::Gt(at, last_), hn::And(hn::Eq(at, last_), hn::Gt(surface, surface_))));
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto position = hn::Add(cell_[i], way.FractionAt(i, x));
+      const auto position = PositionIn(i, way.FractionAt(i, x));
       counts = hn::And(counts, hn::And(hn::Ge(position, Set(box_.low[i])), hn::Lt(position, Set(box_.high[i]))));
     }
     return counts;
@@ -424,7 +427,7 @@ class SurfaceWalk {
       const auto last = hn::IfThenElse(backward, plane[i], hn::Sub(plane[i], one));  // cell before the plane
       const auto behind = hn::IfThenElse(backward, hn::Sub(plane[i], one), plane[i]);
       // Along the other axes: never back, and not beyond the plane.
-      const auto beside = hn::Floor(PositionOf(packet_, i, leave));
+      const auto beside = CellAt(i, PositionOf(packet_, i, leave));
       const auto limited = hn::IfThenElse(backward, hn::Min(hn::Max(beside, last), cell_[i]), hn::Max(hn::Min(beside, last), cell_[i]));
       cell_[i] = hn::IfThenElse(rays, hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, limited), cell_[i]);
     }
@@ -440,8 +443,30 @@ class SurfaceWalk {
     known_to_ = hn::IfThenElse(rays, hn::IfThenElse(inside, at, Set(kRayEnd)), known_to_);
   }
 
-  // Where the rays pass a plane of voxel centres, in samples.
-  HWY_INLINE Floats PlaneAt(std::size_t axis, Floats plane) const { return hn::Mul(hn::Sub(plane, packet_.first[axis]), inverse_[axis]); }
+  // Where the rays pass a position, in samples, or the plane of voxels of a number.
+  HWY_INLINE Floats Passes(std::size_t axis, Floats position) const {
+    return hn::Mul(hn::Sub(position, packet_.first[axis]), inverse_[axis]);
+  }
+  HWY_INLINE Floats PlaneAt(std::size_t axis, Floats voxel) const {
+    if constexpr (kStretched) return Passes(axis, PlaceOfVoxel(box_.stretch->axes[axis], voxel));
+    return Passes(axis, voxel);
+  }
+  // The cell of a position; what fraction lies before it in its cell; and back.
+  HWY_INLINE Floats CellAt(std::size_t axis, Floats position) const {
+    if constexpr (kStretched) return VoxelBefore(box_.stretch->axes[axis], position);
+    return hn::Floor(position);
+  }
+  HWY_INLINE Floats FractionIn(std::size_t axis, Floats position) const {
+    if constexpr (kStretched) return FractionBehind(box_.stretch->axes[axis], position, cell_[axis]);
+    return hn::Sub(position, cell_[axis]);
+  }
+  HWY_INLINE Floats PositionIn(std::size_t axis, Floats fraction) const {
+    if constexpr (kStretched) {
+      const StretchTable& table = box_.stretch->axes[axis];
+      return Lerp(fraction, PlaceOfVoxel(table, cell_[axis]), PlaceOfVoxel(table, hn::Add(cell_[axis], Set(1))));
+    }
+    return hn::Add(cell_[axis], fraction);
+  }
 
   const MarchWork& work_;
   const RayBox& box_;
@@ -459,6 +484,29 @@ class SurfaceWalk {
   Floats kept_;                    // how many
   Crossing queue_[kMostKept];      // nearest first
 };
+
+// Adds the crossings of rays with isosurfaces up to `before`, in samples, to `sums`: add(rays, crossings). A packet walks `ahead` samples
+// at once. Returns how many.
+template <class Walk, class Sums, class Add>
+HWY_INLINE std::uint64_t AddCrossingsUpTo(Floats before, float ahead, float termination, Walk& walk, Sums& sums, Add&& add) {
+  const FloatTag df;
+  const auto opaque = Set(1 - termination);
+  std::uint64_t count = 0;
+  for (;;) {
+    const auto alive = hn::Lt(sums.alpha, opaque);
+    const auto unknown = hn::And(alive, walk.MayCross(before));
+    if (!hn::AllFalse(df, unknown)) {
+      const auto last = hn::MaxOfLanes(df, hn::IfThenElseZero(unknown, before));
+      walk.Find(alive, hn::Add(last, Set(ahead)));
+    }
+    const auto at = walk.nearest().at;
+    const auto crossing = hn::And(alive, hn::And(hn::Le(at, before), hn::Lt(at, Set(kRayEnd))));
+    if (hn::AllFalse(df, crossing)) return count;
+    count += hn::CountTrue(df, crossing);
+    add(crossing, walk.nearest());
+    walk.Leave(crossing);
+  }
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace slabstream
