@@ -232,7 +232,10 @@ void DeclareIndex(const CommandLine& line) {
   const Command sub = line.app.AddCommand(
       "index", "Read a volume once and note the values of its parts, so that later pictures read only what can show something");
   IndexingOptions& options = OptionsOf(line, sub, RunIndex);
-  sub.AddText("SOURCE", options.source, "A volume that is read in parts: a file, or a folder such as an OME-Zarr").Required();
+  sub.AddText("SOURCE", options.source,
+              "A volume that is read in parts: a file, or a folder such as an OME-Zarr; or an unstructured grid, whose cells are put in "
+              "order on disk")
+      .Required();
   AddParsed(sub, "--memory", options.memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M").TypeName("SIZE").Default("1G");
   AddCacheOption(sub, options.cache);
   sub.AddFlag("--progress", options.progress, "Show progress on stderr");

@@ -2,24 +2,27 @@
 
 #include <algorithm>
 #include <exception>
-#include <limits>
 #include <utility>
 
 #include "common/planning/levels.h"
 #include "common/planning/shown_zones.h"
 #include "common/planning/worker_memory.h"
 #include "common/threads/guarded.h"
+#include "common/volume/memory_budget.h"
 
 namespace slabstream {
 namespace {
 
 // The worker with the least memory decides: any box may come to it after a loss.
 std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
-  // The coordinator cuts out the cells of a box, and has them three times meanwhile, with half of the bytes that BoxBytesOfCells says: half
-  // of its limit.
-  const bool limited = setup.cells && request.own_memory > 0;
-  const std::int64_t most = limited ? std::int64_t(request.own_memory / 3) : std::numeric_limits<std::int64_t>::max();
-  return std::min(most, BoxBytesFor(setup, request.worker_memory));
+  const std::int64_t target = BoxBytesFor(setup, request.worker_memory);
+  if (!setup.cells || request.own_memory == 0) return target;
+  // Beside what it takes at all, and the lattice, the coordinator has the cells of a box that was sent, and those of one that it cuts out
+  // three times: as bytes, these four take twice what BoxBytesOfCells says. The rest of three times is slack.
+  constexpr std::uint64_t kLeast = 2 << 20;
+  const std::uint64_t taken = kIdleMemoryBytes / 2 + std::uint64_t(setup.description.voxel_bytes());
+  const std::uint64_t room = request.own_memory - std::min(request.own_memory, taken);
+  return std::min(target, std::int64_t(std::max(room / 3, kLeast)));
 }
 
 // Each field as it is drawn beside the finest level.

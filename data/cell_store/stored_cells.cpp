@@ -147,7 +147,7 @@ Status WriteCellStoreHeader(const std::string& folder, const CellStoreFacts& fac
 }
 
 Result<CellArrays::Part> CellArrays::Read(std::span<const std::uint32_t> numbers) const {
-  const auto fits = [](std::size_t bytes) { return CheckFitsMemory(std::int64_t(bytes), "a part of a grid"); };
+  const auto fits = [](std::size_t bytes) { return CheckFitsMemory(std::int64_t(bytes), "a box of cells"); };
   if (Status status = fits(numbers.size() * (sizeof(Tetrahedron) + sizeof(float))); !status.ok()) return status;
   Part part;
   Mesh& mesh = part.mesh;
@@ -241,7 +241,7 @@ Result<Mesh> StoredCells::CellsIn(const Box& box) const {
   Result<CellArrays::Part> part = arrays_.Read(numbers);
   if (!part.ok()) return Told(part.status());
   // Then as bytes.
-  if (Status fits = CheckFitsMemory(2 * std::int64_t(part->mesh.bytes()), "the cells of a box"); !fits.ok()) return fits;
+  if (Status fits = CheckFitsMemory(2 * std::int64_t(part->mesh.bytes()), "a box of cells"); !fits.ok()) return fits;
   return CellsTouching(part->mesh, space);
 }
 

@@ -52,8 +52,6 @@ struct LoadedMesh {
   Bounds3 bounds;                              // the bounds of the points, in the world
   Mesh mesh;                                   // its points are in the world, from bounds.low; empty if they are in the spool
   std::shared_ptr<CellSpool> spool = nullptr;  // null: they are in memory
-
-  std::uint64_t tetrahedra() const { return spool == nullptr ? mesh.tetrahedra.size() : spool->cells.size(); }
 };
 
 struct MeshOptions {

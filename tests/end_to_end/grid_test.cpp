@@ -91,6 +91,18 @@ TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
   MustRun({"down"});
 }
 
+TEST_F(GridTest, CellsThatAreKeptOnDiskAreTheSame) {
+  const std::vector<std::string> view = {"--local=2", "--elevation", "20", "--azimuth", "30", "--array", "height"};
+  const std::string info = MustRun({"info", "grid.vtu", "--array", "height", "--json"}).out;
+  const PictureFile held = Render("grid.vtu", "held.exr", view);
+  const ProgramResult kept = MustRun({"index", "grid.vtu", "--array", "height", "--progress"});
+  EXPECT_THAT(kept.out, HasSubstr("keeps the cells of grid.vtu"));
+  EXPECT_THAT(kept.err, HasSubstr("sorting the cells of grid.vtu: "));
+  EXPECT_EQ(MustRun({"info", "grid.vtu", "--array", "height", "--json"}).out, info);
+  EXPECT_THAT(MustRun({"info", "grid.vtu", "--array", "height"}).out, HasSubstr("kept on disk"));
+  EXPECT_EQ(LargestDifference(held, Render("grid.vtu", "kept.exr", view)), 0);
+}
+
 // Two pieces, each with a layer of ghost cells of the other one, which must not be drawn.
 TEST_F(GridTest, PiecesAreDrawnAsOneGrid) {
   const auto place = [](const Vec3& number) { return number; };

@@ -689,6 +689,7 @@ TEST_F(StreamsInPartsTest, PicturesOfCellsOnDiskAreThoseOfCellsInMemory) {
       SCOPED_TRACE(testing::Message() << workers << " workers of " << (limit >> 20) << " MiB");
       for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
         request.view.projection = projection;
+        request.policy.balance_by = projection == Projection::kPerspective ? "occupied" : "auto";  // for which cells are counted
         std::vector<Picture> pictures;
         for (const std::string& path : {held, kept}) {
           Start(path, workers, 0, limit);
