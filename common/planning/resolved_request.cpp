@@ -166,7 +166,10 @@ Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summar
   };
   const auto is_rectilinear = [](const FieldVolume& field) { return field.levels.front().summary->description.geometry.rectilinear(); };
   if (!summary.description.geometry.rectilinear()) {
-    return std::ranges::any_of(fields.others, is_rectilinear) ? refused("overlays and labels are") : Status::Ok();
+    if (std::ranges::none_of(fields.others, is_rectilinear)) return Status::Ok();
+    return Status::InvalidArgument(
+        fmt::format("dataset \"{}\": its overlay has a rectilinear grid, which is not drawn over another one; --resample even resamples it",
+                    request.dataset));
   }
   if (!fields.others.empty()) return refused("several fields are");
   return request.shading.needs_light_volume() ? refused("shadows and ambient occlusion are") : Status::Ok();

@@ -1,6 +1,7 @@
 #include "worker/rays/stretch_tables.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -40,15 +41,18 @@ StretchTable TableOf(const std::vector<double>& knots, double& longest) {
   longest = *std::ranges::max_element(strides);
   const double size = double(knots.size()) - 2, bins = std::min(std::ceil(size / least), std::max(kMostBins, size));
   table.bins_a_unit = float(bins / size);
-  std::size_t knot = 0;
+  std::size_t knot = 0, most = 1;  // knots within a bin
   for (double bin = 0; bin < bins; ++bin) {
     const double begin = (bin - kRounding) / double(table.bins_a_unit) - 0.5, end = (bin + 1 + kRounding) / double(table.bins_a_unit) - 0.5;
     while (knot + 2 < knots.size() && knots[knot + 1] <= begin) ++knot;
     table.first.push_back(std::int32_t(knot));
     double stride = strides[knot];
-    for (std::size_t i = knot + 1; i < strides.size() && knots[i] < end; ++i) stride = std::min(stride, strides[i]);
+    std::size_t i = knot + 1;
+    for (; i < strides.size() && knots[i] < end; ++i) stride = std::min(stride, strides[i]);
     table.strides.push_back(float(stride));
+    most = std::max(most, i - 1 - knot);
   }
+  table.first_step = std::int32_t(std::bit_floor(most));
   return table;
 }
 

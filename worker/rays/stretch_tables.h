@@ -14,7 +14,8 @@ struct StretchTable {
   AlignedVector<float> knots;         // the places of the voxels -1, 0 ... n; empty: the axis is even, and there is nothing else
   AlignedVector<float> per_step;      // 1 / distance of each of them to the next one
   AlignedVector<float> slopes;        // 2 / distance of the two voxels beside each: 1 where even
-  AlignedVector<std::int32_t> first;  // by bin: a knot at or before its begin, mostly the last one
+  AlignedVector<std::int32_t> first;  // by bin: a knot at or before its begin
+  std::int32_t first_step = 1;        // with halves of it after it, it leads from there to any knot of the bin
   AlignedVector<float> strides;       // by bin: a way along the axis that passes from a step between voxels to the next one at most
   float bins_a_unit = 1;
 

@@ -24,12 +24,12 @@ HWY_INLINE Ints KnotBefore(const StretchTable& table, Floats position) {
   const IntTag di;
   const auto last = SetInt(std::int32_t(table.knots.size()) - 2);
   auto knot = hn::GatherIndex(di, table.first.data(), BinAt(table, position));
-  for (;;) {  // mostly no step, or one
-    const auto next = hn::GatherIndex(df, table.knots.data() + 1, knot);
-    const auto beyond = hn::And(hn::RebindMask(di, hn::Ge(position, next)), hn::Lt(knot, last));
-    if (hn::AllFalse(di, beyond)) return knot;
-    knot = hn::Add(knot, hn::IfThenElseZero(beyond, SetInt(1)));
+  for (std::int32_t step = table.first_step; step > 0; step /= 2) {
+    const auto farther = hn::Min(hn::Add(knot, SetInt(step)), last);
+    const auto reached = hn::Ge(position, hn::GatherIndex(df, table.knots.data(), farther));
+    knot = hn::IfThenElse(hn::RebindMask(di, reached), farther, knot);
   }
+  return knot;
 }
 
 // Between voxels `voxel` and the next one, whole numbers: where they lie, which one a position lies behind, and its share of the way.

@@ -345,25 +345,33 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
   }
 }
 
-TEST(StretchTables, NoStrideIsLongerThanAStepThere) {
+TEST(StretchTables, BinsLeadToTheirVoxelsAndNoStrideIsLongerThanAStep) {
   Random random(13);
   SCOPED_TRACE(random.trace());
-  for (int round = 0; round < 20; ++round) {
-    const int size = random.Integer(2, 50);
-    const Stretch stretch = Stretch::Make({{RandomPlaces(size, 1000, random), {}, {}}}, {size, 3, 3}).value();
+  std::int32_t crowded = 0;
+  for (int round = 0; round < 100; ++round) {
+    const int size = random.Integer(4, 50);
+    std::vector<double> places = RandomPlaces(size, 1000, random);
+    if (round % 2 == 1) {  // a bin holds many of them
+      for (int i = 0; i < size; ++i) places[std::size_t(i)] = i < size / 2 ? 1 + 2e-5 * i : i;
+    }
+    const Stretch stretch = Stretch::Make({{places, {}, {}}}, {size, 3, 3}).value();
     const StretchTables tables(stretch);
     const StretchTable& table = tables.axes[0];
     const std::vector<double>& knots = stretch.knots(Axis::kX);
     ASSERT_FALSE(table.even());
     EXPECT_TRUE(tables.axes[1].even());
     for (int i = 0; i < 300; ++i) {
-      const double position = random.Real(-0.5, size - 0.5);
+      const double position = i % 2 == 0 ? random.Real(-0.5, size - 0.5) : stretch.ToData(random.Real(-0.5, size - 0.5), Axis::kX);
       const auto bin = std::min(std::size_t((position + 0.5) * double(table.bins_a_unit)), table.first.size() - 1);
       const auto voxel = std::size_t(std::floor(stretch.ToVoxel(position, Axis::kX)) + 1);  // number of the knot before
       EXPECT_LE(std::size_t(table.first[bin]), voxel);
+      EXPECT_LE(voxel, std::size_t(table.first[bin] + 2 * table.first_step - 1));
+      crowded = std::max(crowded, table.first_step);
       EXPECT_LE(double(table.strides[bin]), (knots[voxel + 1] - knots[voxel]) * 1.00001);
     }
   }
+  EXPECT_GE(crowded, 4);
 }
 
 }  // namespace
