@@ -11,6 +11,7 @@
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"
 #include "tests/data/sources/opened_source.h"
+#include "tests/data/volume_io/kept_cells.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/whole_file.h"
@@ -126,6 +127,7 @@ TEST_F(VtkHdfTest, PartsAndBlocksBecomeOneGrid) {
     WriteBlock(file, kRoot, pieces_);
   }
   ExpectSame(*Read(path_, {.dataset = "height"}), *Read(list, {.array = "height"}));
+  for (const char* const array : {"height", "number"}) ExpectKeptCellsAreTheSame(path_, {.dataset = array}, context_, directory_ / "cache");
   {
     Hdf5Writer file(path_);
     file.Group(kRoot);

@@ -10,6 +10,7 @@
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"
 #include "tests/data/sources/opened_source.h"
+#include "tests/data/volume_io/kept_cells.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/data/xdmf/xdmf_elements.h"
 #include "tests/support/temporary_directory.h"
@@ -163,6 +164,7 @@ TEST_F(XdmfMeshTest, PiecesInSpaceBecomeOneGrid) {
   WriteFile(directory_ / "all.pvtu", VtkListFile("PUnstructuredGrid", {"0.vtu", "1.vtu"}));
   ExpectSame(Write(Collection("Spatial", Grid(Mixed(a) + Geometry(a) + Values(a)) + Grid(Mixed(b) + Geometry(b) + Values(b)))),
              directory_ / "all.pvtu");
+  ExpectKeptCellsAreTheSame(directory_ / "a.xmf", {.array = "height"}, context_, directory_ / "cache");
 }
 
 // As DOLFIN, DOLFINx and meshio write them: a grid without values, and times that include its cells and points.
