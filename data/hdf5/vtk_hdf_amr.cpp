@@ -18,7 +18,6 @@
 #include "data/sources/file_array.h"
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/grid_arrays.h"
-#include "data/volume_io/stated_field.h"
 
 namespace slabstream {
 namespace {
@@ -76,7 +75,10 @@ class AmrOpener {
       : file_(std::move(file)), options_(options), context_(std::move(context)) {}
 
   Result<std::shared_ptr<VolumeSource>> Open() {
-    if (Status status = ChooseTime(); !status.ok()) return status;
+    const Result<VtkHdfTime> time = ChooseVtkHdfTime(*file_, options_);
+    if (!time.ok()) return time.status();
+    info_.times = time->times;
+    info_.time = int(time->number);
     if (Status status = ChooseValues(); !status.ok()) return status;
     for (int number = 0; file_->Has(fmt::format("{}/Level{}", kRoot, number)); ++number) {
       if (number == kMostLevels) return Wrong(fmt::format("has more than {} levels", kMostLevels));
@@ -92,19 +94,6 @@ class AmrOpener {
 
  private:
   Status Wrong(const std::string& why) const { return Status::InvalidArgument(file_->path() + ": " + why); }
-
-  Status ChooseTime() {
-    const std::string steps = std::string(kRoot) + "/Steps";
-    if (file_->Has(steps)) {
-      const Result<std::vector<double>> values = file_->SmallDataset(steps + "/Values");
-      if (!values.ok()) return values.status();
-      info_.times = StatedTimes(std::int64_t(values->size()), *values, "");
-      has_steps_ = true;
-    }
-    const Result<std::int64_t> step = ChosenVolume(file_->path(), info_.times.count, options_);
-    if (step.ok()) info_.time = int(*step);
-    return step.status();
-  }
 
   // The array is named by level 0.
   Status ChooseValues() {
@@ -157,7 +146,7 @@ class AmrOpener {
     const Result<DatasetFacts> facts = file_->Describe(boxes);
     if (!facts.ok()) return facts.status();
     std::int64_t first = 0, count = std::int64_t(facts->size[0]);
-    if (has_steps_) {
+    if (info_.times.count > 1 || file_->Has(std::string(kRoot) + "/Steps")) {
       const std::string steps = fmt::format("{}/Steps/Level{}/", kRoot, number);
       const Result<std::int64_t> at = AtStep(steps + "AMRBoxOffset"), of = AtStep(steps + "NumberOfAMRBox"),
                                  begin = AtStep(steps + "CellDataOffset/" + name_);
@@ -228,7 +217,6 @@ class AmrOpener {
   const std::shared_ptr<Hdf5File> file_;
   const ReadOptions& options_;
   const SourceContext context_;
-  bool has_steps_ = false;
   std::string name_;           // of the array
   std::vector<Level> levels_;  // coarsest first
   SourceInfo info_;

@@ -90,11 +90,13 @@ class GridReader {
       : file_(std::move(file)), options_(options), context_(std::make_shared<ReadContext>(ReadContext::Limits{})) {}
 
   Result<RawVolume> Read() {
-    if (Status status = ChooseTime(); !status.ok()) return status;
+    const Result<VtkHdfTime> time = ChooseVtkHdfTime(*file_, options_);
+    if (!time.ok()) return time.status();
+    step_ = time->number;
     const auto files = [this] { return std::vector{file_->path()}; };
     Result<RawVolume> raw = GridVolume(file_->path(), options_, {files, [this](const MeshOptions& of) { return ReadMesh(of); }});
     if (!raw.ok()) return raw;
-    raw->header.times = times_;
+    raw->header.times = time->times;
     raw->header.number = step_;
     return raw;
   }
@@ -142,19 +144,6 @@ class GridReader {
     }
     if (blocks.empty()) return Status::InvalidArgument(fmt::format("{}: has no block of type {}", file_->path(), kGrid));
     return blocks;
-  }
-
-  // By the root, or in a file of blocks by the first of them.
-  Status ChooseTime() {
-    const std::string steps = std::string(kRoot) + "/Steps";
-    if (file_->Has(steps)) {
-      const Result<std::vector<double>> values = file_->SmallDataset(steps + "/Values");
-      if (!values.ok()) return values.status();
-      times_ = StatedTimes(std::int64_t(values->size()), *values, "");
-    }
-    const Result<std::int64_t> step = ChosenVolume(file_->path(), times_.count, options_);
-    if (step.ok()) step_ = *step;
-    return step.status();
   }
 
   // Where the pieces of the time begin.
@@ -259,7 +248,6 @@ class GridReader {
   const std::shared_ptr<Hdf5File> file_;
   const ReadOptions& options_;
   const SourceContext context_;
-  TimeAxis times_;
   std::int64_t step_ = 0;
   MeshBuilder builder_;
   std::optional<GridArray> array_;  // the chosen one, as the first block has it
@@ -268,6 +256,20 @@ class GridReader {
 }  // namespace
 
 std::string VtkHdfType(AttributedFile& file) { return file.Text(std::string(kRoot), "Type").value_or(""); }
+
+Result<VtkHdfTime> ChooseVtkHdfTime(AttributedFile& file, const ReadOptions& options) {
+  const std::string steps = std::string(kRoot) + "/Steps";
+  VtkHdfTime time;
+  if (file.Has(steps)) {
+    const Result<std::vector<double>> values = file.SmallDataset(steps + "/Values");
+    if (!values.ok()) return values.status();
+    time.times = StatedTimes(std::int64_t(values->size()), *values, "");
+  }
+  const Result<std::int64_t> number = ChosenVolume(file.path(), time.times.count, options);
+  if (!number.ok()) return number.status();
+  time.number = *number;
+  return time;
+}
 
 bool IsVtkHdfGrid(const std::string& type) { return type == kGrid || std::ranges::find(kOfBlocks, type) != kOfBlocks.end(); }
 

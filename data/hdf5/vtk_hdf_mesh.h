@@ -17,6 +17,13 @@ namespace slabstream {
 // "UnstructuredGrid"; "": it is no VTKHDF file.
 std::string VtkHdfType(AttributedFile& file);
 
+// The times of a file (Steps), and the number of the one that the options take. Errors of ChosenVolume and SmallDataset.
+struct VtkHdfTime {
+  TimeAxis times = TimeAxis();  // one, if the file has no Steps
+  std::int64_t number = 0;
+};
+Result<VtkHdfTime> ChooseVtkHdfTime(AttributedFile& file, const ReadOptions& options);
+
 // A file of type UnstructuredGrid, or MultiBlockDataSet or PartitionedDataSetCollection, whose blocks of such grids become one.
 bool IsVtkHdfGrid(const std::string& type);
 // The grid and its times. options.dataset names the array: "p", or "VTKHDF/PointData/p". Errors of ReadMesh (mesh_reader.h). Waits.
