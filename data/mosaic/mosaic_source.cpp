@@ -60,20 +60,12 @@ class SourceParts : public PartReader {
     return source;
   }
 
-  // Blocks lie at multiples of their size in the level, so those of parts that begin elsewhere are of no use. But where a block of a part
-  // reaches from end to end, parts are the blocks: whoever cuts near their borders reads few twice. Parts may share their border points.
+  // Blocks lie at multiples of their size in the level, so those of parts that begin elsewhere are of no use.
   Index3 BlockLike(Index3 block, std::size_t level) const {
-    const std::vector<MosaicPart>& parts = levels_[level];
-    for (const Axis axis : kAxes) {
-      std::vector<std::int32_t> begins;
-      for (const MosaicPart& part : parts) begins.push_back(part.box.begin[axis]);
-      if (std::ranges::all_of(begins, [&](std::int32_t begin) { return begin % block[axis] == 0; })) continue;
-      std::int32_t shortest = block[axis] < parts.front().box.size()[axis] ? 1 : block[axis];
-      std::ranges::sort(begins);
-      for (std::size_t i = 1; i < begins.size(); ++i) {
-        if (begins[i] > begins[i - 1]) shortest = std::min(shortest, begins[i] - begins[i - 1]);
+    for (const MosaicPart& part : levels_[level]) {
+      for (int axis = 0; axis < 3; ++axis) {
+        if (part.box.begin[axis] % block[axis] != 0) block[axis] = 1;
       }
-      block[axis] = shortest;
     }
     return block;
   }

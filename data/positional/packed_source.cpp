@@ -20,7 +20,7 @@ std::uint64_t ChunkBytes(std::uint64_t block_bytes) {
   return std::max(std::clamp(kBlocks * block_bytes, kLeast, kMost), block_bytes);
 }
 
-// Whole slices, or a part of one slice in whole rows: all parts have about as many. The axes are z, y, x and the components of a voxel.
+// Whole slices, or whole rows of one slice. The axes are z, y, x and the components of a voxel.
 ArrayShape ShapeOf(const RawHeader& header, std::uint64_t block_bytes) {
   ArrayShape shape{.type = header.type, .cut_at_end = true, .fill = std::vector<std::byte>(BytesPerSample(header.type))};
   for (const std::int32_t side : {header.size.z, header.size.y, header.size.x, std::int32_t{header.components}}) {
@@ -28,9 +28,8 @@ ArrayShape ShapeOf(const RawHeader& header, std::uint64_t block_bytes) {
   }
   const std::uint64_t row = shape.size[2] * shape.size[3] * BytesPerSample(header.type), slice = shape.size[1] * row;
   const std::uint64_t bytes = ChunkBytes(block_bytes);
-  const std::uint64_t parts = std::clamp<std::uint64_t>((slice + bytes / 2) / bytes, 1, shape.size[1]);
-  shape.chunk = {std::clamp<std::uint64_t>(bytes / slice, 1, shape.size[0]), (shape.size[1] + parts - 1) / parts, shape.size[2],
-                 shape.size[3]};
+  const auto most = [&](std::uint64_t each, std::uint64_t count) { return std::clamp<std::uint64_t>(bytes / each, 1, count); };
+  shape.chunk = {most(slice, shape.size[0]), most(row, shape.size[1]), shape.size[2], shape.size[3]};
   return shape;
 }
 

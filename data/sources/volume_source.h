@@ -38,8 +38,8 @@ struct FileStamp;
 
 struct SourceLevel {
   VolumeDescription description;  // type, mapping and axes are the same at all levels
-  // Voxels along each axis of what one read of the source brings at least. Such blocks lie at multiples of it, or about there where parts
-  // of a mosaic are no multiples. Whoever cuts boxes there reads no voxel twice, or few.
+  // Voxels along each axis of what one read of the source brings at least. Such blocks lie at multiples of it. Whoever cuts boxes there
+  // reads no voxel twice.
   Index3 block;
   // Of an adaptive mesh: where the level has voxels of its own. The others are interpolated between those of the next coarser level. Null:
   // it has all of them.

@@ -170,21 +170,6 @@ TEST_F(Mosaic, BlocksAreThoseOfPartsWhereTheseBeginAtThem) {
   EXPECT_EQ((*mosaic)->info().levels.front().block, (Index3{5, 4, 1}));
 }
 
-// Blocks are those of the parts, unless these begin elsewhere. Parts that are one block each are the blocks.
-TEST_F(Mosaic, BlocksLieWherePartsAndTheirBlocksBegin) {
-  const auto block_of = [&](std::vector<std::int32_t> begins, std::int32_t end) {
-    std::vector<MosaicPart> parts;
-    begins.push_back(end);
-    for (std::size_t i = 0; i + 1 < begins.size(); ++i) parts.push_back(PartOf({{begins[i], 0, 0}, {begins[i + 1], 4, 2}}));
-    const auto mosaic = MakeMosaic("mosaic", InfoOf({end, 4, 2}), {std::move(parts)});
-    return mosaic.ok() ? (*mosaic)->info().levels.front().block.x : -1;
-  };
-  EXPECT_EQ(block_of({0, 10, 15}, 20), 5) << "all begin where blocks do";
-  EXPECT_EQ(block_of({0, 11, 15}, 20), 1) << "blocks of the second part lie elsewhere";
-  EXPECT_EQ(block_of({0, 4, 8, 12}, 16), 4) << "each part is one block";
-  EXPECT_EQ(block_of({0, 5, 8, 13}, 18), 3) << "the shortest one";
-}
-
 // Patches of three levels over a coarse grid: a linear field is exact at each of them, wherever patches lie.
 TEST_F(Mosaic, WhatLiesInNoPatchIsInterpolatedBetweenCoarserVoxels) {
   const unsigned seed = 62;
