@@ -17,8 +17,8 @@ namespace {
 std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
   const std::int64_t target = BoxBytesFor(setup, request.worker_memory);
   if (!setup.cells || request.own_memory == 0) return target;
-  // Beside what it takes at all, and the lattice, the coordinator has the cells of a box that was sent, and those of one that it cuts out
-  // three times: as bytes, these four take twice what BoxBytesOfCells says. The rest of three times is slack.
+  // The coordinator holds the lattice and what every coordinator takes. Beside these it has the cells of a box four times: those that it
+  // sent last once, and those that it cuts out three times. Four times are twice what BoxBytesOfCells says; a third part stays free.
   constexpr std::uint64_t kLeast = 2 << 20;
   const std::uint64_t taken = kIdleMemoryBytes / 2 + std::uint64_t(setup.description.voxel_bytes());
   const std::uint64_t room = request.own_memory - std::min(request.own_memory, taken);

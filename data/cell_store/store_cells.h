@@ -28,7 +28,7 @@ struct CellStoring {
 
 // The store is the spool's folder, whose spool is removed. Its cells, and all that is derived of them, are those that MoveToLattice,
 // SortByPlace, PointGradients, Resample and RangesOf make of the same grid in memory, bit for bit. Errors as of RecordFile;
-// ResourceExhausted; those of `progress`. Of a failure nothing is a store: the header comes last. Parallel.
+// ResourceExhausted; those of `progress`. After a failure there is no store, since the header is written last. Parallel.
 Status StoreCells(CellSpool spool, const CellStoring& storing);
 
 }  // namespace slabstream

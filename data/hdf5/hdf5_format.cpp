@@ -25,19 +25,33 @@ bool IsClassicNetcdf(const std::string& path) { return BeginsWith(path, "CDF"); 
 
 bool Recognises(const std::string& path, const ReadOptions&) { return BeginsWith(path, "\x89HDF\r\n\x1a\n") || IsClassicNetcdf(path); }
 
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  if (!IsClassicNetcdf(path)) {
-    const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
-    if (!file.ok()) return file.status();
-    const std::string type = VtkHdfType(**file);
-    if (IsVtkHdfGrid(type)) return std::shared_ptr<VolumeSource>();
-    if (options.lattice) return Status::InvalidArgument(path + ": holds voxels, so it takes no option lattice");
-    if (type == kVtkHdfAmr) return OpenVtkHdfAmr(*file, options, context);
-    if (options.dataset.find('/') == std::string::npos && IsFlash(**file)) return OpenFlash(*file, options, context);
+// As one image, at one level or several.
+Result<Pyramid> ReadPyramid(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
+  for (const Hdf5Layout& layout : {Imaris(), BigDataViewerHdf5()}) {
+    if (options.dataset.empty() && layout.recognises(*file)) return layout.read(file, options, context);
   }
-  Result<Pyramid> pyramid = ReadHdf5(path, options, context);
-  if (!pyramid.ok()) return pyramid.status();
-  return MakeChunkedSource(path, *std::move(pyramid), context);
+  // A path names a dataset of any file, and a bare name a mesh of openPMD.
+  if (options.dataset.find('/') == std::string::npos && IsOpenPmd(*file)) return ReadOpenPmd(*file, options, context);
+  return ReadImage(*file, options, context);
+}
+
+Result<std::shared_ptr<VolumeSource>> OpenPyramid(const std::string& path, Result<Pyramid> pyramid, const SourceContext& context) {
+  return pyramid.ok() ? MakeChunkedSource(path, *std::move(pyramid), context) : pyramid.status();
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  if (IsClassicNetcdf(path)) {
+    const Result<std::unique_ptr<AttributedFile>> file = OpenClassicNetcdf(path);
+    return file.ok() ? OpenPyramid(path, ReadImage(**file, options, context), context) : file.status();
+  }
+  const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
+  if (!file.ok()) return file.status();
+  const std::string type = VtkHdfType(**file);
+  if (IsVtkHdfGrid(type)) return std::shared_ptr<VolumeSource>();
+  if (options.lattice) return Status::InvalidArgument(path + ": holds voxels, so it takes no option lattice");
+  if (type == kVtkHdfAmr) return OpenVtkHdfAmr(*file, options, context);
+  if (options.dataset.find('/') == std::string::npos && IsFlash(**file)) return OpenFlash(*file, options, context);
+  return OpenPyramid(path, ReadPyramid(*file, options, context), context);
 }
 
 // A grid with cells.
@@ -53,21 +67,6 @@ int CountNumbered(const std::vector<std::string>& names, const std::string& pref
   int count = 0;
   while (known.contains(prefix + std::to_string(count))) ++count;
   return count;
-}
-
-Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  if (IsClassicNetcdf(path)) {
-    const Result<std::unique_ptr<AttributedFile>> file = OpenClassicNetcdf(path);
-    return file.ok() ? ReadImage(**file, options, context) : file.status();
-  }
-  const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
-  if (!file.ok()) return file.status();
-  for (const Hdf5Layout& layout : {Imaris(), BigDataViewerHdf5()}) {
-    if (options.dataset.empty() && layout.recognises(**file)) return layout.read(*file, options, context);
-  }
-  // A path names a dataset of any file, and a bare name a mesh of openPMD.
-  if (options.dataset.find('/') == std::string::npos && IsOpenPmd(**file)) return ReadOpenPmd(**file, options, context);
-  return ReadImage(**file, options, context);
 }
 
 VolumeFormat Hdf5() {

@@ -97,20 +97,15 @@ class AmrOpener {
 
   // The array is named by level 0.
   Status ChooseValues() {
-    const std::string group = std::string(kRoot) + "/Level0/CellData";
-    const Result<std::vector<std::string>> names = file_->Names(group);
-    if (!names.ok()) return names.status();
-    std::vector<GridArray> arrays;
-    for (const std::string& name : *names) {
-      GridArray array{.name = name, .at = ValuesAt::kCells, .active = file_->Text(group, "Scalars") == name};
-      if (const Result<DatasetFacts> facts = file_->Describe(group + "/" + name); facts.ok()) {
-        array.type = facts->type;
-        if (facts->size.size() == 2) array.components = int(std::min<std::uint64_t>(facts->size[1], kMaxComponents + 1));
-      }
-      arrays.push_back(std::move(array));
-    }
+    const Result<std::vector<GridArray>> found = VtkHdfArrays(*file_, std::string(kRoot) + "/Level0", ValuesAt::kCells);
+    if (!found.ok()) return found.status();
+    const std::vector<GridArray>& arrays = *found;
     const Result<std::size_t> chosen = ChooseArray(file_->path(), arrays, VtkHdfArrayName(options_.dataset));
     if (!chosen.ok()) return chosen.status();
+    if (const int components = arrays[*chosen].components; components > kMaxComponents) {
+      return Wrong(
+          fmt::format("array '{}' has {} components, must have at most {}", Printable(arrays[*chosen].name), components, kMaxComponents));
+    }
     name_ = arrays[*chosen].name;
     info_.notes = NotesOf(arrays, *chosen);
     std::vector<FieldInfo> channels(std::size_t(arrays[*chosen].components));

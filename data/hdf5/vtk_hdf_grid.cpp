@@ -34,24 +34,10 @@ class Block {
   std::string named(const std::string& name) const { return file_->Named(path_ + "/" + name); }
 
   Result<std::vector<GridArray>> Arrays() const {
-    std::vector<GridArray> arrays;
-    for (const ValuesAt at : {ValuesAt::kPoints, ValuesAt::kCells}) {
-      const std::string group = path_ + "/" + GroupOf(at), active = file_->Text(group, "Scalars").value_or("");
-      const Result<std::vector<std::string>> names = file_->Names(group);
-      if (!names.ok()) return names.status();
-      for (const std::string& name : *names) {
-        GridArray array{.name = name, .at = at, .active = name == active};
-        if (const Result<DatasetFacts> facts = file_->Describe(group + "/" + name); facts.ok()) {
-          array.type = facts->type;
-          if (facts->size.size() == 2) array.components = int(std::min<std::uint64_t>(facts->size[1], std::numeric_limits<int>::max()));
-          if (file_->Text(group + "/" + name, "Attribute") == "Scalars") array.active = true;
-        } else {
-          array.type = std::nullopt;
-          array.type_name = "another type";
-        }
-        arrays.push_back(std::move(array));
-      }
-    }
+    Result<std::vector<GridArray>> arrays = VtkHdfArrays(*file_, path_, ValuesAt::kPoints);
+    const Result<std::vector<GridArray>> of_cells = VtkHdfArrays(*file_, path_, ValuesAt::kCells);
+    if (!arrays.ok() || !of_cells.ok()) return arrays.ok() ? of_cells.status() : arrays.status();
+    arrays->insert(arrays->end(), of_cells->begin(), of_cells->end());
     return arrays;
   }
 
@@ -256,6 +242,26 @@ class GridReader {
 }  // namespace
 
 std::string VtkHdfType(AttributedFile& file) { return file.Text(std::string(kRoot), "Type").value_or(""); }
+
+Result<std::vector<GridArray>> VtkHdfArrays(AttributedFile& file, const std::string& block, ValuesAt at) {
+  const std::string group = block + "/" + GroupOf(at), active = file.Text(group, "Scalars").value_or("");
+  const Result<std::vector<std::string>> names = file.Names(group);
+  if (!names.ok()) return names.status();
+  std::vector<GridArray> arrays;
+  for (const std::string& name : *names) {
+    const std::string path = group + "/" + name;
+    GridArray array{.name = name, .at = at, .active = name == active || file.Text(path, "Attribute") == "Scalars"};
+    if (const Result<DatasetFacts> facts = file.Describe(path); facts.ok()) {
+      array.type = facts->type;
+      if (facts->size.size() == 2) array.components = int(std::min<std::uint64_t>(facts->size[1], std::numeric_limits<int>::max()));
+    } else {
+      array.type = std::nullopt;
+      array.type_name = "another type";
+    }
+    arrays.push_back(std::move(array));
+  }
+  return arrays;
+}
 
 Result<VtkHdfTime> ChooseVtkHdfTime(AttributedFile& file, const ReadOptions& options) {
   const std::string steps = std::string(kRoot) + "/Steps";

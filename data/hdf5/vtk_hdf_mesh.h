@@ -24,6 +24,9 @@ struct VtkHdfTime {
 };
 Result<VtkHdfTime> ChooseVtkHdfTime(AttributedFile& file, const ReadOptions& options);
 
+// The arrays of points or of cells in a block or a level ("/VTKHDF/Level0"). Errors of AttributedFile::Names.
+Result<std::vector<GridArray>> VtkHdfArrays(AttributedFile& file, const std::string& block, ValuesAt at);
+
 // A file of type UnstructuredGrid, or MultiBlockDataSet or PartitionedDataSetCollection, whose blocks of such grids become one.
 bool IsVtkHdfGrid(const std::string& type);
 // The grid and its times. options.dataset names the array: "p", or "VTKHDF/PointData/p". Errors of ReadMesh (mesh_reader.h). Waits.

@@ -295,6 +295,7 @@ Result<LoadedMesh> ReadXdmfMesh(XdmfDocument& document, const std::vector<const 
                                 XdmfArrays& arrays) {
   MeshBuilder builder;
   std::optional<GridArray> array;
+  std::set<std::string> files;
   for (const XdmfElement* piece : pieces) {
     const Result<bool> is_mesh = IsXdmfMesh(document, *piece);
     if (!is_mesh.ok()) return is_mesh.status();
@@ -311,16 +312,16 @@ Result<LoadedMesh> ReadXdmfMesh(XdmfDocument& document, const std::vector<const 
       array = offered[*chosen];
     }
     if (options.headers_only) return builder.TakeHeaders();
+    if (Status status = reader.AddFiles(files); !status.ok()) return status;
     if (Status status = reader.Read(*array, document.Named(*pieces.front()), builder); !status.ok()) return status;
   }
   Result<LoadedMesh> loaded = builder.Finish(document.path());
   if (!loaded.ok()) return loaded;
   loaded->info.format = "XDMF";
-  const Result<std::vector<std::string>> files = FilesOfXdmfMesh(document, pieces, arrays);
-  if (!files.ok()) return files.status();
-  loaded->info.other_files.assign(files->begin() + 1, files->end());
+  loaded->info.other_files.assign(files.begin(), files.end());
+  files.insert(document.path());
   std::error_code error;
-  for (const std::string& file : *files) {
+  for (const std::string& file : files) {
     if (options.read) options.read(std::int64_t(std::filesystem::file_size(file, error)));
   }
   return loaded;
