@@ -49,7 +49,7 @@ Schedule ScheduleOf(const ScheduleName& name, PixelRange frame) {
   Schedule whole = {name.ranks, name.roots, {}};
   std::uint32_t rounds = 0;
   for (std::size_t run = 0; run < name.runs.size(); ++run) {
-    const Rank first = name.runs[run], end = run + 1 < name.runs.size() ? name.runs[run + 1] : name.ranks;
+    const Rank first = name.runs[run], end = EndOfRun(name, run);
     for (Rank rank = first + 1; rank < end; ++rank) whole.steps.push_back({rank - first - 1, rank, first, frame});
     rounds = std::max(rounds, end - first - 1);
   }

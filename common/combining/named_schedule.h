@@ -27,6 +27,9 @@ struct ScheduleName {
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };
 
+// One past the last rank of a run, by its place in `name.runs`.
+inline Rank EndOfRun(const ScheduleName& name, std::size_t run) { return run + 1 < name.runs.size() ? name.runs[run + 1] : name.ranks; }
+
 // What the scheme does among runs: a schedule whose ranks are the runs of `name`.
 ScheduleName AmongRuns(const ScheduleName& name);
 

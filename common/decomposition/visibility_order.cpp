@@ -53,8 +53,7 @@ std::vector<TouchingBoxes> FindTouching(const Partition& partition) {
       if (box.begin[node.axis] <= node.position) open.push_back(node.lower);
       if (box.end[node.axis] >= node.position) open.push_back(node.upper);
     }
-    std::sort(touching.begin() + std::ptrdiff_t(before), touching.end(),
-              [](const TouchingBoxes& a, const TouchingBoxes& b) { return a.second < b.second; });
+    std::ranges::sort(touching.begin() + std::ptrdiff_t(before), touching.end(), {}, &TouchingBoxes::second);
   }
   return touching;
 }

@@ -11,8 +11,8 @@ namespace slabstream {
 struct AssignmentRequest {
   std::span<const double> costs;  // predicted, by box; >= 0, in any unit
   std::uint32_t slots = 1;        // >= 1
-  std::span<const std::uint32_t> holders =
-      {};  // by box: who holds its voxels (OwnedBox::owner), numbers below `holder_count`; empty: unknown
+  // By box: who holds its voxels (OwnedBox::owner), numbers below `holder_count`; empty: unknown.
+  std::span<const std::uint32_t> holders = {};
   std::uint32_t holder_count = 0;
 };
 

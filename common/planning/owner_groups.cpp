@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/planning/layout.h"
 
 namespace slabstream {
@@ -21,17 +22,10 @@ class Grouper {
     left_ = std::size_t(std::ranges::count_if(request.slots, [](std::uint32_t slot) { return slot != kNoSlot; }));
     ready_.resize(slots_);
     FindWhatIsBehind();
-    std::vector<BoxId> foremost;
     for (BoxId box = 0; box < waits_.size(); ++box) {
-      if (waits_[box] == 0) foremost.push_back(box);
+      if (waits_[box] == 0) Free(box);
     }
-    for (const BoxId box : foremost) {
-      if (request.slots[box] == kNoSlot) {
-        Pass(box);
-      } else {
-        ready_[request.slots[box]].push_back(box);
-      }
-    }
+    PassOn();
   }
 
   std::vector<std::vector<BoxId>> Group() {
@@ -43,6 +37,7 @@ class Grouper {
         open_[*slot] = false;
         TakeRun(*slot, group);
       }
+      CHECK(!group.empty()) << "boxes lie in front of each other in a circle";
     }
     return groups;
   }
@@ -69,19 +64,18 @@ class Grouper {
     return std::span(behind_).subspan(behind_begin_[box], behind_begin_[box + 1] - behind_begin_[box]);
   }
 
-  // The box, and empty ones behind it, are in front of nothing more.
-  void Pass(BoxId box) {
-    passing_ = {box};
-    while (!passing_.empty()) {
-      const BoxId passed = passing_.back();
-      passing_.pop_back();
-      for (const BoxId back : Behind(passed)) {
-        if (--waits_[back] > 0) continue;
-        if (request_.slots[back] == kNoSlot) {
-          passing_.push_back(back);
-        } else {
-          ready_[request_.slots[back]].push_back(back);
-        }
+  // Nothing is in front of the box any more.
+  void Free(BoxId box) {
+    const std::uint32_t slot = request_.slots[box];
+    (slot == kNoSlot ? passed_ : ready_[slot]).push_back(box);
+  }
+  // Boxes that have been passed are in front of nothing.
+  void PassOn() {
+    while (!passed_.empty()) {
+      const BoxId box = passed_.back();
+      passed_.pop_back();
+      for (const BoxId back : Behind(box)) {
+        if (--waits_[back] == 0) Free(back);
       }
     }
   }
@@ -98,7 +92,8 @@ class Grouper {
       }
       group.push_back(box);
       --left_;
-      Pass(box);
+      passed_.push_back(box);
+      PassOn();
     }
     ready.erase(ready.begin(), ready.begin() + std::ptrdiff_t(taken));
   }
@@ -163,7 +158,7 @@ class Grouper {
   std::vector<bool> open_;                 // by slot: it has no run in the group yet
   std::uint32_t look_ = 0;
   std::vector<Looked> looks_;  // by box
-  std::vector<BoxId> passing_, looking_;
+  std::vector<BoxId> passed_, looking_;
 };
 
 }  // namespace

@@ -150,8 +150,7 @@ void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker& check)
   if (!check.ok()) return;
   const std::vector<Rank>& runs = group.schedule.runs;
   for (std::size_t run = 0; run < runs.size(); ++run) {
-    const Rank end = run + 1 < runs.size() ? runs[run + 1] : group.schedule.ranks;
-    const auto of_run = std::span(group.placements).subspan(runs[run], end - runs[run]);
+    const auto of_run = std::span(group.placements).subspan(runs[run], EndOfRun(group.schedule, run) - runs[run]);
     const bool of_one = std::ranges::all_of(of_run, [&](const Placement& placement) { return placement.worker == of_run.front().worker; });
     check.That(of_one, "schedule.runs", "a run of several workers");
   }

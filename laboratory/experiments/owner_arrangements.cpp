@@ -39,6 +39,7 @@ std::uint32_t Scaled(std::uint32_t place, std::uint32_t places, std::uint32_t ow
   return std::uint32_t(std::uint64_t{place} * owners / places);
 }
 
+// Ranges of a Hilbert curve, as many codes of particles and adaptive meshes cut.
 std::uint32_t OwnerOnCurve(const Index3& cell, std::uint32_t side, std::uint32_t owners) {
   return Scaled(OnHilbertCurve(cell, side), side * side * side, owners);
 }
@@ -66,7 +67,7 @@ std::uint32_t OwnerOfJaggedPart(const Index3& cell, std::uint32_t side, std::uin
   return first + Scaled(std::uint32_t(cell.x) + shift, side + side / 2, end - first);
 }
 
-// By chance, the same every time.
+// By chance, the same every time, as a scheduler of chunks may deal them.
 std::uint32_t OwnerByChance(const Index3& cell, std::uint32_t side, std::uint32_t owners) {
   std::minstd_rand random(1 + std::uint32_t(cell.x) + side * (std::uint32_t(cell.y) + side * std::uint32_t(cell.z)));
   random.discard(3);
@@ -77,11 +78,8 @@ std::uint32_t OwnerByChance(const Index3& cell, std::uint32_t side, std::uint32_
 
 const std::vector<OwnerArrangement>& OwnerArrangements() {
   static const std::vector<OwnerArrangement> entries = {
-      {"hilbert", "ranges of a Hilbert curve, as many particle and AMR codes cut", OwnerOnCurve},
-      {"jagged", "layers with winding borders", OwnerOfJaggedPart},
-      {"checkerboard", "cells to owners in turn along each axis", OwnerOnBoard},
-      {"block-cyclic", "cells dealt to a grid of owners, as arrays are", OwnerOfBlock},
-      {"scattered", "cells to owners by chance, as a scheduler of chunks may deal them", OwnerByChance},
+      {"hilbert", OwnerOnCurve},      {"jagged", OwnerOfJaggedPart}, {"checkerboard", OwnerOnBoard},
+      {"block-cyclic", OwnerOfBlock}, {"scattered", OwnerByChance},
   };
   return entries;
 }

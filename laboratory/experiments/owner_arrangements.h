@@ -12,7 +12,6 @@ namespace slabstream {
 
 struct OwnerArrangement {
   std::string_view name;
-  std::string_view purpose;  // one line
   // The volume in cells, about as large as each other, that tile it: `side` of them along each axis, a power of two, or as many as it has
   // slices. By cell: its owner, in [0, owners).
   std::uint32_t (*owner)(const Index3& cell, std::uint32_t side, std::uint32_t owners);
