@@ -317,10 +317,13 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
 Status RunningFrame::Expire(Time now) {
   if (between_attempts()) return Status::Ok();
   if (const std::optional<Suspicion> suspicion = under_way()->suspicion; suspicion && now >= suspicion->until) {
-    inability_ =
+    const Status reason =
         Status::Unavailable(WorkerName(suspicion->accuser) + " cannot reach " + WorkerName(suspicion->accused) + ", which is alive");
-    unable_.insert(CulpritOf(*suspicion));
-    return CountStall(inability_, now);
+    if (const std::optional<WorkerId> culprit = CulpritOf(*suspicion)) {
+      inability_ = reason;
+      unable_.insert(*culprit);
+    }
+    return CountStall(reason, now);
   }
   if (waiting() && now >= last_progress_ + limits_.stall_timeout) {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.stall_timeout).count();
@@ -329,9 +332,11 @@ Status RunningFrame::Expire(Time now) {
   return Status::Ok();
 }
 
-// Whoever had a part in more complaints; among equals the one that has not accumulated the frame, then the accused.
-WorkerId RunningFrame::CulpritOf(const Suspicion& suspicion) {
+// Nobody at first: a connection ends, too, if a busy machine takes nothing from it for some seconds, and then a new one is made. Else
+// whoever had a part in more complaints; among equals the one that has not accumulated the frame, then the accused.
+std::optional<WorkerId> RunningFrame::CulpritOf(const Suspicion& suspicion) {
   const int of_accused = ++complaints_[suspicion.accused], of_accuser = ++complaints_[suspicion.accuser];
+  if (of_accused == 1 && of_accuser == 1) return std::nullopt;
   if (of_accused != of_accuser) return of_accused > of_accuser ? suspicion.accused : suspicion.accuser;
   return suspicion.accused == plan_.display ? suspicion.accuser : suspicion.accused;
 }

@@ -161,7 +161,7 @@ class RunningFrame {
   Status NoteDeath(WorkerId worker);
   WorkerId WorkerForTrial(const Roster& roster, const std::set<WorkerId>& busy) const;
   Status CountStall(const Status& reason, Time again, bool display_in_doubt = false);
-  WorkerId CulpritOf(const Suspicion& suspicion);
+  std::optional<WorkerId> CulpritOf(const Suspicion& suspicion);
 
   FrameId id_;
   OpenRequest request_;
