@@ -43,8 +43,8 @@ run_workers() {
     [[ ! -e "$folder/ended" ]] || return 0
     file=$(service_file)
     srun --ntasks="$workers" --cpus-per-task="$threads" --kill-on-bad-exit=0 --wait=0 \
-      "$programs/slabstream-worker" --service "$folder/worker.json" --threads "$threads" --drain "$drain" \
-        < /dev/null &
+      "$programs/slabstream-worker" --service "$folder/worker.json" --threads "$threads" --memory 1/$((2 * workers)) \
+        --drain "$drain" < /dev/null &
     step=$!
     while kill -0 "$step" 2> /dev/null && ! is_over "$file"; do sleep 1; done
     if kill -0 "$step" 2> /dev/null; then

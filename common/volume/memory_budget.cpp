@@ -73,17 +73,25 @@ std::string MemoryText(std::uint64_t bytes) { return fmt::format("{} MiB", (byte
 
 Result<std::uint64_t> ParseMemoryLimit(const std::string& option, const std::string& text) {
   constexpr std::string_view kUnits[] = {"M", "G", "T"};
+  const auto checked = [&](std::uint64_t bytes) -> Result<std::uint64_t> {
+    if (bytes >= kLeastMemoryBytes && bytes <= kMostMemoryBytes) return bytes;
+    return Status::InvalidArgument(
+        fmt::format("{} {} is out of range [{}M, {}T]", option, text, kLeastMemoryBytes >> 20, kMostMemoryBytes >> 40));
+  };
+  if (text.starts_with("1/")) {
+    const std::optional<std::uint64_t> parts = ParseNumber<std::uint64_t>(std::string_view(text).substr(2));
+    if (parts && *parts > 0) return checked(MachineMemoryBytes() / *parts);
+  }
   const std::string_view short_text = text.ends_with("iB") ? std::string_view(text).substr(0, text.size() - 2) : text;
   for (std::size_t i = 0; i < std::size(kUnits); ++i) {
     if (!short_text.ends_with(kUnits[i])) continue;
     const std::optional<std::uint64_t> count = ParseNumber<std::uint64_t>(short_text.substr(0, short_text.size() - 1));
     if (!count) break;
     const int shift = 20 + 10 * int(i);
-    if (*count <= kMostMemoryBytes >> shift && *count << shift >= kLeastMemoryBytes) return *count << shift;
-    return Status::InvalidArgument(
-        fmt::format("{} {} is out of range [{}M, {}T]", option, text, kLeastMemoryBytes >> 20, kMostMemoryBytes >> 40));
+    return checked(*count <= kMostMemoryBytes >> shift ? *count << shift : UINT64_MAX);
   }
-  return Status::InvalidArgument(fmt::format("{} '{}' is not a size such as 512M or 4G", option, text));
+  return Status::InvalidArgument(
+      fmt::format("{} '{}' is not a size such as 512M or 4G, nor a part of the machine such as 1/4", option, text));
 }
 
 // Lines "0::/path" of version 2, "7:memory:/path" of version 1. In a container the path may not exist below the mount: then the mount

@@ -28,11 +28,13 @@ TEST(MemoryBudget, LimitsAreWholeNumbersWithUnits) {
   EXPECT_EQ(*ParseMemoryLimit("--memory", "512M"), std::uint64_t{512} << 20);
   EXPECT_EQ(*ParseMemoryLimit("--memory", "2G"), std::uint64_t{2} << 30);
   EXPECT_EQ(*ParseMemoryLimit("--memory", "1T"), std::uint64_t{1} << 40);
-  for (const char* text : {"", "4", "4GB", "4 GiB", "GiB", "-4GiB", "1.5GiB", "4gib", "4GiBx", "2g", "iB", "G"}) {
+  EXPECT_EQ(*ParseMemoryLimit("--memory", "1/2"), MachineMemoryBytes() / 2);
+  for (const char* text :
+       {"1/", "1/0", "2/3", "1/2G", "1/-2", "", "4", "4GB", "4 GiB", "GiB", "-4GiB", "1.5GiB", "4gib", "4GiBx", "2g", "iB", "G"}) {
     EXPECT_EQ(ParseMemoryLimit("--memory", text).status().message(),
-              "--memory '" + std::string(text) + "' is not a size such as 512M or 4G");
+              "--memory '" + std::string(text) + "' is not a size such as 512M or 4G, nor a part of the machine such as 1/4");
   }
-  for (const char* text : {"0GiB", "255MiB", "1025TiB", "18014398509481985MiB"}) {
+  for (const char* text : {"0GiB", "255MiB", "1025TiB", "18014398509481985MiB", "1/1000000000"}) {
     EXPECT_EQ(ParseMemoryLimit("--memory", text).status().message(), "--memory " + std::string(text) + " is out of range [256M, 1024T]");
   }
 }
