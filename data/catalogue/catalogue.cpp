@@ -362,10 +362,13 @@ Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uin
 Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, const FileStamp& before) {
   const auto* const opened = std::get_if<OpenedSource>(&read);
   const SourceInfo& info = opened != nullptr ? opened->source->info() : std::get<LoadedSource>(read).file;
-  if (info.growth != nullptr) return info.growth;
-  if (opened == nullptr) return std::make_shared<const FileStamp>(before);
-  Result<FileStamp> stamp = StampFiles(info.files);
+  if (info.growth != nullptr && info.growth->ask) return info.growth;
+  std::vector<std::string> files = opened != nullptr ? info.files : before.paths;
+  if (info.growth != nullptr) files.insert(files.end(), info.growth->paths.begin(), info.growth->paths.end());
+  Result<FileStamp> stamp = StampFiles(std::move(files));
   if (!stamp.ok()) return stamp.status();
+  const Result<bool> grown = info.growth != nullptr ? HaveChanged(*info.growth) : Result<bool>(false);
+  if (!grown.ok() || *grown) return info.growth;  // the next look sees it
   return std::make_shared<const FileStamp>(*std::move(stamp));
 }
 

@@ -85,7 +85,15 @@ void TakeSizes(AttributedFile& file, const std::string& path, ImageDescription& 
   }
 }
 
-// Where coordinates are even, they place the axis.
+// By the bounds of the cells around coordinates, where these are even.
+std::optional<EvenSteps> CellsAround(AttributedFile& file, const std::string& scale, std::uint64_t size) {
+  const std::optional<std::string> bounds = file.Text(scale, "bounds");
+  if (!bounds) return std::nullopt;
+  const Result<std::vector<double>> values = file.SmallDataset(scale.substr(0, scale.rfind('/') + 1) + *bounds);
+  return values.ok() && values->size() == 2 * size ? EvenCellsOf(*values) : std::nullopt;
+}
+
+// Where cells or coordinates are even, they place the axis.
 void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64_t size, ImageAxis& axis, ImageDescription& image) {
   const AxisKind kind = AxisNamed(axis.name);
   if (scale.empty() || kind == AxisKind::kChannel) return;
@@ -96,7 +104,8 @@ void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64
   const std::string unit = file.Text(scale, "units").value_or(file.Text(scale, "unit").value_or(""));
   const std::string named = Printable(LastPart(scale) + (unit.empty() ? "" : " (" + unit + ")"));
   const bool down = file.Text(scale, "positive").value_or("") == "down";
-  const std::optional<EvenSteps> even = EvenStepsOf(*values);
+  const std::optional<EvenSteps> cells = kind == AxisKind::kTime ? std::nullopt : CellsAround(file, scale, size);
+  const std::optional<EvenSteps> even = cells ? cells : EvenStepsOf(*values);
   if (kind == AxisKind::kTime) {
     if (!even) return;
     axis.step = even->step;
@@ -114,8 +123,8 @@ void TakeCoordinates(AttributedFile& file, const std::string& scale, std::uint64
   axis.step = even ? even->step : 1;
   axis.unit = LengthUnitNamed(unit);
   image.world = World::kScene;
-  image.notes.push_back(
-      fmt::format("coordinates {} place its axis: {:g} and steps of {:g}{}", named, axis.start, axis.step, down ? "; they run down" : ""));
+  image.notes.push_back(fmt::format("{} {} place its axis: {:g} and steps of {:g}{}", cells ? "bounds of the coordinates" : "coordinates",
+                                    named, axis.start, axis.step, down ? "; they run down" : ""));
 }
 
 }  // namespace

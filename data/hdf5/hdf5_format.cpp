@@ -10,6 +10,7 @@
 #include "data/hdf5/hdf5_image.h"
 #include "data/hdf5/hdf5_layouts.h"
 #include "data/hdf5/vtk_hdf_mesh.h"
+#include "data/positional/file_source.h"
 
 namespace slabstream {
 namespace {
@@ -39,6 +40,11 @@ Result<std::shared_ptr<VolumeSource>> OpenPyramid(const std::string& path, Resul
   return pyramid.ok() ? MakeChunkedSource(path, *std::move(pyramid), context) : pyramid.status();
 }
 
+Result<RawVolume> ReadGrid(const std::string& path, const ReadOptions& options) {
+  const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
+  return file.ok() ? ReadVtkHdfGrid(*file, options) : file.status();
+}
+
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   if (IsClassicNetcdf(path)) {
     const Result<std::unique_ptr<AttributedFile>> file = OpenClassicNetcdf(path);
@@ -47,17 +53,12 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
   const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
   if (!file.ok()) return file.status();
   const std::string type = VtkHdfType(**file);
-  if (IsVtkHdfGrid(type)) return std::shared_ptr<VolumeSource>();
+  static const VolumeFormat kGrid = {.name = "VTKHDF", .endings = {}, .read = ReadGrid};
+  if (IsVtkHdfGrid(type)) return OpenFile(kGrid, path, options, context);
   if (options.lattice) return Status::InvalidArgument(path + ": holds voxels, so it takes no option lattice");
   if (type == kVtkHdfAmr) return OpenVtkHdfAmr(*file, options, context);
   if (options.dataset.find('/') == std::string::npos && IsFlash(**file)) return OpenFlash(*file, options, context);
   return OpenPyramid(path, ReadPyramid(*file, options, context), context);
-}
-
-// A grid with cells.
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
-  return file.ok() ? ReadVtkHdfGrid(*file, options) : file.status();
 }
 
 }  // namespace
@@ -74,8 +75,7 @@ VolumeFormat Hdf5() {
           .endings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"},
           .recognises = Recognises,
           .options = {"time", "channel", "dataset", "lattice", "resample"},
-          .open = Open,
-          .read = Read};
+          .open = Open};
 }
 
 }  // namespace slabstream

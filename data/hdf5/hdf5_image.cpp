@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 #include <set>
 #include <sstream>
 
@@ -39,27 +38,33 @@ std::string Listed(AttributedFile& file, const std::vector<std::string>& paths) 
   return list;
 }
 
-// Leaves out what other datasets name, by the conventions of CF, as coordinates of several axes or as bounds of their cells.
-void LeaveOutCoordinates(AttributedFile& file, std::vector<std::string>& paths) {
+// What datasets name, by the conventions of CF, as coordinates of several axes or as bounds of their cells.
+std::set<std::string> NamedByOthers(AttributedFile& file) {
   std::set<std::string> named;
   for (const std::string& path : file.Datasets(1).paths) {
-    for (const char* const attribute : {"bounds", "climatology", "coordinates"}) {
-      std::istringstream names(file.Text(path, attribute).value_or(""));
+    for (const std::string_view attribute : kNamingAttributes) {
+      std::istringstream names(file.Text(path, std::string(attribute)).value_or(""));
       for (std::string name; names >> name;) named.insert(path.substr(0, path.rfind('/') + 1) + name);
     }
   }
-  std::vector<std::string> others;
-  std::ranges::copy_if(paths, std::back_inserter(others), [&](const std::string& path) { return !named.contains(path); });
-  if (!others.empty()) paths = std::move(others);
+  return named;
 }
 
-// Of a file without a dataset of three axes or more, those of two: slices.
-Result<std::vector<std::string>> SlicesIn(AttributedFile& file, const AttributedFile::Found& found) {
+// Datasets of three axes or more, else of two: slices. Those that others name count only if there are no others.
+Result<std::vector<std::string>> PlainImages(AttributedFile& file) {
+  AttributedFile::Found found = file.Datasets(3);
+  const std::set<std::string> named = NamedByOthers(file);
+  const auto is_named = [&](const std::string& path) { return named.contains(path); };
+  if (!std::ranges::all_of(found.paths, is_named)) {
+    std::erase_if(found.paths, is_named);
+    return std::move(found.paths);
+  }
   for (const std::string& path : found.closed) {
     if (const Status status = file.Describe(path).status(); !status.ok()) return status;
   }
   std::vector<std::string> slices = file.Datasets(2).paths;
   if (slices.empty()) return Status::InvalidArgument(file.path() + ": has no dataset of two axes or more");
+  if (!std::ranges::all_of(slices, is_named)) std::erase_if(slices, is_named);
   return slices;
 }
 
@@ -77,11 +82,9 @@ Result<std::string> ChosenDataset(AttributedFile& file, const ReadOptions& optio
     if (!paths.empty()) break;
   }
   if (paths.empty()) {
-    AttributedFile::Found found = file.Datasets(3);
-    Result<std::vector<std::string>> images = found.paths.empty() ? SlicesIn(file, found) : std::move(found.paths);
+    Result<std::vector<std::string>> images = PlainImages(file);
     if (!images.ok()) return images.status();
     paths = *std::move(images);
-    if (paths.size() > 1) LeaveOutCoordinates(file, paths);
   }
   if (paths.size() == 1) return paths[0];
   return Status::InvalidArgument(

@@ -1,6 +1,7 @@
 // What an axis of an array stands for, by the name that writers give it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -15,5 +16,8 @@ constexpr bool IsSpace(AxisKind kind) { return kind == AxisKind::kX || kind == A
 AxisKind AxisNamed(std::string_view name);
 // "z", "time", "channel", "none".
 std::string_view NameOf(AxisKind kind);
+
+// With these attributes of CF arrays name others that only say where elements lie.
+inline constexpr std::array<std::string_view, 3> kNamingAttributes = {"bounds", "climatology", "coordinates"};
 
 }  // namespace slabstream

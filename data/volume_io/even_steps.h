@@ -11,8 +11,15 @@ struct EvenSteps {
   double first = 0, step = 1;  // the step is finite and not 0
 };
 
+// From the first to the last of two coordinates or more, which need not be even.
+EvenSteps MeanSteps(const std::vector<double>& coordinates);
+
 // nullopt: fewer than two; a coordinate lies farther than 2 % of a step off its place; they do not change.
 std::optional<EvenSteps> EvenStepsOf(const std::vector<double>& coordinates);
+
+// The same of the centres of cells, by their bounds (CF conventions, 7.1): two for each cell, in either order. nullopt, too: the length of
+// a cell differs by more than 2 % from the step. The step of a single cell is its length.
+std::optional<EvenSteps> EvenCellsOf(const std::vector<double>& bounds);
 
 // What keeps two coordinates or more from being even, for messages: "number 1 is 850, an even one would be 550".
 std::string WhyUneven(const std::vector<double>& coordinates);

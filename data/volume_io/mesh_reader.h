@@ -70,7 +70,7 @@ inline constexpr std::array<std::string_view, 8> kXmlGridEndings = {".vtu", ".pv
 // `path`, and the files that it names. Errors of ReadVtkList, and of lists that are no grids.
 Result<std::vector<std::string>> FilesOfMesh(const std::string& path);
 
-// By its ending; a legacy VTK file by what it says of its dataset.
+// By its ending; a legacy VTK file by what it says of its dataset, and not a list of images (ListsImages).
 bool LooksLikeMesh(const std::string& path);
 
 // NotFound (no such file), InvalidArgument (no unstructured grid, no such array, cells of another kind, a point that is not finite),

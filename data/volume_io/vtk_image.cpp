@@ -267,11 +267,14 @@ Status Write(const FileSamples& samples, const std::string& path) {
 
 }  // namespace
 
-Result<ParallelImage> ReadParallelImage(const std::string& path, const ReadOptions& options) {
-  const bool rectilinear = ToLower(path).ends_with(".pvtr");
-  const auto image = OpenImage(path, rectilinear ? "PRectilinearGrid" : "PImageData", options);
+Result<ParallelImage> ReadParallelImage(const std::string& path, std::string_view type, const ReadOptions& options) {
+  const auto image = OpenImage(path, type, options);
   if (!image.ok()) return image.status();
-  ParallelImage parallel{(*image)->header, (*image)->array, rectilinear ? kRectilinearName : kImageName};
+  ParallelImage parallel{(*image)->header, (*image)->array, type.ends_with(kImage) ? kImageName : kRectilinearName, {}};
+  if (!(*image)->file.parallel()) {
+    parallel.pieces.push_back({path, {{}, parallel.header.size}});
+    return parallel;
+  }
   for (const Piece& piece : (*image)->pieces) {
     const auto size = (*image)->Voxels(piece);
     if (size[0] * size[1] * size[2] == 0) continue;

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <span>
 
 #include "common/text/trimmed.h"
 #include "data/volume_io/xml_events.h"
@@ -42,6 +44,23 @@ Result<VtkList> ReadVtkList(const std::string& path) {
     return wrong(fmt::format("names {} files, must name 1 to {}", files, kMostListedFiles));
   }
   return list;
+}
+
+bool ListsImages(const std::string& path) {
+  const Result<VtkList> list = ReadVtkList(path);
+  if (!list.ok() || !list->OfBlocks()) return false;
+  for (const VtkListEntry& entry : list->entries) {
+    const Result<VtkList> block = ReadVtkList(entry.path);
+    if (block.ok() && block->OfSurfaces()) continue;
+    return block.ok() && std::ranges::count(kVtkImageTypes, block->type) > 0;
+  }
+  return false;
+}
+
+std::string SurfacesNote(const std::vector<std::string>& names) {
+  const std::size_t named = std::min<std::size_t>(names.size(), 8);
+  const std::string more = named < names.size() ? fmt::format(" and {} more", names.size() - named) : "";
+  return fmt::format("surfaces are left out: {}{}", fmt::join(std::span(names).first(named), ", "), more);
 }
 
 }  // namespace slabstream

@@ -61,7 +61,7 @@ class GridFiles {
     paths_.push_back(path);
     std::error_code error;
     if (!known_.insert(std::filesystem::weakly_canonical(path, error)).second) return Status::InvalidArgument(path + ": is named twice");
-    if (block && (list->type == "PolyData" || list->type == "PPolyData")) {
+    if (block && list->OfSurfaces()) {
       surfaces_.push_back(name);
       return Status::Ok();
     }
@@ -121,11 +121,7 @@ class XmlGridReader {
  private:
   Result<LoadedMesh> ReadFiles() {
     if (Status status = files_.Find(); !status.ok()) return status;
-    if (const auto& names = files_.surfaces(); !names.empty()) {
-      const std::size_t named = std::min<std::size_t>(names.size(), 8);
-      const std::string more = named < names.size() ? fmt::format(" and {} more", names.size() - named) : "";
-      notes_.push_back(fmt::format("surfaces are left out: {}{}", fmt::join(std::span(names).first(named), ", "), more));
-    }
+    if (!files_.surfaces().empty()) notes_.push_back(SurfacesNote(files_.surfaces()));
     for (const GridFile& file : files_.grids()) {
       if (Status status = ReadFile(file); !status.ok()) return status;
       if (options_.headers_only && array_) break;

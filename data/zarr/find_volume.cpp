@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <sstream>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "common/base/printable.h"
+#include "data/sources/axis_kind.h"
 #include "data/zarr/ome.h"
 
 namespace slabstream::zarr {
@@ -56,6 +60,7 @@ Result<std::string> OnlyArray(Store& store, const std::string& path) {
   if (!names.ok()) return names.status();
   std::vector<std::pair<std::string, std::size_t>> found;  // arrays, and how many axes they have
   std::vector<std::string> groups;
+  std::set<std::string> named;  // by others
   std::size_t looked = 0;
   for (const std::string& name : *names) {
     if (!name.ends_with('/') || name.starts_with('.') || ++looked > kMostLooked) continue;
@@ -64,10 +69,17 @@ Result<std::string> OnlyArray(Store& store, const std::string& path) {
     if (!node.ok() || !node->has_value()) continue;
     if ((*node)->array) {
       found.emplace_back(child, (*node)->metadata_field()["shape"].size());
+      for (const std::string_view attribute : kNamingAttributes) {
+        const Result<std::string> text = (*node)->attributes_field()[std::string(attribute)].Text();
+        std::istringstream names_in(text.ok() ? *text : "");
+        for (std::string other; names_in >> other;) named.insert(std::move(other));
+      }
     } else {
       groups.push_back(child);
     }
   }
+  const auto is_named = [&](const auto& array) { return named.contains(array.first); };
+  if (!std::ranges::all_of(found, is_named)) std::erase_if(found, is_named);
   const std::vector<std::string> arrays = OfMostAxes(found);
   if (arrays.size() == 1) return Join(path, arrays.front());
   std::string why = "a group without arrays";

@@ -7,17 +7,16 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <future>
 #include <optional>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "common/base/printable.h"
 #include "common/text/base64.h"
 #include "common/volume/volume.h"
+#include "data/sources/array_numbers.h"
 #include "data/sources/mapped_array.h"
 #include "data/volume_io/even_steps.h"
 #include "data/volume_io/length_names.h"
@@ -59,18 +58,13 @@ void NoteAxes(const std::vector<std::string>& names, const std::vector<AxisKind>
 struct AxisCoordinates {
   std::vector<double> values;  // one for each index along the axis
   std::string unit;            // "m"; "": none is stated
+  std::string bounds;          // the array with those of their cells; "": there is none
 };
 
-Result<std::optional<StoredChunk>> ReadNow(ChunkedArray& array, std::uint64_t index) {
-  std::promise<Result<std::optional<StoredChunk>>> answer;
-  array.ReadChunk(std::span(&index, 1), [&](Result<std::optional<StoredChunk>> chunk) { answer.set_value(std::move(chunk)); });
-  return answer.get_future().get();
-}
-
-// Those in the array `name` of a group that has one axis of `size` elements. nullopt: there is no such array, or it holds no numbers.
-// Errors of reading its chunks. Waits.
+// Those in the array `name` of a group that has one axis of `size` elements; or, of bounds, `each` numbers for each of them along a second
+// axis. nullopt: there is no such array, or it holds no numbers. Errors of reading its chunks. Waits.
 Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& context, const std::string& group, const std::string& name,
-                                                       std::uint64_t size) {
+                                                       std::uint64_t size, std::uint64_t each = 1) {
   const std::optional<AxisCoordinates> none;
   if (name.empty() || name.find('/') != std::string::npos || size > std::uint64_t(kMaxVolumeSide)) return none;
   const Result<std::optional<ZarrNode>> node = NodeReading(*context.store, metadata::Join(group, name)).Get();
@@ -79,23 +73,17 @@ Result<std::optional<AxisCoordinates>> ReadCoordinates(const ArrayContext& conte
   if (!opened.ok()) return none;
   const ArrayShape& shape = opened->array->shape();
   constexpr std::uint64_t kMostChunks = 1024;
-  if (shape.size.size() != 1 || shape.size[0] != size || (size - 1) / shape.chunk[0] >= kMostChunks) return none;
-  AxisCoordinates coordinates;
-  for (std::uint64_t chunk = 0; chunk * shape.chunk[0] < size; ++chunk) {
-    const Result<std::optional<StoredChunk>> read = ReadNow(*opened->array, chunk);
-    if (!read.ok()) return read.status();
-    for (std::uint64_t i = 0; i < std::min(shape.chunk[0], size - chunk * shape.chunk[0]); ++i) {
-      coordinates.values.push_back(VisitSampleType(shape.type, [&](const auto* null) {
-        std::remove_cvref_t<decltype(*null)> element;
-        std::memcpy(&element, *read ? (*read)->elements.span().data() + i * sizeof element : shape.fill.data(), sizeof element);
-        return double(element);
-      }));
-    }
-  }
+  const std::vector<std::uint64_t> all = each == 1 ? std::vector{size} : std::vector{size, each};
+  if (SizesInMetadata(*opened) != all || opened->from.front() != 0 || (size - 1) / shape.chunk[0] >= kMostChunks) return none;
+  const auto values =
+      ReadNumbers<double>(NameOf(*context.store, (*node)->path), opened->array, {std::vector<std::uint64_t>(all.size()), all});
+  if (!values.ok()) return values.status();
+  AxisCoordinates coordinates{.values = {values->begin(), values->end()}};
   const metadata::Field attributes = (*node)->attributes_field();
   for (const char* const key : {"units", "unit"}) {
     if (const metadata::Field unit = attributes[key]; unit.is_text()) coordinates.unit = *unit.Text();
   }
+  if (const metadata::Field bounds = attributes["bounds"]; bounds.is_text()) coordinates.bounds = *bounds.Text();
   return std::optional(std::move(coordinates));
 }
 
@@ -111,7 +99,7 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
     const auto number = std::size_t(time - kinds.begin());
     const Result<std::optional<AxisCoordinates>> coordinates = ReadCoordinates(context, group, names[number], sizes[number]);
     if (coordinates.ok() && *coordinates) {
-      const auto& [values, unit] = **coordinates;
+      const auto& [values, unit, bounds] = **coordinates;
       pyramid.info.times = StatedTimes(choice.times, values, unit.substr(0, unit.find(' ')));  // "hours since 2000-01-01"
     }
   }
@@ -124,9 +112,13 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
     if (!coordinates.ok()) return coordinates.status();
     if (!*coordinates) continue;
     const std::vector<double>& values = (*coordinates)->values;
-    if (values.size() < 2) continue;
-    const bool falls = values.front() > values.back();
-    if (!EvenStepsOf(values)) {
+    const auto bounds = ReadCoordinates(context, group, (*coordinates)->bounds, values.size(), 2);
+    if (!bounds.ok()) return bounds.status();
+    const std::optional<EvenSteps> cells = *bounds ? EvenCellsOf((*bounds)->values) : std::nullopt;
+    if (values.size() < 2 && !cells) continue;
+    const auto [first, step] = cells ? *cells : MeanSteps(values);
+    const bool falls = step < 0;
+    if (!cells && !EvenStepsOf(values)) {
       const Result<UnevenAxis> uneven = UnevenAxisOf(Printable(node.path + ": coordinates " + name), values, ValuesAt::kPoints);
       if (!options.resample && (options.labels || !uneven.ok())) {
         pyramid.info.notes.push_back(
@@ -137,9 +129,9 @@ Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, con
       pyramid.info.uneven[std::size_t(axis)] = falls ? uneven->Reversed() : *uneven;
     }
     level.mirrored[std::size_t(axis)] = falls;
-    level.spacing[axis] = std::abs(values.back() - values.front()) / double(values.size() - 1);
-    level.origin[axis] = std::min(values.front(), values.back());
-    placed.push_back(name);
+    level.spacing[axis] = std::abs(step);
+    level.origin[axis] = falls ? first + step * double(values.size() - 1) : first;
+    placed.push_back(cells ? (*coordinates)->bounds : name);
     units.push_back((*coordinates)->unit);
   }
   if (!placed.empty())

@@ -1,6 +1,8 @@
 // Volume files of every format, read from a file, since that is what the readers take.
 //
 // input: u8 kind (Kinds()), u8 options (OptionsNumber), the file
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "data/open/read_volume.h"
@@ -9,6 +11,7 @@
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/tiff_files.h"
 #include "tests/data/volume_io/volume_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
 
@@ -43,7 +46,11 @@ ReadOptions OptionsNumber(std::uint8_t number, const Kind& kind) {
 }
 
 struct Files {
-  TemporaryDirectory directory{PlaceOfFuzzFiles()};
+  Files() {
+    for (const int x : {0, 3}) WriteFile(Path(fmt::format(".{}.vti", x)), VtiFile({}, FileBytes(24, 'x'), {.origin = {double(x), 0, 0}}));
+  }
+
+  TemporaryDirectory directory{PlaceOfFuzzFiles()};  // with two blocks of an image
   std::string Path(const std::string& ending) const { return directory / ("volume" + ending); }
 };
 const Files& SharedFiles() {
@@ -141,6 +148,7 @@ std::vector<FuzzBytes> VolumeFileSeeds() {
   seeds.push_back(Seed(".nii", NiftiHeader({.dimensions = {4, 3, 2, 2}}) + FileBytes(48, 'x'), 1));
   seeds.push_back(Seed(".npy", NpyHeader("<f2", "(2, 3, 4)", true, 2) + FileBytes(48, 'x')));
   seeds.push_back(Seed(".vti", VtiFile({}, FileBytes(72, 'x'), {.block = 10, .components = 3}), 3));
+  seeds.push_back(Seed(".vtm", VtkListFile("vtkMultiBlockDataSet", {"volume.0.vti", "volume.3.vti"})));
   spec.big_endian = false;
   const std::string path = SharedFiles().Path(".seed.tif");
   for (const SampleType type : {SampleType::kUint8, SampleType::kInt16, SampleType::kFloat32}) {

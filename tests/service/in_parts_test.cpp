@@ -1,4 +1,5 @@
 // Volumes that nobody holds: pictures of voxels that are read in parts, and of levels, are those of the same voxels in memory.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,12 +18,15 @@
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 #include "data/survey/survey.h"
+#include "tests/data/mosaic/amrex_files.h"
+#include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/service/pictures.h"
 #include "tests/service/small_shards.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 
 namespace slabstream {
 namespace {
@@ -132,6 +136,50 @@ TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
     }
     ExpectNothingHeld();
   }
+}
+
+// However much memory it has: most voxels of a fine level would be interpolated.
+TEST_F(InPartsTest, NoLevelOfAnAdaptiveMeshIsHeld) {
+  const AmrexSpec mesh = {.first = {0, 0, 0},
+                          .size = Uniform(16),
+                          .levels = {{1, {{{0, 0, 0}, Uniform(16)}}}, {2, {{Uniform(8), Uniform(24)}}}, {4, {{Uniform(24), Uniform(40)}}}}};
+  const std::string path = directory_ / "plt";
+  WritePlotfile(path, mesh, [](const Vec3& place) { return std::max(0.0, 250 - 30 * Length(place - Vec3{8, 8, 8})); });
+  for (const std::uint64_t memory_bytes : {std::uint64_t{0}, std::uint64_t{1} << 30}) {
+    Start(path + "?array=v", 2, memory_bytes);
+    for (const RendererKind* renderer : VoxelRenderers()) {
+      for (const std::string& level : {std::string(kAutomatic), std::string("0"), std::string("2")}) {
+        FrameRequest request = TestRequest(renderer, 30, 3);
+        request.level = level;
+        const Result<Picture> picture = Render(request);
+        ASSERT_TRUE(picture.ok()) << picture.status().message();
+        EXPECT_GT(HighestAlpha(picture->image), 0.1) << renderer->name() << " at level " << level;
+      }
+    }
+    ExpectNothingHeld();
+  }
+}
+
+TEST_F(InPartsTest, PiecesThatDoNotFitAreNotHeld) {
+  const Index3 size = ball_->description.geometry.size;
+  const auto* const samples = reinterpret_cast<const char*>(ball_->block.bytes.data());
+  const auto extent = [&](int begin, int end) { return fmt::format("0 {} 0 {} {} {}", size.x - 1, size.y - 1, begin, end - 1); };
+  std::string pieces;
+  for (const auto& [begin, end] : {std::pair{0, 41}, {41, size.z}}) {
+    const FileBytes bytes(samples + CountIn({size.x, size.y, begin}), CountIn({size.x, size.y, end - begin}));
+    const FileSpec spec = {.size = {size.x, size.y, end - begin}, .type = SampleType::kUint8};
+    WriteFile(directory_ / fmt::format("{}.vti", begin), VtiFile(spec, bytes, {.extent = extent(begin, end)}));
+    pieces += fmt::format("<Piece Extent=\"{}\" Source=\"{}.vti\"/>", extent(begin, end), begin);
+  }
+  const std::string path = directory_ / "ball.pvti";
+  WriteFile(path, fmt::format("<VTKFile type=\"PImageData\" byte_order=\"LittleEndian\"><PImageData WholeExtent=\"{}\" Spacing=\"1 1 1\">"
+                              "<PPointData><PDataArray type=\"UInt8\" Name=\"density\"/></PPointData>{}</PImageData></VTKFile>",
+                              extent(0, size.z), pieces));
+  Start(path);
+  for (const RendererKind* renderer : VoxelRenderers()) {
+    for (const FrameRequest& request : RequestsFor(renderer)) ExpectPictureOf(request, *ball_);
+  }
+  ExpectNothingHeld();
 }
 
 // The light volume is a level, which workers read, or which the coordinator holds.

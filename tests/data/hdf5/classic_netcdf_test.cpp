@@ -136,6 +136,19 @@ TEST_F(ClassicNetcdfTest, IsReadAsNetcdf4Is) {
   }
 }
 
+TEST_F(ClassicNetcdfTest, EvenBoundsPlaceAnAxisBeforeItsCoordinates) {
+  NetcdfWriter writer = Climate(1);
+  const auto lon_bnds = std::ranges::find(writer.variables, "lon_bnds", &NetcdfWriter::Variable::name);
+  const auto geometry = [&] {
+    Write(writer);
+    return Open({.time = TimeRange{}})->info().finest().geometry;
+  };
+  EXPECT_EQ(geometry().spacing.x, 1) << "cells with gaps place nothing";
+  lon_bnds->values = {-2, 1, 1, 4, 4, 7, 7, 10, 10, 13};
+  EXPECT_EQ(geometry().spacing.x, 3);
+  EXPECT_EQ(geometry().orientation.origin.x, -0.5);
+}
+
 TEST_F(ClassicNetcdfTest, RecordsOfAnOnlyVariableLieNextToEachOther) {
   for (const bool alone : {true, false}) {
     for (const bool streaming : {true, false}) {

@@ -422,6 +422,76 @@ TEST_F(Hdf5ImageTest, GaussianLatitudesAreEven) {
   EXPECT_NEAR(Open()->info().levels[0].description.geometry.spacing.y, 2 * latitudes[0] / (kLatitudes - 1), 1e-9);
 }
 
+// CF: coordinates may lie anywhere in their cells, which bounds tell.
+TEST_F(Hdf5ImageTest, EvenBoundsPlaceAnAxisBeforeItsCoordinates) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  const auto write = [&](const std::vector<hsize_t>& size, const std::vector<double>& bounds) {
+    Hdf5Writer writer(path_);
+    writer.Write("/grid/data", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/grid/depth", {2}, {10, 30});
+    writer.Doubles("/grid/depth_bnds", {2, 2}, {0, 15, 15, 50});
+    writer.Doubles("/grid/lat", {3}, {50, 47, 46});
+    writer.Doubles("/grid/lat_bnds", {3, 2}, {51, 49, 49, 47, 47, 45});
+    writer.Doubles("/grid/lon", {4}, {0, 1.25, 2, 3});
+    writer.Doubles("/grid/lon_bnds", size, bounds);
+    for (const std::string name : {"/grid/depth", "/grid/lat", "/grid/lon"}) writer.Text(name, "bounds", name.substr(6) + "_bnds");
+    writer.Scales("/grid/data", {"/grid/depth", "/grid/lat", "/grid/lon"});
+  };
+  write({4, 2}, {-0.5, 0.5, 0.5, 1.5, 1.5, 2.5, 2.5, 3.5});
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().finest().geometry;
+  EXPECT_EQ(geometry.spacing, (Vec3{1, 2, 20}));
+  EXPECT_EQ(geometry.orientation.origin, (Vec3{0, 46, 10}));
+  EXPECT_TRUE(geometry.stretch.even());
+  EXPECT_EQ(ValueAt(*source, {3, 50, 30}), 15) << "the axis of lat falls";
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("bounds of the coordinates lon place its axis: 0 and steps of 1")));
+  EXPECT_THAT(source->info().notes, Contains("coordinates depth place its axis: 10 and steps of 20")) << "its cells are not even";
+
+  // A row for each corner, borders alone, cells with gaps, and one that is not known: its coordinates place it.
+  const double nan = std::nan("");
+  for (const auto& [size, bounds] :
+       std::vector<std::pair<std::vector<hsize_t>, std::vector<double>>>{{{2, 4}, {-0.5, 0.5, 1.5, 2.5, 0.5, 1.5, 2.5, 3.5}},
+                                                                         {{5}, {-0.5, 0.5, 1.5, 2.5, 3.5}},
+                                                                         {{4, 4}, std::vector<double>(16, 1)},
+                                                                         {{4, 2}, {-0.4, 0.4, 0.6, 1.4, 1.6, 2.4, 2.6, 3.4}},
+                                                                         {{4, 2}, {-0.5, 0.5, 0.5, nan, 1.5, 2.5, 2.5, 3.5}}}) {
+    write(size, bounds);
+    EXPECT_THAT(Open()->info().notes, Contains(HasSubstr("the 4 voxels along x, 0.75 to 1.25 apart, lie at their own places")));
+  }
+}
+
+TEST_F(Hdf5ImageTest, AnOnlySliceHasTheThicknessOfItsCell) {
+  const std::vector<std::int16_t> samples = Ascending(6);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {1, 2, 3}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/depth", {1}, {10});
+    writer.Doubles("/depth_bnds", {1, 2}, {0, 30});
+    writer.Text("/depth", "bounds", "depth_bnds");
+    writer.Scales("/data", {"/depth", "", ""});
+  }
+  const auto source = Open();
+  EXPECT_EQ(source->info().finest().geometry.spacing.z, 30);
+  EXPECT_EQ(source->info().finest().geometry.orientation.origin.z, 15);
+}
+
+TEST_F(Hdf5ImageTest, ASliceBesideBoundsOfMoreAxesIsTheImage) {
+  const std::vector<std::int16_t> samples = Ascending(12);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/tos", {.size = {3, 4}, .type = SampleType::kInt16}, samples.data());
+    for (const char* const name : {"/lat", "/lon"}) {
+      writer.Doubles(name, {3, 4}, std::vector<double>(12));
+      writer.Doubles(name + std::string("_vertices"), {3, 4, 4}, std::vector<double>(48));
+      writer.Text(name, "bounds", (name + std::string("_vertices")).substr(1));
+    }
+    writer.Text("/tos", "coordinates", "lat lon");
+  }
+  const auto source = Open();
+  EXPECT_EQ(source->info().finest().geometry.size, (Index3{4, 3, 1}));
+  EXPECT_EQ(ValueAt(*source, {3, 2, 0}), 11);
+}
+
 TEST_F(Hdf5ImageTest, AMissingValueThatIsADoubleIsOneOfFloats) {
   const std::vector<float> samples = {1, 2, 1e20F, 4, 5, 6, 7, -9.99e8F};
   {

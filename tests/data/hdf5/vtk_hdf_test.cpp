@@ -117,6 +117,7 @@ TEST_F(VtkHdfTest, AGridIsThatOfAVtuFile) {
     const std::string dataset = array == "height" ? "VTKHDF/PointData/height" : array;
     ExpectSame(*Read(path_, {.lattice = 24, .dataset = dataset}), *Read(vtu, {.array = array, .lattice = 24}));
   }
+  EXPECT_EQ(Opened(Open({.dataset = "height"}))->info().format, "VTKHDF");
   EXPECT_THAT(Open({.dataset = "none"}).status().message(), HasSubstr("has no array 'none'; it has height, number"));
 }
 

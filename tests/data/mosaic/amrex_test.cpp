@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "data/open/open_source.h"
+#include "tests/data/mosaic/amrex_files.h"
 #include "tests/data/sources/opened_source.h"
-#include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/whole_file.h"
@@ -24,67 +24,20 @@ constexpr Index3 kDomain = {-8, 0, 4};  // the domain's first cell at the coarse
 constexpr Index3 kCoarse = {16, 8, 8};
 const Vec3 kCorner = {1, 2, 3};
 
-struct Kind {
-  SampleType type = SampleType::kFloat64;
-  bool big_endian = false;
-  int ghosts = 0;
-  bool apart = false;  // each box lies in a file of its own, the last one in the first file
-};
-
 // The values are those of their place in the world.
 double FieldAt(const Vec3& place) { return place.x - 3 * place.y + 0.25 * place.z; }
 
+// Two levels, of which the finer one has two boxes.
+const AmrexSpec kTwoLevels = {
+    .first = kDomain,
+    .size = kCoarse,
+    .corner = kCorner,
+    .spacing = 0.25,
+    .levels = {{1, {{{0, 0, 0}, {16, 8, 4}}, {{0, 0, 4}, {16, 8, 8}}}}, {2, {{{4, 4, 4}, {12, 8, 12}}, {{12, 4, 8}, {20, 8, 12}}}}}};
+
 class AmrexTest : public testing::Test {
  protected:
-  // Two levels, of which the finer one has two boxes. The variable "v" is that of FieldAt, "w" its negative.
-  void Write(const Kind& kind = {}) const {
-    const std::string real = kind.type == SampleType::kFloat64 ? "8, (64 11 52 0 1 12 0 1023)" : "8, (32 8 23 0 1 9 0 127)";
-    const auto bytes = int(BytesPerSample(kind.type));
-    std::string order;
-    for (int i = 0; i < bytes; ++i) order += fmt::format("{}{}", i == 0 ? "" : " ", kind.big_endian ? i + 1 : bytes - i);
-    std::string header = "HyperCLaw-V1.1\n2\nv\nw\n3\n0.5\n1\n1 2 3 \n5 4 5 \n2 \n", sides, grids;
-    for (const int factor : {1, 2}) {
-      const Index3 first = Uniform(factor) * kDomain, size = Uniform(factor) * kCoarse;
-      header += fmt::format("{} ", TextOf({first, first + size}));
-      sides += fmt::format("{0} {0} {0} \n", 0.25 / factor);
-      const std::vector<Box> boxes = factor == 1 ? std::vector<Box>{{{0, 0, 0}, {16, 8, 4}}, {{0, 0, 4}, {16, 8, 8}}}
-                                                 : std::vector<Box>{{{4, 4, 4}, {12, 8, 12}}, {{12, 4, 8}, {20, 8, 12}}};
-      grids += fmt::format("{} {} 0.5\n7\n", factor - 1, boxes.size());
-      std::string of_level = fmt::format("1\n1\n2\n{}\n({} 0\n", kind.ghosts, boxes.size()), places;
-      std::vector<std::string> files(boxes.size());
-      for (const Box& box : boxes) {
-        grids += "0 1\n0 1\n0 1\n";  // corners, which the boxes tell
-        of_level += TextOf({box.begin + first, box.end + first}) + "\n";
-        const std::size_t file = kind.apart ? std::size_t(&boxes.back() - &box) : 0;
-        std::string& data = files[file];
-        places += fmt::format("FabOnDisk: Cell_D_0000{} {}\n", file, data.size());
-        const Box stored = {box.begin - Uniform(kind.ghosts), box.end + Uniform(kind.ghosts)};
-        data += fmt::format("FAB (({}),({}, ({}))){} 2\n", real, bytes, order, TextOf({stored.begin + first, stored.end + first}));
-        std::vector<double> values;
-        for (const double sign : {1.0, -1.0}) {
-          for (std::int32_t z = stored.begin.z; z < stored.end.z; ++z) {
-            for (std::int32_t y = stored.begin.y; y < stored.end.y; ++y) {
-              for (std::int32_t x = stored.begin.x; x < stored.end.x; ++x) {
-                values.push_back(sign * FieldAt(kCorner + (0.25 / factor) * Vec3{x + 0.5, y + 0.5, z + 0.5}));
-              }
-            }
-          }
-        }
-        data += EncodeSamples(kind.type, values, kind.big_endian);
-      }
-      const std::string folder = fmt::format("plt/Level_{}/", factor - 1);
-      WriteFile(directory_ / (folder + "Cell_H"), of_level + fmt::format(")\n{}\n", boxes.size()) + places + "\n2,2\n0,0,\n0,0,\n");
-      for (std::size_t file = 0; file < files.size(); ++file)
-        WriteFile(directory_ / fmt::format("{}Cell_D_0000{}", folder, file), files[file]);
-      grids += fmt::format("Level_{}/Cell\n", factor - 1);
-    }
-    WriteFile(directory_ / "plt/Header", header + "\n7 7 \n" + sides + "0\n0\n" + grids);
-  }
-  // Both ends included.
-  static std::string TextOf(const Box& box) {
-    const Index3 low = box.begin, high = box.end - Uniform(1);
-    return fmt::format("(({},{},{}) ({},{},{}) (0,0,0))", low.x, low.y, low.z, high.x, high.y, high.z);
-  }
+  void Write(const AmrexSpec& spec = kTwoLevels) const { WritePlotfile(directory_ / "plt", spec, FieldAt); }
   Result<std::shared_ptr<VolumeSource>> Open(const std::string& array = "v") const {
     return OpenSource(directory_ / "plt", {.array = array}, context_);
   }
@@ -94,8 +47,12 @@ class AmrexTest : public testing::Test {
 };
 
 TEST_F(AmrexTest, ALinearFieldIsThatOfItsPlaceAtEachLevel) {
-  for (const Kind& kind : {Kind{}, Kind{.big_endian = true, .apart = true}, Kind{.type = SampleType::kFloat32, .ghosts = 2}}) {
-    Write(kind);
+  std::vector<AmrexSpec> specs(3, kTwoLevels);
+  specs[1].big_endian = specs[1].apart = true;
+  specs[2].type = SampleType::kFloat32;
+  specs[2].ghosts = 2;
+  for (const AmrexSpec& spec : specs) {
+    Write(spec);
     for (const std::string array : {"v", "w"}) {
       const std::shared_ptr<VolumeSource> source = Opened(Open(array));
       ASSERT_EQ(source->info().levels.size(), 2U);
@@ -111,6 +68,86 @@ TEST_F(AmrexTest, ALinearFieldIsThatOfItsPlaceAtEachLevel) {
         for (std::size_t i = 0; i < std::size_t(inner.voxel_count()); ++i) {
           const Index3 size = inner.size(), v = inner.begin + Index3{int(i) % size.x, int(i) / size.x % size.y, int(i) / size.x / size.y};
           ASSERT_NEAR(values[i], (array == "v" ? 1 : -1) * FieldAt(geometry.ToWorld(ToVec3(v))), 1e-5);
+        }
+      }
+    }
+  }
+}
+
+Box RandomBoxIn(const Box& whole, Random& random) {
+  Box box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.begin[axis] = random.Integer(whole.begin[axis], whole.end[axis] - 1);
+    box.end[axis] = random.Integer(box.begin[axis] + 1, whole.end[axis]);
+  }
+  return box;
+}
+
+// Disjoint boxes in those of the coarser level, each perhaps as large as one.
+std::vector<Box> RandomBoxes(const std::vector<Box>& coarser, int ratio, Random& random) {
+  std::vector<Box> boxes;
+  for (int attempt = random.Integer(1, 12); attempt > 0; --attempt) {
+    const Box& parent = coarser[random.Integer<std::size_t>(0, coarser.size() - 1)];
+    Box box = RandomBoxIn(parent, random);
+    box = {Uniform(ratio) * box.begin, Uniform(ratio) * box.end};
+    if (std::ranges::all_of(boxes, [&](const Box& other) { return Intersection(box, other).empty(); })) boxes.push_back(box);
+  }
+  return boxes;
+}
+
+// The domain, cut at random.
+std::vector<Box> RandomTiles(const Index3& size, Random& random) {
+  std::vector<Box> tiles = {{{0, 0, 0}, size}};
+  for (int cuts = random.Integer(0, 6); cuts > 0; --cuts) {
+    Box& tile = tiles[random.Integer<std::size_t>(0, tiles.size() - 1)];
+    const int axis = random.Integer(0, 2);
+    if (tile.size()[axis] < 2) continue;
+    Box upper = tile;
+    upper.begin[axis] = tile.end[axis] = random.Integer(tile.begin[axis] + 1, tile.end[axis] - 1);
+    tiles.push_back(upper);
+  }
+  return tiles;
+}
+
+TEST_F(AmrexTest, ALinearFieldIsExactWhateverIsRefined) {
+  Random random(2017);
+  SCOPED_TRACE(random.trace());
+  const auto real = [&] { return random.Real(-3, 3); };
+  for (int round = 0; round < 60; ++round) {
+    SCOPED_TRACE(round);
+    AmrexSpec spec = {.first = {random.Integer(-20, 20), random.Integer(-20, 20), random.Integer(-20, 20)},
+                      .size = {random.Integer(3, 12), random.Integer(3, 12), random.Integer(3, 12)},
+                      .corner = {real(), real(), real()},
+                      .spacing = random.Real(0.1, 2),
+                      .ghosts = random.Integer(0, 1)};
+    spec.levels.push_back({1, RandomTiles(spec.size, random)});
+    for (int level = random.Integer(1, 3), factor = 1; level > 0; --level) {
+      const int ratio = random.Chance(0.3) && factor < 4 ? 4 : 2;
+      factor *= ratio;
+      spec.levels.push_back({factor, RandomBoxes(spec.levels.back().boxes, ratio, random)});
+    }
+    const Vec3 slope = {real(), real(), real()};
+    const double offset = real();
+    const auto field = [&](const Vec3& place) { return offset + Dot(slope, place); };
+    WritePlotfile(directory_ / "plt", spec, field);
+    const std::shared_ptr<VolumeSource> source = Opened(Open());
+    ASSERT_EQ(source->info().levels.size(), spec.levels.size());
+    for (std::size_t level = 0; level < spec.levels.size(); ++level) {
+      const VolumeGeometry& geometry = source->info().levels[level].description.geometry;
+      const int factor = spec.levels[spec.levels.size() - 1 - level].factor;
+      ASSERT_EQ(geometry.size, Uniform(factor) * spec.size);
+      // Beyond the centres of cells values are constant, at each level that is interpolated.
+      const Box inner = {Uniform(factor), geometry.size - Uniform(factor)};
+      for (const Box& wanted : {inner, RandomBoxIn(inner, random)}) {
+        const AlignedVector<std::byte> bytes = ReadBox(*source, int(level), wanted);
+        const auto* value = reinterpret_cast<const float*>(bytes.data());
+        for (std::int32_t z = wanted.begin.z; z < wanted.end.z; ++z) {
+          for (std::int32_t y = wanted.begin.y; y < wanted.end.y; ++y) {
+            for (std::int32_t x = wanted.begin.x; x < wanted.end.x; ++x) {
+              ASSERT_NEAR(*value++, field(geometry.ToWorld(ToVec3({x, y, z}))), 1e-4)
+                  << "level " << level << " at " << x << ", " << y << ", " << z;
+            }
+          }
         }
       }
     }

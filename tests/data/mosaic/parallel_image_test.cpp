@@ -1,4 +1,4 @@
-// .pvti and .pvtr, whose pieces lie in files of their own.
+// .pvti and .pvtr, whose pieces lie in files of their own, and .vtm and its like of images.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,11 @@
 
 #include "data/open/open_source.h"
 #include "data/open/read_volume.h"
+#include "data/volume_io/mesh_reader.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/volume_files.h"
+#include "tests/data/volume_io/vtu_files.h"
+#include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 #include "tests/support/whole_file.h"
 
@@ -72,6 +75,25 @@ class ParallelImage : public testing::Test {
                                 "<PPointData><PDataArray type=\"Int16\" Name=\"p\"/></PPointData>"
                                 "<PCellData><PDataArray type=\"Int16\" Name=\"c\"/></PCellData>{3}</P{0}></VTKFile>",
                                 kind, ExtentOf({{0, 0, 0}, kPoints}), attributes, pieces));
+    return path;
+  }
+  // Writes the same pieces as blocks that do not know of each other: each begins at 0.
+  std::string WriteBlocks(const std::string& kind, const std::vector<Box>& boxes, const std::string& type = "vtkMultiBlockDataSet") const {
+    const std::string ending = kind == "ImageData" ? "vti" : "vtr";
+    Write(kind, boxes);
+    std::vector<std::string> files;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      files.push_back(fmt::format("parts/piece {}.{}", i, ending));
+      FileBytes text = ReadFile(directory_ / files.back());
+      const std::string extent = ExtentOf(boxes[i]), own = ExtentOf({-kFirst, boxes[i].size() - kFirst});
+      for (std::size_t at = text.find(extent); at != FileBytes::npos; at = text.find(extent, at + 1)) text.replace(at, extent.size(), own);
+      const std::size_t at = text.find("WholeExtent");
+      const Vec3 origin = ToVec3(kFirst) + 0.5 * ToVec3(boxes[i].begin);
+      if (ending == "vti") text.insert(at, fmt::format(R"(Origin="{} {} {}" Spacing="0.5 0.5 0.5" )", origin.x, origin.y, origin.z));
+      WriteFile(directory_ / files.back(), text);
+    }
+    std::string path = directory_ / "whole.vtm";
+    WriteFile(path, VtkListFile(type, files));
     return path;
   }
   static std::string WhyNot(const std::string& path, const ReadOptions& options = {.array = "p"}) {
@@ -149,6 +171,120 @@ TEST_F(ParallelImage, PiecesAreTurnedAsTheWholeIs) {
   EXPECT_EQ(read->info.finest().geometry.size, (Index3{kPoints.y, kPoints.x, kPoints.z}));
   for (std::int32_t x = 0; x < kPoints.x; ++x) {
     for (std::int32_t y = 0; y < kPoints.y; ++y) ASSERT_EQ(ValueAt(*read, {y, kPoints.x - 1 - x, 5}), PointValue(x, y, 5));
+  }
+}
+
+// Their order does not matter: where the first block lies is one of many places.
+TEST_F(ParallelImage, BlocksAreOneVolumeOfPointsOrCells) {
+  for (const std::string kind : {"ImageData", "RectilinearGrid"}) {
+    for (const char* const type : {"vtkMultiBlockDataSet", "vtkPartitionedDataSet", "vtkPartitionedDataSetCollection"}) {
+      SCOPED_TRACE(kind + " in " + type);
+      std::vector<Box> boxes = Blocks();
+      std::ranges::rotate(boxes, boxes.begin() + 4);
+      const std::string path = WriteBlocks(kind, boxes, type);
+      EXPECT_FALSE(LooksLikeMesh(path));
+      const Vec3 first = kind == "ImageData" ? ToVec3(kFirst) : Vec3{5, 5, 5};
+      for (const bool cells : {false, true}) {
+        const Result<LoadedVolume> read = ReadVolume(path, {.array = cells ? "c" : "p"});
+        ASSERT_TRUE(read.ok()) << read.status().message();
+        const auto& [size, spacing, orientation, stretch] = read->info.finest().geometry;
+        ASSERT_EQ(size, cells ? kPoints - Uniform(1) : kPoints);
+        EXPECT_EQ(spacing, (Vec3{0.5, 0.5, 0.5}));
+        EXPECT_EQ(orientation.origin, (first + (cells ? 0.25 : 0) * Vec3{1, 1, 1}));
+        EXPECT_EQ(read->info.files.size(), 7U);
+        for (std::int32_t z = 0; z < size.z; ++z) {
+          for (std::int32_t y = 0; y < size.y; ++y) {
+            for (std::int32_t x = 0; x < size.x; ++x) ASSERT_EQ(ValueAt(*read, {x, y, z}), (cells ? CellValue : PointValue)(x, y, z));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ParallelImage, BlocksMayBePiecesAndHaveSurfacesBeside) {
+  Write("ImageData", Blocks());
+  WriteFile(directory_ / "wall.vtp", "<VTKFile type=\"PolyData\"><PolyData/></VTKFile>");
+  WriteFile(directory_ / "all.vtm",
+            "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet name=\"wall\" file=\"wall.vtp\"/>"
+            "<Block><DataSet/><DataSet file=\"whole.pvti\"/></Block></vtkMultiBlockDataSet></VTKFile>");
+  const Result<LoadedVolume> read = ReadVolume(directory_ / "all.vtm", {.array = "p"}),
+                             pieces = ReadVolume(directory_ / "whole.pvti", {.array = "p"});
+  ASSERT_TRUE(read.ok() && pieces.ok()) << read.status().message();
+  EXPECT_EQ(read->info.files.size(), 8U);
+  EXPECT_THAT(read->info.notes, testing::Contains("surfaces are left out: wall"));
+  EXPECT_EQ(read->info.finest().geometry, pieces->info.finest().geometry);
+  EXPECT_TRUE(std::ranges::equal(read->volume->block.bytes, pieces->volume->block.bytes));
+}
+
+TEST_F(ParallelImage, BlocksThatAreApartAlongEvenAxesShareTheUnevenOnes) {
+  bend_ = 0.02;
+  const std::vector<Box> boxes = {{{0, 0, 0}, kPoints}, {{0, 0, 0}, {14, 9, 4}}};
+  EXPECT_EQ(Opened(OpenSource(WriteBlocks("RectilinearGrid", {boxes[0], boxes[0]}), {.array = "p"}, TestReadContext()))
+                ->info()
+                .finest()
+                .geometry.size,
+            kPoints);
+  EXPECT_THAT(WhyNot(WriteBlocks("RectilinearGrid", boxes)),
+              HasSubstr("piece 1.vtr: along z its coordinates must be even, or the same, as those of the first block"));
+}
+
+TEST_F(ParallelImage, WhatIsWrongWithBlocksIsSaidInOneLine) {
+  const auto with = [&](int block, const std::string& from, const std::string& to) {
+    const std::string path = WriteBlocks("ImageData", Blocks()), file = directory_ / fmt::format("parts/piece {}.vti", block);
+    FileBytes text = ReadFile(file);
+    WriteFile(file, text.replace(text.find(from), from.size(), to));
+    return WhyNot(path);
+  };
+  const std::string path = WriteBlocks("ImageData", Blocks());
+  EXPECT_THAT(WhyNot(path, {.array = "q"}), AllOf(HasSubstr("whole.vtm: "), HasSubstr("piece 0.vti: has no array 'q'; it has p, c")));
+  std::vector<Box> boxes = Blocks();
+  boxes.pop_back();
+  EXPECT_THAT(WhyNot(WriteBlocks("ImageData", boxes)), HasSubstr("whole.vtm: its parts hold"));
+  EXPECT_THAT(
+      with(4, "Spacing=\"0.5", "Spacing=\"0.51"),
+      ContainsRegex("whole.vtm: .*piece 4.vti: along x its voxels are 0.51 0 0 apart, must be 0.5 0 0, as those of the first block"));
+  EXPECT_THAT(with(1, "Origin=\"-1.5", "Origin=\"-1.375"),
+              HasSubstr("piece 1.vti: along x its voxels begin at 3.25, must begin at a whole number"));
+  EXPECT_THAT(with(1, "Origin=\"-1.5", "Origin=\"1e300"), HasSubstr("piece 1.vti: along x its voxels begin at"));
+  EXPECT_THAT(with(0, "Spacing=\"0.5", "Spacing=\"nan"), HasSubstr("piece 1.vti: along x its voxels are"));
+  EXPECT_THAT(with(0, "Spacing=\"0.5", "Spacing=\"0"), HasSubstr("piece 1.vti: along x its voxels are"));
+  EXPECT_THAT(with(2, "Name=\"p\"", "Name=\"r\""), HasSubstr("piece 2.vti: has no array 'p'; it has r, c"));
+  EXPECT_THAT(with(2, "Int16\" Name=\"p\"", "Int16\" Name=\"p\" NumberOfComponents=\"3\""),
+              HasSubstr("piece 2.vti: a VTK image with 3 components, must be a VTK image with 1, as the first block"));
+  EXPECT_THAT(with(3, "Int16", "Int32"), HasSubstr("piece 3.vti has samples of int32 from 0 and scale 1, must have int16"));
+  const auto list = [&](const std::vector<std::string>& files) {
+    WriteFile(path, VtkListFile("vtkMultiBlockDataSet", files));
+    return WhyNot(path);
+  };
+  WriteFile(directory_ / "g.vtu", VtuFile(SmallGrid()));
+  EXPECT_THAT(list({"parts/piece 0.vti", "g.vtu"}),
+              HasSubstr("g.vtu: a VTK file of type 'UnstructuredGrid', must be ImageData or PImageData or"));
+  EXPECT_THAT(list({"parts/piece 0.vti", "gone.vti"}), HasSubstr("gone.vti: cannot be opened for reading"));
+  EXPECT_THAT(list({"parts/piece 0.vti", "whole.vtm"}),
+              HasSubstr("whole.vtm: a VTK file of type 'vtkMultiBlockDataSet', must be ImageData"));
+  WriteBlocks("RectilinearGrid", Blocks());
+  EXPECT_THAT(list({"parts/piece 0.vti", "parts/piece 0.vtr"}),
+              HasSubstr("piece 0.vtr: a VTK rectilinear grid with 1 components, must be a VTK image"));
+}
+
+TEST_F(ParallelImage, ListsOfBlocksThatAreCutOffOrAlteredDoNoHarm) {
+  Random random(17);
+  SCOPED_TRACE(random.trace());
+  const std::string path = WriteBlocks("ImageData", {{{0, 0, 0}, {3, 3, 3}}, {{2, 0, 0}, {5, 3, 3}}});
+  for (const std::string& file : {path, directory_ / "parts/piece 1.vti"}) {
+    const FileBytes good = ReadFile(file);
+    for (int i = 0; i < 400; ++i) {
+      FileBytes bytes = good;
+      if (random.Chance(0.1)) bytes.resize(random.Integer<std::size_t>(0, good.size()));
+      for (int flips = random.Integer(1, 3); flips > 0 && !bytes.empty(); --flips) {
+        Damage(bytes[random.Integer<std::size_t>(0, bytes.size() - 1)], random);
+      }
+      WriteFile(file, bytes);
+      const Result<LoadedVolume> read = ReadVolume(path, {.array = "p"});
+      EXPECT_THAT(read.status().message(), testing::AnyOf("", AllOf(HasSubstr(directory_ / ""), testing::Not(HasSubstr("\n")))));
+    }
+    WriteFile(file, good);
   }
 }
 

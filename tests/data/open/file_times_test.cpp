@@ -1,10 +1,12 @@
 // Files of one time each as one source.
 #include "data/open/file_times.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
+#include <functional>
 #include <string>
 
 #include "data/catalogue/catalogue.h"
@@ -99,6 +101,25 @@ TEST_F(FileTimesTest, AFileThatNamesFilesOfTimesIsASeries) {
     EXPECT_EQ(TimesOf(Read(directory_ / name)).step, 0.5);
     for (int time = 0; time < 3; ++time) EXPECT_EQ(ValueOf(Read(directory_ / (name + "?time=" + std::to_string(time)))), time + 1);
   }
+}
+
+TEST_F(FileTimesTest, OfASeriesTheListAndTheFileThatShowsAreLookedAt) {
+  const auto list = [&](const std::string& files) { WriteFile(directory_ / "a.series", R"({"files": [)" + files + "]}"); };
+  const std::string first = R"({"name": "run/0.nrrd", "time": 0})", second = R"({"name": "run/1.nrrd", "time": 1})";
+  for (const int number : {0, 1}) Write(fmt::format("run/{}.nrrd", number), number);
+  list(first);
+  const auto changes = [&](const std::function<void()>& change) {
+    const Result<ReadableSource> read = Read(directory_ / "a.series");
+    EXPECT_TRUE(read.ok()) << read.status().message();
+    const FileStamp& stamp = *std::get<LoadedSource>(*read).stamp;
+    EXPECT_EQ(HaveChanged(stamp).value(), false);
+    change();
+    return HaveChanged(stamp).value();
+  };
+  EXPECT_TRUE(changes([&] { list(first + "," + second); }));
+  EXPECT_TRUE(changes([&] { Write("run/0.nrrd", 7); }));
+  EXPECT_EQ(ValueOf(Read(directory_ / "a.series")), 7);
+  EXPECT_FALSE(changes([&] { Write("run/1.nrrd", 8); })) << "another time is looked at when it is asked for";
 }
 
 TEST_F(FileTimesTest, ASeriesThatIsWrongIsSaidInOneLine) {

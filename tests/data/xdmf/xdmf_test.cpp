@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/files/file_stamp.h"
+#include "data/catalogue/catalogue.h"
 #include "data/mosaic/mosaic_source.h"
 #include "data/open/open_source.h"
 #include "data/volume_io/converted_samples.h"
@@ -303,6 +305,38 @@ TEST_F(XdmfTest, ACollectionHasTimes) {
     ExpectRefused(Collection("Spatial", Collection(type, "") + Collection(type, "")), "is a collection of no grids");
   }
   ExpectRefused(Grid(""), "time is 0:1, must be one volume here", {.time = TimeRange{0, 1}});
+}
+
+// As a simulation writes it: samples first, then the file that names them.
+TEST_F(XdmfTest, TimesThatComeAreSeen) {
+  const auto write = [&](int times) {
+    std::string grids;
+    for (int time = 0; time < times; ++time) {
+      const std::string place = fmt::format("{}.h5:/p", time);
+      grids += Grid(fmt::format("<Time Value=\"{}\"/>", time) + EvenMesh(kPoints) + Attribute("p", HdfItem(ZyxOf(kPoints), place)));
+    }
+    return Write(Collection("Temporal", grids));
+  };
+  const auto read = [&](const std::string& options = "") { return ReadSource(DataSource(directory_ / ("a.xmf" + options), ""), 1U << 30); };
+  for (const int time : {0, 1, 2}) WritePoints(fmt::format("{}.h5", time), "/p", time);
+  write(2);
+  const Result<ReadableSource> two = read();
+  ASSERT_TRUE(two.ok()) << two.status().message();
+  EXPECT_EQ(std::get<LoadedSource>(*two).file.times.count, 2);
+  const FileStamp& stamp = *std::get<LoadedSource>(*two).stamp;
+  EXPECT_EQ(HaveChanged(stamp).value(), false);
+  write(3);
+  EXPECT_EQ(HaveChanged(stamp).value(), true);
+  EXPECT_EQ(std::get<LoadedSource>(*read()).file.times.count, 3);
+  EXPECT_EQ(std::get<LoadedSource>(*read("?time=2")).volume->block.samples<float>()[0], 2000);
+
+  // A time whose samples are not there yet leaves the others alone.
+  write(4);
+  EXPECT_EQ(std::get<LoadedSource>(*read()).file.times.count, 4);
+  EXPECT_EQ(std::get<LoadedSource>(*read("?time=2")).volume->block.samples<float>()[0], 2000);
+  EXPECT_THAT(read("?time=3").status().message(), HasSubstr("3.h5: no such file"));
+  WritePoints("3.h5", "/p", 3);
+  EXPECT_EQ(std::get<LoadedSource>(*read("?time=3")).volume->block.samples<float>()[0], 3000);
 }
 
 TEST_F(XdmfTest, PiecesInSpaceAreOneVolume) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "data/open/open_source.h"
 #include "tests/data/sources/opened_source.h"
@@ -38,12 +39,21 @@ void WriteXarray(const std::string& folder, int version, const std::vector<std::
   WriteJson(folder + "/temperature/zarr.json", metadata);
 }
 
+// `each`: how many there are for each index, along a second axis; 0: there is none.
 void WriteCoordinates(const std::string& folder, int version, const std::string& name, const std::vector<double>& values,
-                      const std::string& unit = "") {
-  const ZarrSpec spec{.version = version, .shape = {values.size()}, .chunk = {2}, .type = SampleType::kFloat64};
-  WriteZarrArray(folder + "/" + name, spec, [&](std::span<const std::uint64_t> at) { return at[0] < values.size() ? values[at[0]] : 0; });
+                      const std::string& unit = "", const std::string& bounds = "", std::uint64_t each = 0) {
+  ZarrSpec spec{.version = version, .shape = {values.size()}, .chunk = {2}, .type = SampleType::kFloat64};
+  if (each > 0) {
+    spec.shape = {values.size() / each, each};
+    spec.chunk = {2, 1};
+  }
+  WriteZarrArray(folder + "/" + name, spec, [&](std::span<const std::uint64_t> at) {
+    const std::uint64_t index = each > 0 ? at[0] * each + at[1] : at[0];
+    return index < values.size() ? values[index] : 0;
+  });
   Json attributes = Json::object();
   if (!unit.empty()) attributes["units"] = unit;
+  if (!bounds.empty()) attributes["bounds"] = bounds;
   if (version == 2) return WriteJson(folder + "/" + name + "/.zattrs", attributes);
   Json metadata = MetadataOf(spec);
   metadata["attributes"] = attributes;
@@ -87,6 +97,65 @@ TEST(PlainArrayTest, EvenCoordinatesGiveSpacingOriginAndUnit) {
     EXPECT_THAT(Opened(Open(folder.path()))->info().notes, Contains(HasSubstr("coordinates of y are not evenly spaced")));
     ExpectRefusal(Open(folder.path(), {.resample = 9}), "coordinates y: number 2 is 1, must be finite and below number 1, which is 1");
   }
+}
+
+TEST(PlainArrayTest, EvenBoundsPlaceAnAxisBeforeItsCoordinates) {
+  for (const int version : {2, 3}) {
+    const TemporaryDirectory folder;
+    WriteXarray(folder.path(), version, {"depth", "lat", "x"});
+    WriteCoordinates(folder.path(), version, "depth", {10, 30}, "", "depth_bnds");
+    WriteCoordinates(folder.path(), version, "depth_bnds", {0, 15, 15, 50}, "", "", 2);
+    WriteCoordinates(folder.path(), version, "lat", {50, 47, 46}, "", "lat_bnds");
+    WriteCoordinates(folder.path(), version, "lat_bnds", {51, 49, 49, 47, 47, 45}, "", "", 2);
+    WriteCoordinates(folder.path(), version, "x", {0, 1.25, 2, 3}, "", "x_bnds");
+    WriteCoordinates(folder.path(), version, "x_bnds", {-0.5, 0.5, 0.5, 1.5, 1.5, 2.5, 2.5, 3.5}, "", "", 2);
+    const auto source = Opened(Open(folder.path()));
+    const VolumeGeometry& geometry = source->info().finest().geometry;
+    EXPECT_EQ(geometry.spacing, (Vec3{1, 2, 20}));
+    EXPECT_EQ(geometry.orientation.origin, (Vec3{0, 46, 10}));
+    EXPECT_TRUE(geometry.stretch.even());
+    const double first = source->info().finest().mapping.FromStored((*SamplesOf<std::uint16_t>(*source))[0]);
+    EXPECT_EQ(first, 8) << "the axis of lat falls";
+    EXPECT_THAT(source->info().notes, Contains(HasSubstr("spacing and origin are those of the coordinates x_bnds, lat_bnds, depth")));
+
+    // Borders alone, cells with gaps, one that is not known, and bounds that are not there: coordinates place the axis.
+    const auto uneven = [&] {
+      EXPECT_THAT(Opened(Open(folder.path()))->info().notes,
+                  Contains(HasSubstr("the 4 voxels along x, 0.75 to 1.25 apart, lie at their own places")));
+    };
+    for (const std::vector<double>& bounds : {std::vector<double>{-0.5, 0.5, 1.5, 2.5, 3.5},
+                                              {-0.4, 0.4, 0.6, 1.4, 1.6, 2.4, 2.6, 3.4},
+                                              {-0.5, 0.5, 0.5, NAN, 1.5, 2.5, 2.5, 3.5}}) {
+      std::filesystem::remove_all(folder / "x_bnds");
+      WriteCoordinates(folder.path(), version, "x_bnds", bounds, "", "", bounds.size() == 8 ? 2 : 0);
+      uneven();
+    }
+    std::filesystem::remove_all(folder / "x_bnds");
+    WriteCoordinates(folder.path(), version, "x_bnds", std::vector<double>(16, 1), "", "", 4);
+    uneven();
+    std::filesystem::remove_all(folder / "x_bnds");
+    uneven();
+  }
+}
+
+TEST(PlainArrayTest, WhatOthersNameIsNoVolume) {
+  const TemporaryDirectory folder;
+  WriteXarray(folder.path(), 2, {"z", "y", "x"}, {{"coordinates", "heights lat"}});
+  const ZarrSpec spec{.shape = {2, 3, 4}, .chunk = {2, 2, 2}, .type = SampleType::kInt16, .separator = '/'};
+  WriteZarrArray(folder / "heights", spec, Number);
+  EXPECT_EQ(Opened(Open(folder.path()))->info().finest().geometry.size, (Index3{4, 3, 2}));
+
+  // A slice, and coordinates of two axes with the corners of its cells.
+  const TemporaryDirectory flat;
+  WriteZarrGroup(flat.path(), 2, Json::object());
+  const ZarrSpec slice{.shape = {3, 4}, .chunk = {2, 2}, .type = SampleType::kInt16};
+  const ElementAt first = [](std::span<const std::uint64_t> at) { return double(at[1] + 4 * at[0]); };
+  WriteZarrArray(flat / "tos", slice, first);
+  WriteJson(flat / "tos/.zattrs", {{"coordinates", "lat"}});
+  WriteZarrArray(flat / "lat", slice, first);
+  WriteJson(flat / "lat/.zattrs", {{"bounds", "vertices"}});
+  WriteZarrArray(flat / "vertices", {.shape = {3, 4, 4}, .chunk = {2, 2, 4}, .type = SampleType::kFloat64}, Number);
+  EXPECT_EQ(Opened(Open(flat.path()))->info().finest().geometry.size, (Index3{4, 3, 1}));
 }
 
 TEST(PlainArrayTest, CoordinatesOfAnotherSizeDoNotCount) {

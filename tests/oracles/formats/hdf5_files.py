@@ -53,13 +53,15 @@ def netcdf(random, folder, number):
 
 
 def unidata(random, folder, number):
-    """As the netCDF library writes and reads it: packed, with missing values, records beside those of other variables, axes either way."""
+    """As the netCDF library writes and reads it: packed, with missing values, records beside those of other variables, axes either way,
+    and cells that bounds tell, with coordinates anywhere."""
     kind = ["NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT_DATA", "NETCDF4"][number % 4]
     types = ["i1", "i2", "f4", "f8"] + ["u1", "u2"] * (number % 4 > 1)
     dtype = np.dtype(types[random.integers(len(types))])
     path = os.path.join(folder, f"u{number}.nc")
-    sizes = {"time": int(random.integers(1, 4)), "depth": 4, "lat": 5, "lon": int(random.integers(2, 8))}
+    sizes = {"time": int(random.integers(1, 4)), "depth": int(random.integers(1, 5)), "lat": 5, "lon": int(random.integers(2, 8))}
     step, first = random.uniform(0.5, 3, 3) * random.choice([-1, 1], 3), random.normal(scale=10, size=3)
+    step[2] = abs(step[2]) if sizes["depth"] == 1 else step[2]
     at = int(random.integers(sizes["time"]))
     with netCDF4.Dataset(path, "w", format=kind) as file:
         for name, size in sizes.items():
@@ -67,8 +69,15 @@ def unidata(random, folder, number):
         time = file.createVariable("time", "f8", ("time",))
         time.units = "hours since 1900-01-01"
         time[:] = 6.0 * np.arange(sizes["time"])
+        file.createDimension("nv", 2)
         for axis, name in enumerate(["lon", "lat", "depth"]):
-            file.createVariable(name, "f8", (name,))[:] = first[axis] + step[axis] * np.arange(sizes[name])
+            centres = first[axis] + step[axis] * np.arange(sizes[name])
+            coordinates = file.createVariable(name, "f8", (name,))
+            coordinates[:] = centres
+            if sizes[name] == 1 or random.random() < 0.5:
+                coordinates.bounds = name + "_bnds"
+                coordinates[:] = centres + step[axis] * (random.uniform(-3, 3) + random.uniform(-0.4, 0.4, sizes[name]))
+                file.createVariable(coordinates.bounds, "f8", (name, "nv"))[:] = np.stack([centres - step[axis] / 2, centres + step[axis] / 2], 1)
         file["lat"].units, file["lon"].units, file["depth"].axis = "degrees_north", "degrees_east", "Z"
         data = file.createVariable("v", dtype, tuple(sizes), fill_value=dtype.type(7))
         if random.random() < 0.5:

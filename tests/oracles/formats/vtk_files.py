@@ -64,6 +64,25 @@ def grids(random, folder):
         yield Case(os.path.basename(path), path, voxels, scaled((1, 1, 1), (0.5, 0.5, 0.5)), f"lattice={max(cells)},{'dataset' if end == '.vtkhdf' else 'array'}=Elevation", tolerance=2e-5)
 
 
+def image_blocks(random, folder, number):
+    """An image cut in two along each of some axes: blocks of images, or of rectilinear grids, each with extents of its own, as VTK lists them."""
+    cells, rectilinear = bool(random.integers(2)), bool(random.integers(2))
+    image, voxels, affine = grid_of(random, cells)
+    points = np.array(image.dimensions)
+    cuts = [sorted({0, int(random.integers(0, side)), int(side) - 1}) for side in points]
+    blocks = pyvista.MultiBlock()
+    for box in itertools.product(*([*zip(at[:-1], at[1:])] for at in cuts)):
+        extract = vtk.vtkExtractVOI()
+        extract.SetInputData(image)
+        extract.SetVOI([end for ends in box for end in ends])
+        extract.Update()
+        block = pyvista.wrap(extract.GetOutput())
+        blocks.append(block.cast_to_rectilinear_grid() if rectilinear else block)
+    path = os.path.join(folder, f"blocks{number}.vtm")
+    blocks.save(path)
+    return Case(f"blocks {number}", path, voxels, affine, tolerance=1e-5)
+
+
 def cases(random, folder, count, skipped):
     for number, (mode, compressor, order) in enumerate(itertools.product(MODES, COMPRESSORS, ORDERS)):
         image, voxels, affine = grid_of(random, bool(random.integers(2)))
@@ -82,4 +101,6 @@ def cases(random, folder, count, skipped):
         path = os.path.join(folder, f"legacy{number}.vtk")
         image.save(path, binary=bool(random.integers(2)))
         yield Case(f"legacy {number}", path, voxels, affine, tolerance=1e-5)  # six digits, where it is text
+    for number in range(count):
+        yield image_blocks(random, folder, number)
     yield from grids(random, folder)
