@@ -438,10 +438,11 @@ void DeclareSlurm(const CommandLine& line) {
   AddInteger(sub, "--threads", options.threads, 1, int(kMaxThreads),
              "Render threads of each worker, for nodes that are shared with other jobs")
       .Default("the job gets whole nodes, and workers divide their cores");
-  AddParsed(sub, "--time", options.time, ParseTimeLimit, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
+  sub.AddText("--time", options.time, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
       .TypeName("TIME")
       .Default("the partition's");
-  AddInteger(sub, "--notice", options.notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
+  AddInteger(sub, "--notice", options.notice_seconds, 1, kMaxNoticeSeconds,
+             "Seconds before the time limit at which workers leave; below --time");
   AddRepeated(sub, "--data", options.data, kDataHelp).Required().TypeName("[NAME=]FILE|FOLDER");
   sub.AddText("--folder", options.folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
       .TypeName("FOLDER")

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+
 #include "client/request/shell_word.h"
+#include "common/base/printable.h"
 
 namespace slabstream {
 namespace {
@@ -117,6 +121,18 @@ exit "$status"
 
 }  // namespace
 
+Result<std::string> ParseDirective(std::string_view text) {
+  constexpr std::array<std::string_view, 3> kDecided = {"array", "nodes", "ntasks"};
+  const auto refused = [text](std::string_view why) {
+    return Printable(Status::InvalidArgument(fmt::format("option '{}' of sbatch {}", text, why)));
+  };
+  if (std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; })) return refused("has a control character");
+  const std::string_view option = text.starts_with("--") ? text.substr(2) : text;
+  if (std::ranges::find(kDecided, option.substr(0, option.find('='))) != kDecided.end())
+    return refused("is decided by --nodes and --workers-per-node");
+  return fmt::format("--{}", option);
+}
+
 std::string JobScript(const SlurmOptions& options, const std::string& dataset, const std::string& programs) {
   std::string text(kPreamble);
   const auto directive = [&text](std::string_view line) { text += fmt::format("#SBATCH {}\n", line); };
@@ -130,7 +146,6 @@ std::string JobScript(const SlurmOptions& options, const std::string& dataset, c
     directive("--exclusive");
     directive("--mem=0");
   }
-  if (!options.time.text.empty()) directive("--time=" + options.time.text);
   directive(fmt::format("--signal=TERM@{}", options.notice_seconds));
   directive("--requeue");
   directive("--open-mode=append");

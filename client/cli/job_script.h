@@ -3,10 +3,17 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "client/cli/options.h"
+#include "common/base/status.h"
 
 namespace slabstream {
+
+// A long option of sbatch, with or without its dashes, such as "partition=long". Returned with them, as it stands on an #SBATCH line.
+// InvalidArgument: the script decides the option itself (array, nodes, ntasks), or the text has a control character, which may end the
+// line. What else is wrong, sbatch says.
+Result<std::string> ParseDirective(std::string_view text);
 
 // `options`: their paths are absolute, and may hold any bytes but zero; directives begin with dashes (ParseDirective), and of two that
 // differ Slurm takes the later. `dataset`: a name of the data, for the example that the job prints. `programs`: their folder, absolute.

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
 #include "client/movie/time_steps.h"
 #include "client/request/camera_file.h"
@@ -26,6 +25,9 @@
 namespace slabstream {
 
 inline constexpr int kMaxLocalWorkers = 256;  // EmbeddedOptions takes no more
+inline constexpr int kMaxJobNodes = 1000;     // Slurm's MaxArraySize is 1001 unless a site changes it
+inline constexpr int kMaxWorkersPerNode = 256;
+inline constexpr int kMaxNoticeSeconds = 65535;  // Slurm's limit
 
 // Where the frames are rendered.
 struct ConnectionOptions {
@@ -217,11 +219,11 @@ struct SlurmOptions {
   int nodes = 1;                        // [1, kMaxJobNodes]
   int workers_per_node = 1;             // [1, kMaxWorkersPerNode]
   int threads = 0;                      // threads of each worker; 0: the cores of a node divided by its workers
-  TimeLimit time;                       // the time limit of the job
+  std::string time;                     // the time limit of the job, as Slurm takes it; empty: none
   int notice_seconds = 60;              // [1, kMaxNoticeSeconds]
   std::vector<std::string> data;        // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string folder;                   // a folder that all nodes share; empty: the one from which the job is submitted
-  std::vector<std::string> directives;  // as ParseDirective takes them
+  std::vector<std::string> directives;  // as ParseDirective (job_script.h) takes them
 };
 
 }  // namespace slabstream

@@ -39,12 +39,9 @@ Result<std::string> FolderOfPrograms() {
 
 Status RunSlurm(const SlurmOptions& options) {
   SlurmOptions script = options;
-  if (!options.time.text.empty() && options.notice_seconds >= options.time.seconds) {
-    return Status::InvalidArgument(fmt::format("--notice {} is not below the {} seconds of --time {}", options.notice_seconds,
-                                               options.time.seconds, options.time.text));
-  }
+  if (!options.time.empty()) script.directives.insert(script.directives.begin(), "time=" + options.time);  // --sbatch may overrule it
   for (std::string& line : script.directives) {
-    Result<std::string> directive = ParseDirective("--sbatch", line);
+    Result<std::string> directive = ParseDirective(line);
     if (!directive.ok()) return directive.status();
     line = *std::move(directive);
   }

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <utility>
+#include <memory>
 
 #include "common/base/check.h"
 
@@ -32,41 +32,23 @@ std::string WhyNot(CURL* easy, CURLcode result, const char* reason) {
   return *reason != '\0' ? reason : curl_easy_strerror(result);
 }
 
+// libcurl calls it now and then, at least once a second. Not 0: it ends the exchange.
+int HasEnded(void* limit, curl_off_t, curl_off_t, curl_off_t, curl_off_t) {
+  return int(MonotonicNow() >= static_cast<std::atomic<Time>*>(limit)->load());
+}
+
 }  // namespace
 
-struct HttpPoster::Impl {
-  Impl() {
-    static const CURLcode started = curl_global_init(CURL_GLOBAL_DEFAULT);
-    CHECK_EQ(int(started), int(CURLE_OK));
-    multi = curl_multi_init();
-    CHECK(multi != nullptr) << "no memory for requests";
-  }
-  ~Impl() { curl_multi_cleanup(multi); }
-
-  // Works on the one exchange until it ends. False: the time has come first.
-  bool Run(Time begin, Duration time, Time& end) {
-    for (int running = 1; running > 0;) {
-      end = std::min(begin + time, limit.load());
-      const Duration left = end - MonotonicNow();
-      if (left <= Duration::zero()) return false;
-      curl_multi_perform(multi, &running);
-      // Longer than it takes: EndBy wakes it up.
-      constexpr auto kMost = std::chrono::milliseconds(std::chrono::hours(1));
-      const auto wait = std::min(kMost, std::chrono::ceil<std::chrono::milliseconds>(left));
-      if (running > 0) curl_multi_poll(multi, nullptr, 0, int(wait.count()), nullptr);
-    }
-    return true;
-  }
-
-  CURLM* multi = nullptr;
-  std::atomic<Time> limit{Time::max()};
-};
-
-HttpPoster::HttpPoster(HttpUrl url) : url_(std::move(url)), impl_(std::make_unique<Impl>()) {}
-HttpPoster::~HttpPoster() = default;
-
 Result<HttpAnswer> HttpPoster::Post(std::string_view type, const std::string& body, Duration time) {
+  static const CURLcode started = curl_global_init(CURL_GLOBAL_DEFAULT);
+  CHECK_EQ(int(started), int(CURLE_OK));
   const Time begin = MonotonicNow();
+  const auto too_late = [&] {
+    const Duration allowed = std::max(std::min(time, limit_.load() - begin), Duration::zero());
+    return Status::DeadlineExceeded(
+        fmt::format("{} has not answered within {:.1f} s", HostOf(url_), std::chrono::duration<double>(allowed).count()));
+  };
+  if (time <= Duration::zero() || limit_.load() <= begin) return too_late();
   const Easy easy(curl_easy_init(), curl_easy_cleanup);
   Headers headers(curl_slist_append(nullptr, fmt::format("Content-Type: {}", type).c_str()), curl_slist_free_all);
   if (easy == nullptr || headers == nullptr) return Status::ResourceExhausted("no memory for a request");
@@ -87,28 +69,18 @@ Result<HttpAnswer> HttpPoster::Post(std::string_view type, const std::string& bo
   set(CURLOPT_WRITEFUNCTION, Append);
   set(CURLOPT_WRITEDATA, static_cast<void*>(&answer.body));
   set(CURLOPT_ERRORBUFFER, reason);
+  set(CURLOPT_TIMEOUT_MS, long(std::chrono::ceil<std::chrono::milliseconds>(time).count()));
+  set(CURLOPT_NOPROGRESS, 0L);
+  set(CURLOPT_XFERINFOFUNCTION, HasEnded);
+  set(CURLOPT_XFERINFODATA, static_cast<void*>(&limit_));
 
-  curl_multi_add_handle(impl_->multi, easy.get());
-  Time end;
-  const bool ended = impl_->Run(begin, time, end);
-  int left = 0;
-  const CURLMsg* const message = curl_multi_info_read(impl_->multi, &left);
-  const CURLcode result = message != nullptr ? message->data.result : CURLE_OK;
-  curl_multi_remove_handle(impl_->multi, easy.get());
-  if (!ended) {
-    const double allowed = std::chrono::duration<double>(std::max(end - begin, Duration::zero())).count();
-    return Status::DeadlineExceeded(fmt::format("{} has not answered within {:.1f} s", HostOf(url_), allowed));
-  }
+  const CURLcode result = curl_easy_perform(easy.get());
+  if (result == CURLE_OPERATION_TIMEDOUT || result == CURLE_ABORTED_BY_CALLBACK) return too_late();
   if (result != CURLE_OK) return Status::Unavailable(fmt::format("{}: {}", HostOf(url_), WhyNot(easy.get(), result, reason)));
   long status = 0;
   curl_easy_getinfo(easy.get(), CURLINFO_RESPONSE_CODE, &status);
   answer.status = unsigned(status);
   return answer;
-}
-
-void HttpPoster::EndBy(Time limit) {
-  impl_->limit = limit;
-  curl_multi_wakeup(impl_->multi);
 }
 
 }  // namespace slabstream

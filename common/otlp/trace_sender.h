@@ -34,7 +34,7 @@ Status SendSpans(const HttpUrl& collector, const TraceSource& source, std::span<
 class TraceSender {
  public:
   TraceSender(HttpUrl collector, TraceSource source);
-  ~TraceSender();  // sends what waits, in a second at most
+  ~TraceSender();  // sends what waits, in two seconds at most
 
   // The spans of one trace. Any thread.
   void Put(std::vector<TraceSpan> trace);

@@ -1,4 +1,4 @@
-// Assignments and balances that the service does not have, to compare its own with. Each is one line in a list. A policy of the laboratory
+// Balances that the service does not have, to compare its own with. Each is one line in a list. A policy of the laboratory
 // (FrameCase::policy) may name them.
 #pragma once
 
@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "common/planning/assignment.h"
 #include "common/planning/balances.h"
 #include "common/planning/resolved_request.h"
 
@@ -16,7 +15,6 @@ struct ComparedBalance : BalanceEntry {
   bool hands_over = false;  // it changes who owns a box and never the boxes, so it needs several boxes a worker
 };
 
-const std::vector<AssignmentEntry>& ComparedAssignments();
 const std::vector<ComparedBalance>& ComparedBalances();
 
 // Whether the service does not have what the policy names.

@@ -6,7 +6,6 @@
 
 #include "common/planning/assignment.h"
 #include "laboratory/experiments/attachments.h"
-#include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/owner_arrangements.h"
@@ -48,11 +47,10 @@ std::vector<NamedPolicy> PartitionsByVoxels() {
   return policies;
 }
 
-// The service's own assignments and those that it is compared with. Without owners, no box stays with one.
+// Without owners, no box stays with one.
 std::vector<AssignmentEntry> AssignmentsToCompare() {
   std::vector<AssignmentEntry> all = Assignments();
   std::erase_if(all, [](const AssignmentEntry& entry) { return entry.by_owner; });
-  all.insert(all.end(), ComparedAssignments().begin(), ComparedAssignments().end());
   return all;
 }
 

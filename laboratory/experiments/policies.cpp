@@ -53,9 +53,7 @@ std::vector<NamedPolicy> BalanceMethods() {
   Policy equal = tree;
   equal.balance_by = "voxels";
   const Policy several = Combined(equal, equal.combine, kBoxesAWorker);
-  std::vector<NamedPolicy> methods = {
-      {"slabs", EqualSlabs().policy}, {"equal", equal}, {"random", several}, {"bricks", BrickTree().policy}, {"rebuilt", tree}};
-  methods[2].policy.assignment = "random";
+  std::vector<NamedPolicy> methods = {{"slabs", EqualSlabs().policy}, {"equal", equal}, {"bricks", BrickTree().policy}, {"rebuilt", tree}};
   for (const BalanceEntry& entry : Balances()) {
     if (entry.change != nullptr) methods.emplace_back(std::string(entry.name), tree).policy.balance = entry.name;
   }

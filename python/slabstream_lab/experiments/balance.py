@@ -16,7 +16,6 @@ BOUND = "shared out perfectly"
 SOURCES = {
     "slab by voxels": "Yagel and Machiraju, 1995",
     "kd-tree by voxels": "boxes of equal volume",
-    "kd-tree by voxels, 4 boxes a worker, random": "boxes of equal volume, owners drawn",
     "kd-tree by bricks": "what the service does if nothing is asked for",
     STAYS: "boxes of equal occupied voxels, cut anew when the transfer function changes, which Zellmann, Schulze and Lang made quick, 2018",
     "kd-tree by occupied, planes": "after Marchesin, Mongenet and Dischler, 2006",
