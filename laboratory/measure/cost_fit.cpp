@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <numeric>
-#include <utility>
 
 namespace slabstream {
 namespace {
@@ -15,39 +12,77 @@ namespace {
 constexpr std::size_t kSamplesATerm = 3;
 constexpr int kFolds = 5;
 
-using Units = unsigned;  // a set of work units, a bit each
-
-bool Has(Units units, std::size_t unit) { return (units >> unit & 1U) != 0; }
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 double Measured(const CostSample& sample, Stage stage) { return double(sample.stage_ns[std::size_t(stage)]) * 1e-9; }
 
-// The normal equations of a stage. Of the system that they are made of, each sample is a row: its amounts of work over its time. Constants
-// that fit it make each row 1, so residuals are relative. Columns are scaled to length 1: their units differ by ten orders of magnitude.
-struct System {
-  Units units = 0;  // the stage's
-  double rows = 0;
-  WorkUnits lengths{}, sums{};  // by column: its length, and the sum of its scaled values
-  std::array<WorkUnits, kWorkUnitCount> products{};
-};
-
-System MakeSystem(const StageModel& stage, std::span<const CostSample* const> samples) {
-  System system{.rows = double(samples.size())};
-  for (const WorkUnit unit : stage.units) system.units |= 1U << unsigned(unit);
-  for (const CostSample* sample : samples) {
-    const double time = Measured(*sample, stage.stage);
-    for (std::size_t i = 0; i < system.sums.size(); ++i) {
-      system.sums[i] += sample->work[i] / time;
-      for (std::size_t k = 0; k < system.sums.size(); ++k) system.products[i][k] += sample->work[i] * sample->work[k] / (time * time);
+// A row a sample: its amounts of work over its time. Constants that fit it make each row 1, so residuals are relative.
+MatrixXd MakeSystem(const StageModel& stage, std::span<const CostSample* const> samples) {
+  MatrixXd system(Eigen::Index(samples.size()), Eigen::Index(stage.units.size()));
+  for (std::size_t row = 0; row < samples.size(); ++row) {
+    for (std::size_t column = 0; column < stage.units.size(); ++column) {
+      system(Eigen::Index(row), Eigen::Index(column)) =
+          samples[row]->work[std::size_t(stage.units[column])] / Measured(*samples[row], stage.stage);
     }
   }
-  for (std::size_t i = 0; i < system.sums.size(); ++i) {
-    system.lengths[i] = system.products[i][i] > 0 ? std::sqrt(system.products[i][i]) : 1;
-  }
-  for (std::size_t i = 0; i < system.sums.size(); ++i) {
-    system.sums[i] /= system.lengths[i];
-    for (std::size_t k = 0; k < system.sums.size(); ++k) system.products[i][k] /= system.lengths[i] * system.lengths[k];
-  }
   return system;
+}
+
+VectorXd Ones(const MatrixXd& system) { return VectorXd::Ones(system.rows()); }
+
+// Columns are first scaled to the same length: their units differ by ten orders of magnitude.
+VectorXd ColumnLengths(const MatrixXd& a) {
+  return a.colwise().norm().transpose().unaryExpr([](double n) { return n > 0 ? n : 1.0; });
+}
+
+VectorXd SolveOn(const MatrixXd& a, const VectorXd& b, const std::vector<Eigen::Index>& columns) {
+  VectorXd x = VectorXd::Zero(a.cols());
+  if (columns.empty()) return x;
+  const VectorXd part = a(Eigen::all, columns).completeOrthogonalDecomposition().solve(b);
+  for (std::size_t i = 0; i < columns.size(); ++i) x[columns[i]] = part[Eigen::Index(i)];
+  return x;
+}
+
+// Lawson and Hanson's NNLS: argmin |a x - b| with x >= 0, and the columns that are not held at 0.
+VectorXd SolveNonNegative(const MatrixXd& a, const VectorXd& b, std::vector<Eigen::Index>& free) {
+  const double tolerance = 1e-12 * b.norm();
+  VectorXd x = VectorXd::Zero(a.cols());
+  free.clear();
+  while (Eigen::Index(free.size()) < a.cols()) {
+    // Frees the column with the largest gradient.
+    const VectorXd gradient = a.transpose() * (b - a * x);
+    Eigen::Index best = -1;
+    for (Eigen::Index i = 0; i < a.cols(); ++i) {
+      if (std::find(free.begin(), free.end(), i) != free.end() || gradient[i] <= tolerance) continue;
+      if (best < 0 || gradient[i] > gradient[best]) best = i;
+    }
+    if (best < 0) break;
+    free.push_back(best);
+    VectorXd next = SolveOn(a, b, free);
+    if (next[best] <= 0) {  // the gradient was rounding
+      free.pop_back();
+      break;
+    }
+    // Moves towards the solution as far as all values stay positive. A value that reaches 0 is held there.
+    while (std::any_of(free.begin(), free.end(), [&](Eigen::Index i) { return next[i] <= 0; })) {
+      double step = 1;
+      for (const Eigen::Index i : free) {
+        if (next[i] <= 0) step = std::min(step, x[i] / (x[i] - next[i]));
+      }
+      x += step * (next - x);
+      std::erase_if(free, [&](Eigen::Index i) { return x[i] <= 1e-14 && next[i] <= 0; });
+      next = SolveOn(a, b, free);
+    }
+    x = next;
+  }
+  return x;
+}
+
+VectorXd FitConstants(const StageModel& stage, std::span<const CostSample* const> samples, std::vector<Eigen::Index>& free) {
+  const MatrixXd system = MakeSystem(stage, samples);
+  const VectorXd lengths = ColumnLengths(system);
+  return SolveNonNegative(system * lengths.cwiseInverse().asDiagonal(), Ones(system), free).cwiseQuotient(lengths);
 }
 
 // The 97.5 % quantile of Student's t (Abramowitz and Stegun, 26.7.5): within 1 % for 3 degrees of freedom, better for more.
@@ -58,73 +93,36 @@ double StudentQuantile(double freedom) {
   return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) + (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
 }
 
-struct Solution {
-  Units units = 0;                // those that are not held at 0
-  WorkUnits seconds{}, widths{};  // widths: half of each constant's 95 % interval
-  double squares = 0;             // the sum of squared residuals
-};
-
-// Least squares with constants of `units` alone. Units that depend on those before them are held at 0.
-Solution Solve(const System& system, Units units) {
-  // Inverts the products of the chosen columns in place, by Gauss and Jordan.
-  constexpr double kDependent = 1e-10;  // of a column's squared length, when the columns before it are taken out
-  auto m = system.products;
-  for (std::size_t k = 0; k < m.size(); ++k) {
-    if (!Has(units, k)) continue;
-    const double pivot = m[k][k];
-    if (pivot < kDependent) {
-      units &= ~(1U << k);
-      continue;
-    }
-    m[k][k] = 1;
-    for (double& value : m[k]) value /= pivot;
-    for (std::size_t i = 0; i < m.size(); ++i) {
-      if (i == k) continue;
-      const double factor = std::exchange(m[i][k], 0);
-      for (std::size_t j = 0; j < m.size(); ++j) m[i][j] -= factor * m[k][j];
-    }
+// Half the width of each constant's 95 % interval, if `columns` are the ones that were fitted.
+VectorXd HalfWidths(const MatrixXd& system, const std::vector<Eigen::Index>& columns, const VectorXd& seconds) {
+  VectorXd widths = VectorXd::Zero(seconds.size());
+  const double freedom = double(system.rows()) - double(columns.size());
+  if (columns.empty() || freedom < 1) return widths;
+  const double variance = (system * seconds - Ones(system)).squaredNorm() / freedom;
+  const VectorXd lengths = ColumnLengths(system);
+  const MatrixXd scaled = (system * lengths.cwiseInverse().asDiagonal())(Eigen::all, columns);
+  const MatrixXd covariance = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    widths[columns[i]] =
+        StudentQuantile(freedom) * std::sqrt(variance * covariance(Eigen::Index(i), Eigen::Index(i))) / lengths[columns[i]];
   }
-  Solution solution{.units = units, .squares = system.rows};
-  const auto of_units = [&](auto&& function) {
-    for (std::size_t i = 0; i < m.size(); ++i) {
-      if (Has(units, i)) function(i);
-    }
-  };
-  of_units([&](std::size_t i) {
-    double scaled = 0;
-    of_units([&](std::size_t k) { scaled += m[i][k] * system.sums[k]; });
-    solution.seconds[i] = scaled / system.lengths[i];
-    solution.squares -= scaled * system.sums[i];
-  });
-  solution.squares = std::max(solution.squares, 0.0);
-  const double freedom = system.rows - std::popcount(units);
-  if (freedom < 1) return solution;
-  of_units([&](std::size_t i) {
-    solution.widths[i] = StudentQuantile(freedom) * std::sqrt(solution.squares / freedom * m[i][i]) / system.lengths[i];
-  });
-  return solution;
+  return widths;
 }
 
-// Least squares with no constant below 0: the best of the solutions with some units that have none.
-Solution SolveNonNegative(const System& system) {
-  Solution best{.squares = system.rows};
-  for (Units units = system.units; units != 0; units = (units - 1) & system.units) {
-    const Solution solution = Solve(system, units);
-    const bool allowed = std::ranges::all_of(solution.seconds, [](double seconds) { return seconds >= 0; });
-    if (allowed && solution.squares < best.squares) best = solution;
-  }
-  return best;
-}
-
-std::vector<TermFit> MakeTerms(const StageModel& stage, const System& system, const Solution& fit) {
+std::vector<TermFit> MakeTerms(const StageModel& stage, const MatrixXd& system, const VectorXd& seconds,
+                               const std::vector<Eigen::Index>& free) {
+  const VectorXd widths = HalfWidths(system, free, seconds);
   // A constant held at 0 gets the upper bound of the fit with all columns.
-  const Solution unconstrained = Solve(system, system.units);
+  std::vector<Eigen::Index> all(stage.units.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = Eigen::Index(i);
+  const VectorXd unconstrained = SolveOn(system, Ones(system), all);
+  const VectorXd all_widths = HalfWidths(system, all, unconstrained);
+
   std::vector<TermFit> terms;
-  for (const WorkUnit unit : stage.units) {
-    const auto i = std::size_t(unit);
-    const Solution& upper = Has(fit.units, i) ? fit : unconstrained;
-    terms.push_back(
-        {unit, fit.seconds[i], std::max(fit.seconds[i] - fit.widths[i], 0.0), std::max(upper.seconds[i] + upper.widths[i], 0.0)});
+  for (const Eigen::Index i : all) {
+    const bool held = std::find(free.begin(), free.end(), i) == free.end();
+    const double high = held ? unconstrained[i] + all_widths[i] : seconds[i] + widths[i];
+    terms.push_back({stage.units[std::size_t(i)], seconds[i], std::max(seconds[i] - widths[i], 0.0), std::max(high, 0.0)});
   }
   return terms;
 }
@@ -137,9 +135,13 @@ std::vector<double> CrossPredict(const StageModel& stage, std::span<const CostSa
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (int(i % kFolds) != fold) others.push_back(samples[i]);
     }
-    const WorkUnits seconds = SolveNonNegative(MakeSystem(stage, others)).seconds;
-    for (std::size_t i = std::size_t(fold); i < samples.size(); i += kFolds)
-      predicted[i] = std::inner_product(seconds.begin(), seconds.end(), samples[i]->work.begin(), 0.0);
+    std::vector<Eigen::Index> free;
+    const VectorXd seconds = FitConstants(stage, others, free);
+    for (std::size_t i = std::size_t(fold); i < samples.size(); i += kFolds) {
+      for (std::size_t unit = 0; unit < stage.units.size(); ++unit) {
+        predicted[i] += seconds[Eigen::Index(unit)] * samples[i]->work[std::size_t(stage.units[unit])];
+      }
+    }
   }
   return predicted;
 }
@@ -155,8 +157,9 @@ Result<StageFit> FitStage(const StageModel& stage, std::span<const CostSample> s
     return Status::InvalidArgument(fmt::format("the stage {} took time in {} samples, but {} constants need at least {}",
                                                ToString(stage.stage), used.size(), stage.units.size(), kSamplesATerm * stage.units.size()));
   }
-  const System system = MakeSystem(stage, used);
-  const Solution fit = SolveNonNegative(system);
+  std::vector<Eigen::Index> free;
+  const VectorXd seconds = FitConstants(stage, used, free);
+  const MatrixXd system = MakeSystem(stage, used);
   const std::vector<double> predicted = CrossPredict(stage, used);
   double missed = 0, measured = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -164,8 +167,9 @@ Result<StageFit> FitStage(const StageModel& stage, std::span<const CostSample> s
     missed += std::abs(predicted[i] - time);
     measured += time;
   }
-  return StageFit{
-      .terms = MakeTerms(stage, system, fit), .residual = std::sqrt(fit.squares / system.rows), .prediction_error = missed / measured};
+  return StageFit{.terms = MakeTerms(stage, system, seconds, free),
+                  .residual = std::sqrt((system * seconds - Ones(system)).squaredNorm() / double(used.size())),
+                  .prediction_error = missed / measured};
 }
 
 }  // namespace slabstream

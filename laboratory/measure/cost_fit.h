@@ -1,5 +1,5 @@
 // Fits the constants of the cost model to measured times: linear least squares of relative residuals, since the noise of a time grows with
-// the time, with no constant below 0.
+// the time, with no constant below 0 (active set method of Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23).
 #pragma once
 
 #include <span>
@@ -25,8 +25,8 @@ struct TermFit {
 struct StageFit {
   std::vector<TermFit> terms;  // by the order of the stage's units
   double residual = 0;         // root mean square of (measured - fitted) / measured
-  // Mean |measured - predicted| / mean measured: each fifth of the samples as the fit to the others predicts it.
-  double prediction_error = 0;
+  double prediction_error =
+      0;  // mean |measured - predicted| / mean measured: each fifth of the samples as the fit to the others predicts it
 };
 
 // InvalidArgument: fewer than three samples a unit in which the stage took time; the others do not count.

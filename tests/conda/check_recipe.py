@@ -16,7 +16,7 @@ PLATFORMS = ("linux-64", "linux-aarch64")
 PACKAGES = {
     "Threads": None, "PkgConfig": "pkg-config", "cppzmq": "cppzmq", "OpenSSL": "openssl", "Boost": "libboost-headers",
     "Protobuf": "libprotobuf", "CLI11": "cli11", "spdlog": "spdlog", "fmt": "fmt", "nlohmann_json": "nlohmann_json",
-    "zstd": "zstd", "hwy": "libhwy", "TBB": "tbb-devel", "TIFF": "libtiff", "PNG": "libpng",
+    "zstd": "zstd", "Eigen3": "eigen", "hwy": "libhwy", "TBB": "tbb-devel", "TIFF": "libtiff", "PNG": "libpng",
     "JPEG": "libjpeg-turbo", "EXPAT": "libexpat", "Freetype": "freetype", "ZLIB": "zlib", "BZip2": "bzip2",
     "LibLZMA": "liblzma-devel", "BROTLI": "brotli", "OPENJPEG": "openjpeg", "CURL": "libcurl", "BLOSC": "blosc",
     "LZ4": "lz4-c", "LZF": "liblzf", "ZIP": "libzip", "HDF5": "hdf5", "XXHASH": "xxhash", "OIIO": "openimageio",
