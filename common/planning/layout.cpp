@@ -181,6 +181,10 @@ struct LayoutMaker::State {
     return int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes));
   }
 
+  // More parts hold fewer voxels that no zone needs. Half of the groups that a plan may have are left for parts that are too large. Beyond
+  // so many parts little is saved (docs/simulations.md).
+  std::size_t MostParts() const { return std::min<std::size_t>(std::size_t{kMaxGroups} / 2 * request.slots, 2048); }
+
   // The zones that the picture shows of a level (ShownZones), in boxes of whole blocks if one of them is not too large.
   std::optional<LevelPartition> DivideShownBlocks(const ResolvedPolicy& policy) const {
     const Box bounds = request.summary->description.geometry.bounds();
@@ -194,6 +198,7 @@ struct LayoutMaker::State {
     LevelPartition made = DivideByLevels({.map = &in_blocks,
                                           .size = UnitsOver(bounds.end, block),
                                           .least_boxes = LeastBoxes(policy),
+                                          .most_parts = MostParts(),
                                           .most_bytes = request.box_bytes_target,
                                           .bytes_of = bytes_of,
                                           .blocks_of = [](std::uint8_t) { return Uniform(1); }});
@@ -205,6 +210,7 @@ struct LayoutMaker::State {
     return DivideByLevels({.map = request.map,
                            .size = request.summary->description.geometry.size,
                            .least_boxes = LeastBoxes(policy),
+                           .most_parts = MostParts(),
                            .most_bytes = request.box_bytes_target,
                            .bytes_of = [&](const LevelBox& at) { return BytesOf(at); },
                            .blocks_of =
