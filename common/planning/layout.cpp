@@ -181,10 +181,6 @@ struct LayoutMaker::State {
     return int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes));
   }
 
-  // More parts hold fewer voxels that no zone needs. Half of the groups that a plan may have are left for parts that are too large. Beyond
-  // so many parts little is saved (docs/simulations.md).
-  std::size_t MostParts() const { return std::min<std::size_t>(std::size_t{kMaxGroups} / 2 * request.slots, 2048); }
-
   // The zones that the picture shows of a level (ShownZones), in boxes of whole blocks if one of them is not too large.
   std::optional<LevelPartition> DivideShownBlocks(const ResolvedPolicy& policy) const {
     const Box bounds = request.summary->description.geometry.bounds();
@@ -198,7 +194,6 @@ struct LayoutMaker::State {
     LevelPartition made = DivideByLevels({.map = &in_blocks,
                                           .size = UnitsOver(bounds.end, block),
                                           .least_boxes = LeastBoxes(policy),
-                                          .most_parts = MostParts(),
                                           .most_bytes = request.box_bytes_target,
                                           .bytes_of = bytes_of,
                                           .blocks_of = [](std::uint8_t) { return Uniform(1); }});
@@ -206,11 +201,16 @@ struct LayoutMaker::State {
     return made;
   }
 
+  // Half of the groups that a plan may have are left for parts that are too large. A box takes about 0.2 ms of a picture, so less waste
+  // than a MiB is not worth one; of meshes of 656 million cells, 2048 parts waste little.
   LevelPartition DivideAtZones(const ResolvedPolicy& policy) const {
+    constexpr std::size_t kMostParts = 2048;
+    constexpr std::int64_t kLeastWaste = std::int64_t{1} << 20;
     return DivideByLevels({.map = request.map,
                            .size = request.summary->description.geometry.size,
                            .least_boxes = LeastBoxes(policy),
-                           .most_parts = MostParts(),
+                           .most_parts = std::min<std::size_t>(std::size_t{kMaxGroups} / 2 * request.slots, kMostParts),
+                           .least_waste = kLeastWaste,
                            .most_bytes = request.box_bytes_target,
                            .bytes_of = [&](const LevelBox& at) { return BytesOf(at); },
                            .blocks_of =

@@ -145,9 +145,9 @@ class Divider {
     std::priority_queue<Mixed> mixed;
     mixed.push(MixedOf({0, bounds}));
     while (!mixed.empty()) {
-      const Part part = mixed.top().part;
+      const auto [waste, part] = mixed.top();
       mixed.pop();
-      const bool full = mixed.size() + leaves_.size() + 1 >= request_.most_parts;
+      const bool full = waste <= request_.least_waste || mixed.size() + leaves_.size() + 1 >= request_.most_parts;
       const std::optional<Cut> cut = full ? std::nullopt : BetweenLevels(part.box);
       if (!cut) {
         Keep(part);
