@@ -96,7 +96,8 @@ void Even(LevelMap& map) {
   }
 }
 
-// By zone: the finest of the levels of `map` that has voxels of its own there, or beside it, where they count for what is interpolated.
+// By zone: the finest of the levels of `map` that has voxels of its own there, or beside one of its faces, where they count for what is
+// interpolated.
 std::vector<std::uint8_t> RefinedIn(const LevelMap& map, const VolumeLevels& levels) {
   std::vector<std::uint8_t> finest(CountIn(map.counts), std::uint8_t(map.levels.size() - 1));
   const VolumeGeometry& grid = levels.levels[std::size_t(map.levels.front())].geometry;
@@ -106,9 +107,14 @@ std::vector<std::uint8_t> RefinedIn(const LevelMap& map, const VolumeLevels& lev
     const std::vector<Box> everywhere = {geometry.bounds()};
     const GridMap to_grid = MapBetween(geometry, grid);
     for (const Box& box : levels.refined[level] != nullptr ? *levels.refined[level] : everywhere) {
-      const Box there = CoveringVoxels(Grown(box, 1, geometry.bounds()), to_grid, grid.size);
-      for (const Index3& zone : IndicesIn({there.begin / map.side, (there.end - Uniform(1)) / map.side + Uniform(1)})) {
-        finest[NumberIn(map.counts, zone)] = std::uint8_t(n);
+      // Beside a face, half of what a picture shows at the border of a zone is the refined cell's; beside an edge, a quarter or less.
+      for (const Axis axis : kAxes) {
+        Index3 step;
+        step[axis] = 1;
+        const Box there = CoveringVoxels(Intersection({box.begin - step, box.end + step}, geometry.bounds()), to_grid, grid.size);
+        for (const Index3& zone : IndicesIn({there.begin / map.side, (there.end - Uniform(1)) / map.side + Uniform(1)})) {
+          finest[NumberIn(map.counts, zone)] = std::uint8_t(n);
+        }
       }
     }
   }

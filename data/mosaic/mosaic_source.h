@@ -40,7 +40,7 @@ struct MosaicPart {
   std::function<Result<std::shared_ptr<VolumeSource>>()> open;  // waits; called again if the source was closed meanwhile
 };
 
-inline constexpr std::size_t kMaxMosaicParts = 1 << 17;  // of a level
+inline constexpr std::size_t kMaxMosaicParts = 1 << 18;  // of a level
 
 // `info`: of the volume, complete but for where levels are refined. With several levels, exact samples are float32 or float64. Parts of a
 // level may overlap where they have the same samples, as pieces do that meet at their points. InvalidArgument, naming `name`: no part or

@@ -170,7 +170,7 @@ TEST_F(AmrexTest, WhatIsWrongIsSaidInOneLine) {
   EXPECT_THAT(with("Header", "\n3\n", "\n2\n"), HasSubstr("Header: has 2 axes, must have 3"));
   EXPECT_THAT(with("Header", "\n0.5\n1\n", "\n0.5\n99\n"), HasSubstr("has 100 levels, must have 1 to 16"));
   EXPECT_THAT(with("Header", "Level_1/Cell", "Level_7/Cell"), HasSubstr("Level_7/Cell_H"));
-  EXPECT_THAT(with("Level_1/Cell_H", "(2 0", "(0 0"), HasSubstr("has 0 boxes, must have 1 to 131072"));
+  EXPECT_THAT(with("Level_1/Cell_H", "(2 0", "(0 0"), HasSubstr("has 0 boxes, must have 1 to 262144"));
   EXPECT_THAT(with("Level_1/Cell_H", "((-12,", "((-99,"), HasSubstr("box 0 is none, or not in the domain"));
   EXPECT_THAT(with("Level_1/Cell_H", "(0,0,0))", "(1,0,0))"), HasSubstr("box 0 has values of nodes or faces"));
   EXPECT_THAT(with("Level_1/Cell_H", "FabOnDisk: Cell_D_00000 0", "FabOnDisk: Cell_D_00000 1"), HasSubstr("begins no box: FAB is missing"));

@@ -480,7 +480,7 @@ TEST_F(XdmfTest, HostileFilesEndSoon) {
   ExpectRefused(others + mesh + Collection("Spatial", pieces), "its references and numbers take more than 67108864 steps to read");
   // Many pieces of few words.
   for (std::size_t i = 0; i < kMaxMosaicParts; ++i) same += "<Grid Reference=\"//Grid[@Name='one']\"/>";
-  ExpectRefused(Collection("Spatial", Grid(EvenMesh(kPoints) + attribute, "Name=\"one\"") + same), "has more than 131072 grids");
+  ExpectRefused(Collection("Spatial", Grid(EvenMesh(kPoints) + attribute, "Name=\"one\"") + same), "has more than 262144 grids");
 }
 
 }  // namespace
