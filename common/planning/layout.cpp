@@ -201,16 +201,10 @@ struct LayoutMaker::State {
     return made;
   }
 
-  // Half of the groups that a plan may have are left for parts that are too large. A box takes about 0.2 ms of a picture, so less waste
-  // than a MiB is not worth one; of meshes of 656 million cells, 2048 parts waste little.
   LevelPartition DivideAtZones(const ResolvedPolicy& policy) const {
-    constexpr std::size_t kMostParts = 2048;
-    constexpr std::int64_t kLeastWaste = std::int64_t{1} << 20;
     return DivideByLevels({.map = request.map,
                            .size = request.summary->description.geometry.size,
                            .least_boxes = LeastBoxes(policy),
-                           .most_parts = std::min<std::size_t>(std::size_t{kMaxGroups} / 2 * request.slots, kMostParts),
-                           .least_waste = kLeastWaste,
                            .most_bytes = request.box_bytes_target,
                            .bytes_of = [&](const LevelBox& at) { return BytesOf(at); },
                            .blocks_of =

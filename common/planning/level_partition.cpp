@@ -40,21 +40,21 @@ class Divider {
     const Box bounds = {{0, 0, 0}, request_.size};
     nodes_.resize(1);
     PartLevels(bounds);
-    std::size_t undivided = 0;  // leaves of one voxel
-    while (!leaves_.empty() && leaves_.size() + undivided < kMostShown) {
+    std::size_t shown = leaves_.size();
+    while (!leaves_.empty() && shown < kMostShown) {
       const Leaf largest = leaves_.top();
-      if (largest.bytes <= request_.most_bytes && leaves_.size() + undivided >= std::size_t(request_.least_boxes)) break;
+      if (largest.bytes <= request_.most_bytes && shown >= std::size_t(request_.least_boxes)) break;
       leaves_.pop();
       const std::optional<Cut> cut = Middle(largest);
       if (!cut) {
         done_.push_back(largest);
-        ++undivided;
         if (largest.bytes > request_.most_bytes) continue;
         break;  // the others are no larger
       }
       const auto [lower, upper] = Split(largest.node, largest.box, *cut);
-      Keep(lower);
-      Keep(upper);
+      Keep(lower.node, lower.box, largest.level);
+      Keep(upper.node, upper.box, largest.level);
+      ++shown;
     }
     return Finish(bounds);
   }
@@ -73,7 +73,7 @@ class Divider {
     Box box;
   };
 
-  // Zones that the box has voxels of.
+  // Zones whose voxels begin in the box, which ends between zones.
   Box ZonesIn(const Box& box) const {
     Box zones;
     for (const Axis axis : kAxes) {
@@ -139,18 +139,20 @@ class Divider {
     return {std::max<std::int64_t>(request_.bytes_of({part.box, finest}) - needed, 0) + 1, part};
   }
 
-  // Each box takes time of its own, and a plan has limits. So where levels lie in many small parts, as in adaptive meshes, boxes hold zones
-  // of several levels, and are drawn from the finest of them.
+  // Each box takes time of its own, and a plan of one worker has at most kMaxGroups boxes, too large ones halved. So where levels lie in
+  // many small parts, as in adaptive meshes, boxes hold zones of several levels, and are drawn from the finest of them. What limits this is
+  // the same for any number of workers with any memory, and so are pictures.
   void PartLevels(const Box& bounds) {
+    constexpr std::size_t kMostParts = 768;
     std::priority_queue<Mixed> mixed;
     mixed.push(MixedOf({0, bounds}));
     while (!mixed.empty()) {
-      const auto [waste, part] = mixed.top();
+      const Part part = mixed.top().part;
       mixed.pop();
-      const bool full = waste <= request_.least_waste || mixed.size() + leaves_.size() + 1 >= request_.most_parts;
+      const bool full = mixed.size() + leaves_.size() + 1 >= kMostParts;
       const std::optional<Cut> cut = full ? std::nullopt : BetweenLevels(part.box);
       if (!cut) {
-        Keep(part);
+        Keep(part.node, part.box, FinestIn(ZonesIn(part.box)));
         continue;
       }
       const auto [lower, upper] = Split(part.node, part.box, *cut);
@@ -159,10 +161,10 @@ class Divider {
     }
   }
 
-  void Keep(const Part& part) {
-    Leaf leaf{0, part.node, part.box, FinestIn(ZonesIn(part.box))};
-    if (leaf.level == LevelMap::kOutside) return done_.push_back(leaf);
-    leaf.bytes = request_.bytes_of({leaf.box, leaf.level});
+  void Keep(std::uint32_t node, const Box& box, std::uint8_t level) {
+    Leaf leaf{0, node, box, level};
+    if (level == LevelMap::kOutside) return done_.push_back(leaf);
+    leaf.bytes = request_.bytes_of({box, level});
     leaves_.push(leaf);
   }
 

@@ -22,8 +22,6 @@ struct LevelPartitionRequest {
   const LevelMap* map = nullptr;  // a map of several levels
   Index3 size;                    // the size of the frame's grid
   int least_boxes = 1;            // the least number of boxes that the picture shows, as far as zones can be divided
-  std::size_t most_parts = 512;   // the most boxes that planes between levels make
-  std::int64_t least_waste = 0;   // bytes; zones of several levels that waste no more than this in one box become one
   std::int64_t most_bytes = 0;    // the most bytes of one box
   std::function<std::int64_t(const LevelBox&)> bytes_of;
   // A box that is divided within a zone is divided at multiples of this, if there is one within: of a level's blocks, in voxels of the
@@ -31,7 +29,8 @@ struct LevelPartitionRequest {
   std::function<Index3(std::uint8_t level)> blocks_of;
 };
 
-// Pure. A kd-tree: planes between zones first part levels, where they part most; then they halve what is too large.
+// Pure. A kd-tree: planes between zones first part levels, where they part most, into about 768 boxes at most; then they halve what is too
+// large. Which level a place is drawn from depends on the map, its bytes and the grid alone.
 LevelPartition DivideByLevels(const LevelPartitionRequest& request);
 
 }  // namespace slabstream
