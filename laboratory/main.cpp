@@ -18,7 +18,6 @@
 #include "laboratory/bench/bench.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/run_experiment.h"
-#include "laboratory/measure/replay.h"
 
 namespace slabstream {
 namespace {
@@ -76,19 +75,6 @@ void DeclareBench(const CommandLine& line) {
   });
 }
 
-void DeclareReplay(const Command& experiment, std::function<Status()>& run) {
-  const Command sub = experiment.AddCommand("replay", "Simulate recorded frames again, under another policy or on another machine");
-  auto options = std::make_shared<ReplayOptions>();
-  sub.AddText("FILE", options->trace_path, "A trace that --trace of render or turntable has written").Required();
-  sub.AddTexts("--with", options->changes,
-               "What to change: combine=SCHEME (as --combine takes it), link=NAME or link=NAME:MICROSECONDS,GBIT, workers=N; may be "
-               "repeated. Links" +
-                   Explained(LinkPresets()))
-      .TypeName("KEY=VALUE")
-      .Repeatable();
-  sub.OnTyped([options, &run] { run = [options] { return RunReplay(*options, std::cout); }; });
-}
-
 // The options of all experiments, which may stand before or after the experiment's name.
 void AddCommonOptions(const Command& app, ExperimentOptions& options) {
   app.AddText("-o,--output", options.folder, "Folder for the results and all measurements; made if it does not exist").TypeName("DIR");
@@ -126,12 +112,10 @@ void DeclareExperiment(const CommandLine& line) {
     AddCommonOptions(one, *options);
     one.OnTyped([options, &experiment] { options->name = experiment.name; });
   }
-  DeclareReplay(sub, line.run);
   SetHelpPage(
       sub, {.examples = {{"slabstream experiment paper -o paper --quick", "The tables and figures of the paper on this machine, in short"},
                          {"slabstream experiment combining -o combining", "Schemes to combine images, compared"}}});
   sub.OnTyped([options, &run = line.run] {
-    if (run) return;  // replay
     if (options->list) {
       run = [] {
         std::cout << ExperimentList();

@@ -32,7 +32,7 @@ Command DeclareAbout(const CommandLine& line, const std::string& name, const std
                      const std::function<void(const Command& found)>& act) {
   const Command sub = line.app.AddCommand(name, purpose);
   auto names = std::make_shared<std::vector<std::string>>();
-  sub.AddTexts("COMMAND", *names, fmt::format("Which one, such as: {0} render, {0} experiment replay", name));
+  sub.AddTexts("COMMAND", *names, fmt::format("Which one, such as: {0} render, {0} experiment sweep", name));
   sub.OnTyped([app = line.app, &run = line.run, names, act] {
     run = [app, names, act] {
       Command found = app;

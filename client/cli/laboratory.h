@@ -20,7 +20,8 @@ inline constexpr LaboratoryCommand kBenchCommand = {"bench", "Measure how fast t
 // Declares them without options: for lists of commands.
 void DeclareLaboratory(const CommandLine& line);
 
-// Whether the words that follow the name of the program are about one of them: `bench --size 64`, `help experiment replay`.
+// Whether the words after the name of the program call one of these commands or ask for its help: `bench --size 64`,
+// `help experiment sweep`.
 bool IsOfLaboratory(std::span<const char* const> words);
 
 // Becomes the laboratory, with the same arguments. Returns only if it cannot. NotFound: it is missing.

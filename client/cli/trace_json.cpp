@@ -4,7 +4,6 @@
 #include <set>
 #include <utility>
 
-#include "client/cli/recording.h"
 #include "client/report/frame_spans.h"
 #include "common/json/json.h"
 
@@ -73,10 +72,7 @@ std::string TraceJson(const std::vector<FrameRecord>& frames) {
     events.push_back(Name("process_name", worker, 0, "worker " + std::to_string(worker)));
     for (const auto& [track, name] : kTracks) events.push_back(Name("thread_name", worker, track, name));
   }
-  std::vector<RecordedFrame> recorded;
-  recorded.reserve(frames.size());
-  for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, frame.latency));
-  const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
+  const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}};
   return json.dump() + "\n";
 }
 

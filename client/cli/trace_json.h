@@ -3,7 +3,7 @@
 //
 // One process a worker, with the tracks render, combine and fetch; names are stages, args give frame, group, rank and box. Process 0 has a
 // track of whole frames for each frame in flight. Times are microseconds since the first frame was planned; those of workers are
-// StageSpans. Beside the events the file holds the data for a replay (client/cli/recording.h).
+// StageSpans.
 #pragma once
 
 #include <string>

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <mutex>
 #include <utility>
 
@@ -40,7 +41,47 @@ class RecentSchedules {
   LruMap<Key, SharedSchedule> schedules_;
 };
 
+// Before the scheme, each run is combined from the front at its first rank.
+Schedule ScheduleOf(const ScheduleName& name, PixelRange frame) {
+  const CombiningChoice scheme = ParseCombining(name.scheme).value();
+  if (name.runs.empty()) return scheme.Make(name.ranks, name.roots, frame);
+  const ScheduleName among = AmongRuns(name);
+  Schedule whole = {name.ranks, name.roots, {}};
+  std::uint32_t rounds = 0;
+  for (std::size_t run = 0; run < name.runs.size(); ++run) {
+    const Rank first = name.runs[run], end = EndOfRun(name, run);
+    for (Rank rank = first + 1; rank < end; ++rank) whole.steps.push_back({rank - first - 1, rank, first, frame});
+    rounds = std::max(rounds, end - first - 1);
+  }
+  for (const Step& step : scheme.Make(among.ranks, among.roots, frame, kMaxSteps - (name.ranks - among.ranks)).steps) {
+    whole.steps.push_back({rounds + step.round, name.runs[step.from], name.runs[step.to], step.pixels});
+  }
+  std::ranges::stable_sort(whole.steps, {}, &Step::round);
+  return whole;
+}
+
+Status CheckRuns(const ScheduleName& name) {
+  if (name.runs.empty()) return Status::Ok();
+  const bool ascend = std::ranges::adjacent_find(name.runs, std::greater_equal<>()) == name.runs.end();
+  if (name.runs.front() != 0 || !ascend || name.runs.back() >= name.ranks) {
+    return Status::InvalidArgument(fmt::format("schedule.runs must ascend from 0 and stay below {}", name.ranks));
+  }
+  for (const Rank root : name.roots) {
+    if (!std::ranges::binary_search(name.runs, root)) {
+      return Status::InvalidArgument(fmt::format("schedule.roots has {}, but must be the first ranks of runs", root));
+    }
+  }
+  return Status::Ok();
+}
+
 }  // namespace
+
+ScheduleName AmongRuns(const ScheduleName& name) {
+  if (name.runs.empty()) return name;
+  ScheduleName among = {name.scheme, Rank(name.runs.size()), {}, {}};
+  for (const Rank root : name.roots) among.roots.push_back(Rank(std::ranges::lower_bound(name.runs, root) - name.runs.begin()));
+  return among;
+}
 
 IndexedSchedule::IndexedSchedule(Schedule schedule) : schedule_(std::move(schedule)), first_of_rank_(schedule_.ranks + 1) {
   for (const Step& step : schedule_.steps) {
@@ -77,6 +118,7 @@ Status CheckScheduleName(const ScheduleName& name) {
     return Status::InvalidArgument(fmt::format("schedule.roots are {}, but at most {} are allowed for {} ranks", name.roots.size(),
                                                kMaxSteps / name.ranks, name.ranks));
   }
+  if (Status status = CheckRuns(name); !status.ok()) return status;
   if (name.ranks == 0) return Status::Ok();
   const Result<CombiningChoice> scheme = ParseCombining(name.scheme);
   return scheme.ok() ? Status::Ok() : Status::InvalidArgument(fmt::format("schedule.scheme: {}", scheme.status().message()));
@@ -87,7 +129,7 @@ Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame
   if (Status status = CheckScheduleName(name); !status.ok()) return status;
   if (name.ranks == 0) return std::make_shared<const IndexedSchedule>(Schedule{.ranks = 0, .roots = {0}, .steps = {}});
   if (SharedSchedule known = recent.Find(name, frame)) return known;
-  auto schedule = std::make_shared<const IndexedSchedule>(ParseCombining(name.scheme)->Make(name.ranks, name.roots, frame));
+  auto schedule = std::make_shared<const IndexedSchedule>(ScheduleOf(name, frame));
   recent.Keep(name, frame, schedule);
   return SharedSchedule(std::move(schedule));
 }

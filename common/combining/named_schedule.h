@@ -21,10 +21,20 @@ struct ScheduleName {
   // Schedule's roots: 1 ... kMaxShares, each below `ranks`, 0 if there are none. If there are several shares, all of
   // them together have at most kMaxSteps ranks.
   std::vector<Rank> roots = {0};
+  // The first ranks of runs, ascending from 0. The ranks of a run are of one worker. It combines their images at the first of them, which
+  // then takes part in the scheme for all; roots are such ranks. Empty: each rank is a run.
+  std::vector<Rank> runs = {};
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };
 
-// InvalidArgument: an unknown scheme, wrong arguments, too many ranks, no root or too many, or a root that is no rank.
+// One past the last rank of a run, by its place in `name.runs`.
+inline Rank EndOfRun(const ScheduleName& name, std::size_t run) { return run + 1 < name.runs.size() ? name.runs[run + 1] : name.ranks; }
+
+// What the scheme does among runs: a schedule whose ranks are the runs of `name`.
+ScheduleName AmongRuns(const ScheduleName& name);
+
+// InvalidArgument: an unknown scheme, wrong arguments, too many ranks, no root or too many, a root that is no rank or not the first one of
+// its run, or runs that are out of order.
 Status CheckScheduleName(const ScheduleName& name);
 
 // A schedule and, for each rank, the steps that it sends or receives. Immutable.

@@ -42,14 +42,14 @@ const std::vector<CombiningEntry>& CombiningSchemes() {
   return entries;
 }
 
-Schedule CombiningChoice::Make(Rank ranks, const std::vector<Rank>& roots, PixelRange pixels) const {
-  if (roots.size() == 1) return Make({.ranks = ranks, .root = roots.front(), .pixels = pixels});
+Schedule CombiningChoice::Make(Rank ranks, const std::vector<Rank>& roots, PixelRange pixels, std::uint32_t most_steps) const {
+  if (roots.size() == 1) return Make({ranks, roots.front(), pixels, most_steps});
   const auto make = scheme->make_share != nullptr ? scheme->make_share : scheme->make;
   Schedule whole = {ranks, roots, {}};
   for (std::size_t share = 0; share < roots.size(); ++share) {
     const PixelRange of_root = Share(pixels, share, roots.size());
     if (of_root.begin == of_root.end) continue;
-    const Schedule steps = make({ranks, roots[share], of_root, kMaxSteps / std::uint32_t(roots.size())}, arguments);
+    const Schedule steps = make({ranks, roots[share], of_root, most_steps / std::uint32_t(roots.size())}, arguments);
     whole.steps.insert(whole.steps.end(), steps.steps.begin(), steps.steps.end());
   }
   std::ranges::stable_sort(whole.steps, {}, &Step::round);

@@ -45,8 +45,8 @@ struct CombiningChoice {
   const CombiningEntry* scheme = nullptr;
   CombiningArguments arguments;
   Schedule Make(const ScheduleRequest& request) const { return scheme->make(request, arguments); }
-  // Each of `roots` gets its share of the pixels. At most kMaxSteps / roots.size() ranks.
-  Schedule Make(Rank ranks, const std::vector<Rank>& roots, PixelRange pixels) const;
+  // Each of `roots` gets its share of the pixels. At most `most_steps` / roots.size() ranks.
+  Schedule Make(Rank ranks, const std::vector<Rank>& roots, PixelRange pixels, std::uint32_t most_steps = kMaxSteps) const;
 };
 
 // InvalidArgument: an unknown name (the message lists the known ones), or arguments that the scheme does not take, with their limits.

@@ -53,4 +53,17 @@ class Partition {
 // are parallel to it, no ray crosses from one side to the other, and the lower side comes first. `stretch`: of the volume.
 std::vector<BoxId> VisibilityOrder(const Partition& partition, const Camera& camera, const Stretch& stretch = {});
 
+// Two boxes with a face, an edge or a corner in common.
+struct TouchingBoxes {
+  BoxId first = 0, second = 0;  // first < second
+  friend bool operator==(const TouchingBoxes&, const TouchingBoxes&) = default;
+};
+// All of them, each once, by ascending ids.
+std::vector<TouchingBoxes> FindTouching(const Partition& partition);
+
+// Whether a ray of the camera may pass from one of two boxes that touch into the other, and out of which. Since boxes tile the volume, an
+// order that heeds all boxes that touch heeds all boxes.
+enum class Passage : std::uint8_t { kNone, kFromFirst, kFromSecond };
+Passage PassageBetween(const Box& first, const Box& second, const Camera& camera, const Stretch& stretch = {});
+
 }  // namespace slabstream

@@ -44,6 +44,14 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
   return slots;
 }
 
+// Each slot has about as many owners, with neighbouring numbers: these often lie side by side, so that their boxes make longer runs.
+std::vector<std::uint32_t> AssignToOwners(const AssignmentRequest& request) {
+  const std::uint64_t owners = std::max(request.holder_count, request.slots);
+  std::vector<std::uint32_t> slots;
+  for (const std::uint32_t holder : request.holders) slots.push_back(std::uint32_t(holder * std::uint64_t{request.slots} / owners));
+  return slots;
+}
+
 }  // namespace
 
 const std::vector<AssignmentEntry>& Assignments() {
@@ -53,6 +61,8 @@ const std::vector<AssignmentEntry>& Assignments() {
        false, true},
       {"contiguous", "neighbouring boxes to the same worker", AssignContiguous},
       {"greedy", "the costliest remaining box to the worker with the least work", AssignGreedy, true},
+      {"owner", "each box to the worker beside whoever holds its voxels; boxes are those of the pieces that a volume lies in",
+       AssignToOwners, false, false, true},
   };
   return entries;
 }

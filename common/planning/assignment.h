@@ -11,6 +11,9 @@ namespace slabstream {
 struct AssignmentRequest {
   std::span<const double> costs;  // predicted, by box; >= 0, in any unit
   std::uint32_t slots = 1;        // >= 1
+  // By box: who holds its voxels (OwnedBox::owner), numbers below `holder_count`; empty: unknown.
+  std::span<const std::uint32_t> holders = {};
+  std::uint32_t holder_count = 0;
 };
 
 struct AssignmentEntry {
@@ -20,6 +23,8 @@ struct AssignmentEntry {
   bool by_cost = false;                                            // it uses costs: the better they are known, the better it is
   // In every other frame the last slot renders the first one's boxes, and so on: each worker holds the voxels of two slots.
   bool alternates = false;
+  // Boxes are those of owners (VolumeSummary::owned), and groups take runs of them (owner_groups.h). Needs `holders`.
+  bool by_owner = false;
 };
 
 // The only list.

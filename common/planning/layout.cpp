@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 
+#include "common/decomposition/owner_partition.h"
 #include "common/parallel/parallel.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/level_partition.h"
@@ -13,6 +14,7 @@
 #include "common/planning/worker_memory.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
+#include "common/volume/indices.h"
 
 namespace slabstream {
 namespace {
@@ -272,16 +274,17 @@ struct LayoutMaker::State {
 
   // An index says which boxes are rendered, and what of them is read. It does not say where they are: boxes are those that would be
   // made without it.
-  Layout Assign(Partition partition, const ResolvedPolicy& policy) {
+  // `holders`: by box (AssignmentRequest); empty: it does not matter who holds which voxels.
+  Layout Assign(Partition partition, const ResolvedPolicy& policy, std::span<const std::uint32_t> holders = {}) {
     const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
     const std::optional<UnreadParts> unread = FindUnread();
     std::vector<std::vector<FilledBox>> filled(unread ? partition.boxes().size() : 0);
-    const auto shows = [&](const Box& box, BoxId) { return fields.Shows(box) && (!unread || unread->Shows(box)); };
+    const auto shows = [&](const Box& box, BoxId) { return InPicture(box) && fields.Shows(box) && (!unread || unread->Shows(box)); };
     const auto cost_of = [&](const Box& box, BoxId id) {
       if (!unread) return by_cost ? MeanSeconds(box) : 1;
       return double(VoxelsRead(*unread, PaddedBoxOf({box, 0}), filled[id]));
     };
-    Layout layout = Share(std::move(partition), policy, shows, cost_of);
+    Layout layout = Share(std::move(partition), policy, shows, cost_of, holders);
     layout.filled = std::move(filled);
     if (!extinction) extinction = FindLeastExtinction(*request.summary, *request.volume);
     layout.extinction = *extinction;
@@ -298,19 +301,46 @@ struct LayoutMaker::State {
 
   // Gives boxes that show something to slots. Asks for the cost of each of them once.
   template <class Shows, class CostOf>
-  Layout Share(Partition partition, const ResolvedPolicy& policy, Shows&& shows, CostOf&& cost_of) {
+  Layout Share(Partition partition, const ResolvedPolicy& policy, Shows&& shows, CostOf&& cost_of,
+               std::span<const std::uint32_t> holders = {}) {
     std::vector<BoxId> shown;
     std::vector<double> box_costs;
+    std::vector<std::uint32_t> box_holders;
     for (BoxId id = 0; id < partition.boxes().size(); ++id) {
       const Box& box = partition.boxes()[id];
       if (!shows(box, id)) continue;
       shown.push_back(id);
       box_costs.push_back(cost_of(box, id));
+      if (!holders.empty()) box_holders.push_back(holders[id]);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-    const std::vector<std::uint32_t> owners = policy.assignment->assign({box_costs, request.slots});
+    const std::vector<std::uint32_t> owners =
+        policy.assignment->assign({.costs = box_costs,
+                                   .slots = request.slots,
+                                   .holders = box_holders,
+                                   .holder_count = holders.empty() ? 0 : std::ranges::max(holders) + 1});
     for (std::size_t i = 0; i < shown.size(); ++i) layout.owners[shown[i]] = owners[i];
+    return layout;
+  }
+
+  // Whether the picture shows some of the box; true if it is not known which zones it shows (ShownZones).
+  bool InPicture(const Box& box) const {
+    if (request.map == nullptr || request.map->one_level()) return true;
+    const Index3& side = request.map->side;
+    for (const Index3& zone : IndicesIn(Box{box.begin / side, (box.end - Uniform(1)) / side + Uniform(1)})) {
+      if (request.map->Of(zone) != LevelMap::kOutside) return true;
+    }
+    return false;
+  }
+
+  // Boxes as their owners hold them, or parts of these that fit the target.
+  Layout MakeByOwner(const ResolvedPolicy& policy) {
+    const auto fits = [&](const Box& box) { return BytesOf({box, 0}) <= request.box_bytes_target || box.voxel_count() == 1; };
+    OwnerPartition made = DivideByOwners(request.summary->description.geometry.bounds(), *request.summary->owned, fits);
+    Layout layout = Assign(std::move(made.partition), policy, made.owners);
+    layout.touching = FindTouching(layout.partition);
+    layout.group_bytes = std::uint64_t(request.box_bytes_target);
     return layout;
   }
 
@@ -445,6 +475,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
+  if (policy.assignment->by_owner) return state_->MakeByOwner(policy);
   if (state_->request.map != nullptr) return state_->MakeByLevels(policy);
   if (state_->request.summary->stored) return state_->Assign(state_->MakeStoredPartition(policy), policy);
   const BalanceBy metric = policy.balance_by;

@@ -29,6 +29,9 @@ struct Layout {
   // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
   LeastExtinction extinction = {};  // the volume's least extinction; empty: not known
+  // Of boxes that are grouped by owner (owner_groups.h): all pairs that touch, and the most bytes of padded boxes of a worker in a group.
+  std::vector<TouchingBoxes> touching = {};  // empty: groups are as many boxes as there are slots, in visibility order
+  std::uint64_t group_bytes = 0;
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 

@@ -8,6 +8,7 @@
 #include "common/base/check.h"
 #include "common/combining/schemes.h"
 #include "common/combining/travel.h"
+#include "common/planning/owner_groups.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
@@ -41,6 +42,41 @@ WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& prese
   return candidates[plan.turn.number % candidates.size()];
 }
 
+std::vector<std::vector<BoxId>> GroupsOf(const FramePlan& plan) {
+  const Layout& layout = *plan.layout;
+  const Stretch& stretch = plan.setup.description.geometry.stretch;
+  if (!layout.touching.empty()) {
+    std::vector<std::uint64_t> bytes;
+    for (const Box& box : layout.partition.boxes()) {
+      bytes.push_back(std::uint64_t(PaddedBox({box, 0}, plan.setup).voxel_count()) * BytesPerSample(plan.setup.description.type));
+    }
+    return GroupByOwner({.partition = &layout.partition,
+                         .touching = layout.touching,
+                         .slots = layout.owners,
+                         .camera = &plan.setup.camera,
+                         .stretch = &stretch,
+                         .bytes = bytes,
+                         .most_bytes = layout.group_bytes});
+  }
+  std::vector<std::vector<BoxId>> groups;
+  for (const BoxId id : VisibilityOrder(layout.partition, plan.setup.camera, stretch)) {
+    if (layout.owners[id] == kNoSlot) continue;
+    if (groups.empty() || groups.back().size() == plan.slots) groups.emplace_back();
+    groups.back().push_back(id);
+  }
+  return groups;
+}
+
+// Where another worker's ranks begin; empty if no worker has two ranks in a row.
+std::vector<Rank> RunsOf(const GroupPlan& group) {
+  std::vector<Rank> runs;
+  for (Rank rank = 0; rank < group.placements.size(); ++rank) {
+    if (rank == 0 || group.placements[rank].worker != group.placements[rank - 1].worker) runs.push_back(rank);
+  }
+  if (runs.size() == group.placements.size()) runs.clear();
+  return runs;
+}
+
 // Gives what else `apart.worker` holds of the groups of its boxes to `others`, in turn.
 void Separate(const SetApart& apart, const std::vector<WorkerId>& others, FramePlan& plan) {
   std::size_t next = 0;
@@ -64,7 +100,8 @@ ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
   if (is_of_one && plan.client.straight8) return ColorCoding::kStraight8;
   if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
   const PixelRange frame = WholeFrame(plan.setup);
-  Travel travel = TravelOf(DeriveSchedule(group.schedule, frame).value(), frame);
+  // Images of a run do not travel.
+  Travel travel = TravelOf(DeriveSchedule(AmongRuns(group.schedule), frame).value(), frame);
   if (DisplaysOf(group, plan.display).front() != group.placements[group.schedule.roots.front()].worker)
     travel = {travel.hops + 1, travel.transfers + 1};
   ColorCoding best = ColorCoding::kFloat32;
@@ -131,12 +168,13 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool 
 
 void PlaceBoxes(FramePlan& plan) {
   plan.groups.clear();
-  for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera, plan.setup.description.geometry.stretch)) {
-    if (plan.layout->owners[id] == kNoSlot) continue;
-    if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
-    const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];
-    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0, level});
-    if (!plan.layout->filled.empty()) plan.groups.back().placements.back().filled = plan.layout->filled[id];
+  for (const std::vector<BoxId>& boxes : GroupsOf(plan)) {
+    GroupPlan& group = plan.groups.emplace_back();
+    for (const BoxId id : boxes) {
+      const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];
+      group.placements.push_back({id, plan.layout->partition.boxes()[id], 0, level});
+      if (!plan.layout->filled.empty()) group.placements.back().filled = plan.layout->filled[id];
+    }
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }
@@ -157,7 +195,7 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apar
   for (GroupPlan& group : plan.groups) {
     const bool may_divide = plan.groups.size() == 1 && apart.boxes.empty();
     group.schedule = {plan.combine, Rank(group.placements.size()),
-                      may_divide ? SharesOf(plan) : std::vector<Rank>{RootOf(group, plan.display)}};
+                      may_divide ? SharesOf(plan) : std::vector<Rank>{RootOf(group, plan.display)}, RunsOf(group)};
     if (group.schedule.roots.size() > 1) plan.display = group.placements[group.schedule.roots.front()].worker;
     group.color = ChooseColor(plan, group);
   }

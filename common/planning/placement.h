@@ -10,7 +10,8 @@ namespace slabstream {
 // Workers 1 ... `workers`, one for each slot: for plans that no service runs.
 Roster RosterOf(std::uint32_t workers);
 
-// Groups of `plan.slots` boxes of its layout that show something, in visibility order; at least one group.
+// Groups of `plan.slots` boxes of its layout that show something, in visibility order, or groups by owner (Layout::touching); at least one
+// group.
 void PlaceBoxes(FramePlan& plan);
 
 // Boxes for one worker that renders nothing else of their groups. It is not the display worker either, unless it is the only worker.

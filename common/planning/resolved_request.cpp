@@ -102,6 +102,18 @@ Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& data
 
 namespace {
 
+Status CheckOwners(const FrameRequest& request, const VolumeSummary& summary) {
+  const Policy& policy = request.policy;
+  if (!FindNamed(Assignments(), policy.assignment)->by_owner) return Status::Ok();
+  if (summary.owned == nullptr) {
+    return Status::InvalidArgument(
+        fmt::format("policy.assignment is '{}', but dataset \"{}\" does not lie in pieces", policy.assignment, request.dataset));
+  }
+  if (!IsDynamic(policy)) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("policy.assignment is '{}', whose boxes stay where they are, but policy.balance is '{}'",
+                                             policy.assignment, policy.balance));
+}
+
 // Whether the strongest value of a channel is opaque: what shows is a value or a plane, not matter that lets light through.
 bool HasFullRange(const FrameRequest& request, const RendererKind& renderer) {
   return request.clipping.slab.has_value() || renderer.format() == PixelFormat::kMaximum;
@@ -203,6 +215,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
+  if (Status status = CheckOwners(request, *summary); !status.ok()) return status;
   if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
   const Result<bool> as_channel = ShowsAsChannel(request, fields);
   if (!as_channel.ok()) return as_channel.status();

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/volume/labels.h"
+#include "common/volume/owned_box.h"
 #include "common/volume/sample_types.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/volume.h"
@@ -56,6 +57,8 @@ struct VolumeSummary {
   // What an index knows of the bricks of a stored level, in place of `bricks`. It says which voxels need not be read,
   // and nothing else: no picture may depend on whether there is an index. Null: there is none.
   std::shared_ptr<const BrickRangeList> indexed = nullptr;
+  // Who holds which voxels, where that is known: processes, or the pieces that they wrote. The boxes tile the volume. Null: not known.
+  std::shared_ptr<const OwnedBoxes> owned = nullptr;
   std::vector<std::uint32_t> cells;  // for an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
   SampleTypes types() const { return {description.type, !cells.empty()}; }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -146,6 +147,13 @@ void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker& check)
   }
   check.That(MayCode(setup.format, group.color), "color", "that of another format");
   if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
+  if (!check.ok()) return;
+  const std::vector<Rank>& runs = group.schedule.runs;
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    const auto of_run = std::span(group.placements).subspan(runs[run], EndOfRun(group.schedule, run) - runs[run]);
+    const bool of_one = std::ranges::all_of(of_run, [&](const Placement& placement) { return placement.worker == of_run.front().worker; });
+    check.That(of_one, "schedule.runs", "a run of several workers");
+  }
 }
 
 // The shares of a frame of several groups would have to be accumulated.

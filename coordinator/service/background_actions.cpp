@@ -244,6 +244,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     }
   }
   const DatasetId id = IdOf(action.name, description, at.stored);
+  summary.owned = at.source->info().levels[std::size_t(at.stored.level)].owned;
   const std::uint64_t held = samples.bytes();
   return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), held, at.stamp}, id,
               std::move(samples)};

@@ -114,6 +114,7 @@ class Parts : public std::enable_shared_from_this<Parts> {
                                                  coarsest.voxel_count() - missing, coarsest.voxel_count()));
     }
     for (std::size_t level = 0; level + 1 < boxes_.size(); ++level) info_.levels[level].refined = boxes_[level];
+    if (boxes_.size() == 1 && boxes_.front()->size() <= kMostOwners) info_.levels.front().owned = Owned();
     return info_;
   }
 
@@ -139,6 +140,22 @@ class Parts : public std::enable_shared_from_this<Parts> {
  private:
   Status NoMemory(const std::exception& error) const {
     return Status::ResourceExhausted(fmt::format("{}: a part cannot be read: {}", name_, error.what()));
+  }
+
+  static constexpr std::size_t kMostOwners = 1 << 14;
+
+  // Each part owns its voxels, but for those that an earlier one has, too.
+  std::shared_ptr<const OwnedBoxes> Owned() const {
+    const std::vector<Box>& parts = *boxes_.front();
+    auto owned = std::make_shared<OwnedBoxes>();
+    for (std::uint32_t part = 0; part < parts.size(); ++part) {
+      std::vector<Box> earlier;
+      for (const std::uint32_t other : trees_.front().Meeting(parts[part])) {
+        if (other < part) earlier.push_back(parts[other]);
+      }
+      for (const Box& box : Assemble(parts[part], earlier).missing) owned->push_back({box, part});
+    }
+    return owned;
   }
 
   // Which parts a box is read from, in ascending order.

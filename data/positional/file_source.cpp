@@ -138,12 +138,4 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const
   return *found ? OpenDescribed(path, **std::move(found), options, context) : OpenDecoded(format, path, options);
 }
 
-Result<std::shared_ptr<VolumeSource>> OpenLocated(const std::string& format, const std::string& path, const LocatedSamples& located,
-                                                  const SourceContext& context) {
-  Result<std::optional<LocatedVolume>> found = Described(format, path, located, {});
-  if (!found.ok()) return found.status();
-  CHECK(found->has_value()) << "axes that are not at right angles";
-  return OpenDescribed(path, **std::move(found), {}, context);
-}
-
 }  // namespace slabstream

@@ -22,8 +22,5 @@ namespace slabstream {
 // `format` has `locate` or `read`, and knows the path and takes the options. Errors of OpenSource (data/open/open_source.h).
 Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
                                                const SourceContext& context);
-// The same of samples whose place is known, of one volume, whose axes are at right angles.
-Result<std::shared_ptr<VolumeSource>> OpenLocated(const std::string& format, const std::string& path, const LocatedSamples& located,
-                                                  const SourceContext& context);
 
 }  // namespace slabstream

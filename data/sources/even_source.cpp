@@ -97,7 +97,8 @@ Result<std::shared_ptr<VolumeSource>> MakeEven(const std::string& name, std::sha
   if (std::ranges::all_of(uneven, [](const UnevenAxis& axis) { return axis.centres.empty(); })) return source;
   if (info.labels) return Status::InvalidArgument(name + ": its values are labels, which are not resampled");
   if (info.levels.size() > 1) return Status::InvalidArgument(name + ": has several levels, which are not resampled");
-  auto& [description, block, refined] = info.levels.front();
+  auto& [description, block, refined, owned] = info.levels.front();
+  owned = {};  // pieces count the voxels that they hold
   VolumeGeometry& geometry = description.geometry;
   const auto places = std::make_shared<VoxelPlaces>();
   for (const Axis axis : kAxes) {

@@ -44,6 +44,7 @@ struct SourceLevel {
   // Of an adaptive mesh: where the level has voxels of its own. The others are interpolated between those of the next coarser level. Null:
   // it has all of them.
   std::shared_ptr<const std::vector<Box>> refined = {};
+  std::shared_ptr<const OwnedBoxes> owned = {};  // as VolumeSummary::owned
 };
 
 // The order of slices in which a stream gives its voxels.

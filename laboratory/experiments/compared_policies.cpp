@@ -7,6 +7,7 @@
 
 #include "common/base/find_named.h"
 #include "common/planning/balance.h"
+#include "laboratory/experiments/owner_arrangements.h"
 
 namespace slabstream {
 namespace {
@@ -55,7 +56,14 @@ bool IsCompared(const Policy& policy) {
   return FindNamed(ComparedAssignments(), policy.assignment) != nullptr || FindNamed(ComparedBalances(), policy.balance) != nullptr;
 }
 
-Result<ResolvedRequest> ResolveCompared(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
+Result<ResolvedRequest> ResolveCompared(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
+                                        std::uint32_t owners) {
+  if (const OwnerArrangement* const arrangement = FindNamed(OwnerArrangements(), request.policy.assignment)) {
+    auto held = std::make_shared<VolumeSummary>(*summary);
+    held->owned = std::make_shared<const OwnedBoxes>(Arrange(*arrangement, summary->description.geometry.size, owners));
+    summary = std::move(held);
+    request.policy.assignment = std::ranges::find_if(Assignments(), &AssignmentEntry::by_owner)->name;
+  }
   const AssignmentEntry* const assignment = FindNamed(ComparedAssignments(), request.policy.assignment);
   const ComparedBalance* const balance = FindNamed(ComparedBalances(), request.policy.balance);
   if (assignment != nullptr) request.policy.assignment = Policy().assignment;

@@ -2,6 +2,8 @@
 // (FrameCase::policy) may name them.
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/planning/assignment.h"
@@ -20,8 +22,10 @@ const std::vector<ComparedBalance>& ComparedBalances();
 // Whether the service does not have what the policy names.
 bool IsCompared(const Policy& policy);
 
-// As the other ResolveRequest. The policy may name what is above, too.
-Result<ResolvedRequest> ResolveCompared(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
+// As the other ResolveRequest. The policy may name what is above, too, or as its assignment an arrangement of so many owners
+// (OwnerArrangements).
+Result<ResolvedRequest> ResolveCompared(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
+                                        std::uint32_t owners);
 
 // Planes of the partition move to where both sides took as long, each time, whatever that costs to move: after Marchesin, Mongenet and
 // Dischler, "Dynamic load balancing for parallel volume rendering", EGPGV 2006.

@@ -184,7 +184,8 @@ Json NumbersOf(const std::vector<BoxCost>& costs, const FramePlan& plan) {
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame) {
   const FrameRequest request = RequestOf(frame);
   OrThrow(Validate(request));
-  return OrThrow(ResolveCompared(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary));
+  return OrThrow(ResolveCompared(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary,
+                                 std::uint32_t(frame.workers)));
 }
 
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {

@@ -2,8 +2,10 @@
 
 #include <utility>
 
+#include "common/base/find_named.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/resolved_policy.h"
+#include "laboratory/experiments/owner_arrangements.h"
 #include "laboratory/experiments/request_json.h"
 
 namespace slabstream {
@@ -59,8 +61,10 @@ KeyedFrame ForBoxCosts(ExperimentContext& context, const FrameCase& frame) {
   // With an open number of groups, boxes also depend on what is known about the volume, and with it on assignment and balance.
   if (frame.policy.groups == 0) return keyed;
   LeaveOut(keyed, "balance", &Policy::balance);
-  // Other boxes than those of equal volume are cut for the quickest frame (MakeLayout), which depends on who owns which.
-  if (settled.policy.balance_by == NameOf(BalanceBy::kVoxels)) LeaveOut(keyed, "assignment", &Policy::assignment);
+  // Other boxes than those of equal volume are cut for the quickest frame (MakeLayout), which depends on who owns which. Owners have boxes
+  // of their own.
+  const bool of_owners = FindNamed(OwnerArrangements(), frame.policy.assignment) != nullptr;
+  if (settled.policy.balance_by == NameOf(BalanceBy::kVoxels) && !of_owners) LeaveOut(keyed, "assignment", &Policy::assignment);
   return keyed;
 }
 

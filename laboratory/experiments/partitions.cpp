@@ -9,6 +9,7 @@
 #include "laboratory/experiments/compared_policies.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/owner_arrangements.h"
 #include "laboratory/experiments/policies.h"
 #include "laboratory/experiments/subjects.h"
 
@@ -47,11 +48,16 @@ std::vector<NamedPolicy> PartitionsByVoxels() {
   return policies;
 }
 
-// The service's own assignments and those that it is compared with.
+// The service's own assignments and those that it is compared with. Without owners, no box stays with one.
 std::vector<AssignmentEntry> AssignmentsToCompare() {
   std::vector<AssignmentEntry> all = Assignments();
+  std::erase_if(all, [](const AssignmentEntry& entry) { return entry.by_owner; });
   all.insert(all.end(), ComparedAssignments().begin(), ComparedAssignments().end());
   return all;
+}
+
+FrameCase OwnedFrame(const Comparison& comparison, const BenchCase& volume, std::string_view arrangement, int p) {
+  return comparison.Frame(volume, Combined(EqualSlabs().policy, kUsualScheme, 1, arrangement), p);
 }
 
 std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& comparison) {
@@ -72,12 +78,16 @@ std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& compar
         add_boxes(Combined(named.policy, kUsualScheme, kBoxesAWorker, assignment.name), comparison.TableWorkers());
     }
     for (const int p : comparison.workers) add_boxes({.groups = 1}, p);
+    for (const OwnerArrangement& arrangement : OwnerArrangements()) {
+      for (const int p : comparison.workers) trials.push_back(BoxCostTrial(context, OwnedFrame(comparison, volume, arrangement.name, p)));
+    }
   }
   return trials;
 }
 
-Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link = "") {
-  Json of = ColumnsOf(frame, {{"part", part}});
+Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link = "", Json more = Json::object()) {
+  more["part"] = part;
+  Json of = ColumnsOf(frame, std::move(more));
   if (link.empty()) {
     of.erase("combine");  // what is measured does not depend on it
   } else {
@@ -143,6 +153,30 @@ void AddAssignments(ExperimentContext& context, const Comparison& comparison, co
   }
 }
 
+// Voxels that stay with whoever holds them: how many groups that takes, and how many images travel.
+void AddOwners(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
+  for (const OwnerArrangement& arrangement : OwnerArrangements()) {
+    for (const int p : comparison.workers) {
+      const FrameCase frame = OwnedFrame(comparison, volume, arrangement.name, p);
+      const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
+      const Json of = CaseOf("owners", frame);
+      std::size_t boxes = 0, images = 0;
+      for (const GroupPlan& group : repeats.front().plan.groups) {
+        boxes += group.placements.size();
+        images += AmongRuns(group.schedule).ranks;
+      }
+      const auto add_count = [&](std::string_view what, std::size_t count) {
+        results.Add(CaseOf("owners", frame, "", {{"variant", what}}), "count", double(count), Origin::kMeasured);
+      };
+      add_count("boxes", boxes);
+      add_count("groups", repeats.front().plan.groups.size());
+      add_count("images", images);
+      AddBoxFigures(results, of, repeats);
+      AddLatency(context, results, "owners", frame, kLinks);
+    }
+  }
+}
+
 }  // namespace
 
 void DeclarePartitions(const Command& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
@@ -158,6 +192,7 @@ void RunPartitions(ExperimentContext& context, Results& results) {
     AddPolicies(context, comparison, volume, results);
     AttachAllBoxes(context, comparison, volume, results);
     AddAssignments(context, comparison, volume, results);
+    AddOwners(context, comparison, volume, results);
   }
 }
 

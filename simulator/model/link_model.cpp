@@ -27,16 +27,12 @@ const std::vector<LinkPreset>& LinkPresets() {
   // bytes have to pass in 1.1e-3 of it.
   constexpr double kPvsFrameSeconds = 4.0e-3, kPvsImageShare = 0.083 / 72.89, kPvsImageBytes = 200 * 200 * 16;
   static const std::vector<LinkPreset> presets = {
-      {"host", "workers of one host: copies in memory", {Contention::kNone, 30e-6, 8e9}},
-      {"1gbit", "1 Gbit/s, switched", {Contention::kSwitched, 50e-6, 1 * kBytesAGigabit}},
-      {"10gbit", "10 Gbit/s, switched", {Contention::kSwitched, 20e-6, 10 * kBytesAGigabit}},
-      {"fat-tree",
-       "10 Gbit/s, groups of 16 behind uplinks of a quarter of their rate",
-       {Contention::kFatTree, 20e-6, 10 * kBytesAGigabit, 16, 4}},
-      {"bus", "10 Gbit/s, one message at a time", {Contention::kSharedBus, 20e-6, 10 * kBytesAGigabit}},
-      {"pvs",
-       "a bus as slow for today's processors as the paper's bus was for its own",
-       {Contention::kSharedBus, 1e-6, kPvsImageBytes / (kPvsImageShare * kPvsFrameSeconds)}},
+      {"host", {Contention::kNone, 30e-6, 8e9}},  // workers of one host: copies in memory
+      {"1gbit", {Contention::kSwitched, 50e-6, 1 * kBytesAGigabit}},
+      {"10gbit", {Contention::kSwitched, 20e-6, 10 * kBytesAGigabit}},
+      {"fat-tree", {Contention::kFatTree, 20e-6, 10 * kBytesAGigabit, 16, 4}},
+      {"bus", {Contention::kSharedBus, 20e-6, 10 * kBytesAGigabit}},
+      {"pvs", {Contention::kSharedBus, 1e-6, kPvsImageBytes / (kPvsImageShare * kPvsFrameSeconds)}},
   };
   return presets;
 }

@@ -31,8 +31,7 @@ struct LinkModel {
 };
 
 struct LinkPreset {
-  std::string_view name;     // what sweeps and ParseLink take
-  std::string_view purpose;  // one line for --help
+  std::string_view name;  // what sweeps and ParseLink take
   LinkModel link;
 };
 

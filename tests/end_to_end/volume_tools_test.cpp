@@ -179,7 +179,7 @@ TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
   EXPECT_EQ(MustRun({"help", "render"}).out, MustRun({"render", "--help"}).out);
   EXPECT_EQ(MustRun({"help"}).out, MustRun({"--help"}).out);
   EXPECT_THAT(MustRun({"man", "render"}).out, HasSubstr(".SH EXAMPLES\n.TP\n.B slabstream render head.nii.gz"));
-  EXPECT_THAT(MustRun({"help", "experiment", "replay"}).out, HasSubstr("--with KEY=VALUE"));
+  EXPECT_THAT(MustRun({"help", "experiment", "sweep"}).out, HasSubstr("What to vary"));
   EXPECT_EQ(Slabstream({"help", "rendr"}).exit_status, 2);
 }
 

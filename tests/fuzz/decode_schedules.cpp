@@ -31,7 +31,7 @@ bool DecodeSchedule(std::span<const std::byte> bytes) {
   std::vector<Rank> roots(1 + input.Take<std::uint8_t>() % 4);
   for (Rank& root : roots) root = input.Take<std::uint8_t>() % ranks;
   const std::string text(input.Text());
-  const ScheduleName name{text, ranks, roots};
+  const ScheduleName name{text, ranks, roots, {}};
   const Result<CombiningChoice> choice = ParseCombining(text);
   const Result<SharedSchedule> derived = DeriveSchedule(name, kPixels);
   CHECK_EQ(CheckScheduleName(name).ok(), choice.ok());

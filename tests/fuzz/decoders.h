@@ -59,9 +59,6 @@ std::vector<FuzzBytes> PrecomputedSeeds();
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 
-bool DecodeRecording(std::span<const std::byte> input);
-std::vector<FuzzBytes> RecordingSeeds();
-
 bool DecodeSweep(std::span<const std::byte> input);
 std::vector<FuzzBytes> SweepSeeds();
 

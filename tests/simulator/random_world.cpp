@@ -5,10 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/find_named.h"
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
+#include "tests/common/decomposition/random_partition.h"
 #include "tests/support/random_combining.h"
 #include "tests/support/renderers.h"
 
@@ -77,6 +79,16 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
     world.policy.balance_by = one_of(BalanceByChoices());
     world.policy.assignment = one_of(Assignments());
     world.policy.balance = one_of(Balances());
+  }
+  if (FindNamed(Assignments(), world.policy.assignment)->by_owner) {
+    auto summary = std::make_shared<VolumeSummary>(*world.summary);
+    auto owned = std::make_shared<OwnedBoxes>();
+    const Partition partition = RandomPartition(random, summary->description.geometry.bounds(), random.Integer(1, 30));
+    const std::uint32_t owners = random.Integer(1U, 8U);
+    for (const Box& box : partition.boxes()) owned->push_back({box, random.Integer(0U, owners - 1)});
+    summary->owned = std::move(owned);
+    world.summary = std::move(summary);
+    world.policy.balance = Policy().balance;  // boxes stay where they are
   }
   world.policy.combine = RandomCombining(random);
   if (random.Chance(0.1)) world.policy.combine.clear();

@@ -9,13 +9,13 @@
 namespace slabstream {
 namespace {
 
-constexpr int kWorkers[] = {1, 2, 4, 8, 16};
+constexpr int kCounts[] = {1, 2, 4, 8, 16};
 constexpr int kCellsASide = 32;
 
 std::vector<FrameCase> GridFrames(const PaperSetup& setup) {
   std::vector<FrameCase> frames;
   for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
-    for (const int p : kWorkers) {
+    for (const int p : kCounts) {
       FrameCase& frame = frames.emplace_back(setup.Frame(FindRenderer("slice"), setup.table_size(), p));
       frame.volume = GridCase({.size = setup.table_size(), .cells = std::min(kCellsASide, setup.table_size() / 2)});
       frame.policy.decomposition = named.policy.decomposition;

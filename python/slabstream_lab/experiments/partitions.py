@@ -31,6 +31,7 @@ def page(run: Run) -> Page:
             _recommended(run, subjects),
             _efficiency(run, subjects),
             _assignments(run, subjects),
+            _owners(run, subjects),
         ],
     )
 
@@ -205,4 +206,40 @@ def _assignments(run: Run, subjects: list[Subject]) -> Section:
         f"p = {p}, {groups} groups. Imbalance as above, from the workers' sums over their boxes.",
         _least_imbalance("Least imbalance", cases),
         [Table("Imbalance by assignment", ["volume", "renderer", "partition", *run.distinct("assignment", part="assignment")], rows)],
+    )
+
+
+def _owners(run: Run, subjects: list[Subject]) -> Section:
+    rows, ratios = [], []
+    for volume, renderer in subjects:
+        for arrangement in run.distinct("assignment", part="owners", volume=volume, renderer=renderer):
+            for p in _shared(run, "owners", (volume, renderer)):
+                of = {"volume": volume, "renderer": renderer, "workers": p}
+                owned = {"part": "owners", "assignment": arrangement, **of}
+                counts = [run.value("count", variant=variant, **owned) for variant in ("boxes", "groups", "images")]
+                latency = run.value("latency", link=LINK, **owned)
+                ratio = latency.over(run.value("latency", part="default", link=LINK, **of))
+                ratios.append(ratio.value)
+                imbalance = run.value("imbalance", **owned)
+                rows.append([volume, renderer, arrangement, p, *counts, imbalance, latency, ratio])
+    answer = ""
+    if ratios:
+        answer = (
+            f"By the simulation, a frame of voxels that stay takes {number_text(min(ratios), 3)} to {number_text(max(ratios), 3)} times as "
+            f"long as one of boxes that are cut for the workers, in the median {number_text(statistics.median(ratios), 3)} times."
+        )
+    return Section(
+        "Voxels that stay with their owners",
+        "If processes hold voxels in parts of any shape, how many groups and images does an exact picture take, and how long?",
+        "As many owners as workers. The volume is divided into cells, 32 or a few more for each owner, of which each has those that the "
+        "arrangement gives it. Neighbours of one owner are one box. A group takes from each worker boxes that follow one another in "
+        "visibility order, and these become one image before it travels.",
+        answer,
+        [
+            Table(
+                "Owners",
+                "volume,renderer,arrangement,p,boxes,groups,images,imbalance,latency,latency / default".split(","),
+                rows,
+            )
+        ],
     )

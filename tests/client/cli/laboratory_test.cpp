@@ -11,7 +11,7 @@ bool Is(const std::vector<const char*>& words) { return IsOfLaboratory(words); }
 
 TEST(LaboratoryTest, TheFirstCommandDecides) {
   EXPECT_TRUE(Is({"bench"}));
-  EXPECT_TRUE(Is({"experiment", "replay", "render"}));
+  EXPECT_TRUE(Is({"experiment", "sweep", "render"}));
   EXPECT_TRUE(Is({"--log-level", "debug", "bench", "--list"}));
   EXPECT_TRUE(Is({"--log-level=debug", "--help", "experiment"}));
   EXPECT_FALSE(Is({}));
@@ -21,7 +21,7 @@ TEST(LaboratoryTest, TheFirstCommandDecides) {
 }
 
 TEST(LaboratoryTest, WhatIsAskedAboutItsCommandsIsItsOwnToAnswer) {
-  EXPECT_TRUE(Is({"help", "experiment", "replay"}));
+  EXPECT_TRUE(Is({"help", "experiment", "sweep"}));
   EXPECT_TRUE(Is({"options", "bench"}));
   EXPECT_TRUE(Is({"man", "bench"}));
   EXPECT_FALSE(Is({"help"}));

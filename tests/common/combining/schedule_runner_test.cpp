@@ -93,6 +93,12 @@ TEST(ScheduleRunner, EveryScheduleEndsAtItsRootsWhateverTheOrderOfEvents) {
       const auto ranks = random.Integer<Rank>(1, 14);
       ScheduleName name = {RandomArguments(scheme, random), ranks, std::vector<Rank>(random.Integer<std::size_t>(1, 5))};
       for (Rank& root : name.roots) root = random.Integer<Rank>(0, ranks - 1);
+      if (trial % 2 == 1) {
+        for (Rank rank = 0; rank < ranks; ++rank) {
+          if (rank == 0 || random.Chance(0.4)) name.runs.push_back(rank);
+        }
+        for (Rank& root : name.roots) root = *std::prev(std::ranges::upper_bound(name.runs, root));
+      }
       SCOPED_TRACE(name.scheme + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
       World world(random, Derive(name), random.Integer(1, 6));
       world.Run();
@@ -105,6 +111,20 @@ TEST(ScheduleRunner, EveryScheduleEndsAtItsRootsWhateverTheOrderOfEvents) {
       }
     }
   }
+}
+
+// As many images travel as there are runs; those of a run are combined first.
+TEST(DeriveSchedule, CombinesRunsBeforeTheScheme) {
+  const ScheduleName name = {"fan-in", 7, {3}, {0, 3, 5}};
+  const std::vector<Step>& steps = Derive(name)->steps();
+  std::vector<std::pair<Rank, Rank>> moves;
+  for (const Step& step : steps) moves.emplace_back(step.from, step.to);
+  EXPECT_EQ(moves, (std::vector<std::pair<Rank, Rank>>{{1, 0}, {4, 3}, {6, 5}, {2, 0}, {0, 3}, {5, 3}}));
+  EXPECT_EQ(AmongRuns(name), (ScheduleName{"fan-in", 3, {1}}));
+  // However many ranks and runs there are, messages can name the steps.
+  ScheduleName large = {"chain:strips=256", kMaxRanks, {0}, {}};
+  for (Rank first = 0; first < kMaxRanks; first += 16) large.runs.push_back(first);
+  EXPECT_LE(DeriveSchedule(large, {0, 1 << 24}).value()->steps().size(), kMaxSteps);
 }
 
 TEST(ScheduleRunner, ARankThatIsNotRenderedWaitsAndOneThatIsCombiningDoesNotSend) {
@@ -203,6 +223,11 @@ TEST(DeriveSchedule, SaysWhatIsWrongWithAName) {
   EXPECT_EQ(message({"fan-in", 2, {}}), "schedule.roots are 0, but must be from 1 to 64");
   EXPECT_EQ(message({"fan-in", 30000, std::vector<Rank>(60)}), "schedule.roots are 60, but at most 34 are allowed for 30000 ranks");
   EXPECT_EQ(message({"fan-in", kMaxRanks + 1, {0}}), "schedule.ranks is 65537, but at most 65536 are allowed");
+  EXPECT_EQ(message({"fan-in", 4, {0}, {0, 4}}), "schedule.runs must ascend from 0 and stay below 4");
+  EXPECT_EQ(message({"fan-in", 4, {0}, {1, 2}}), "schedule.runs must ascend from 0 and stay below 4");
+  EXPECT_EQ(message({"fan-in", 4, {0}, {0, 2, 2}}), "schedule.runs must ascend from 0 and stay below 4");
+  EXPECT_EQ(message({"fan-in", 0, {0}, {0}}), "schedule.runs must ascend from 0 and stay below 0");
+  EXPECT_EQ(message({"fan-in", 4, {1}, {0, 2}}), "schedule.roots has 1, but must be the first ranks of runs");
   EXPECT_NE(message({"glue", 2, {0}}).find("schedule.scheme: 'glue' is not one of"), std::string::npos);
   EXPECT_NE(message({"fan-in:2", 2, {0}}).find("takes nothing after its name"), std::string::npos);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
 #include <vector>
 
@@ -163,7 +164,10 @@ TEST(OwnersOf, LendsTheBoxesOfVacantSlotsEvenly) {
   for (const AssignmentEntry& assignment : Assignments()) {
     const Roster roster = {{11, 0, 13, 0, 15}};
     Layout layout;
-    layout.owners = assignment.assign({std::vector<double>(5 * 30, 1.0), 5});
+    const std::vector<double> costs(5 * 30, 1.0);
+    std::vector<std::uint32_t> holders(costs.size());  // each holds a box
+    std::iota(holders.begin(), holders.end(), 0U);
+    layout.owners = assignment.assign({.costs = costs, .slots = 5, .holders = holders, .holder_count = std::uint32_t(holders.size())});
     layout.owners.insert(layout.owners.begin() + 7, kNoSlot);
     const std::vector<WorkerId> owners = OwnersOf(layout, roster);
     ASSERT_EQ(owners.size(), layout.owners.size());

@@ -229,6 +229,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"fields", kMaxFields},
       {"of_volume", kMaxLevels},
       {"roots", kMaxShares},
+      {"runs", kMaxRanks},
       {"shares", kMaxShares},
       {"web", kMaxWebServers},
       {"looks", kMaxFields},
