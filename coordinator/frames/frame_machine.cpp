@@ -298,16 +298,22 @@ void FrameMachine::State::BeginAttempts() {
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
     if (!frame.AttemptDue(now) || AwaitsTrial(frame)) continue;
+    const std::string why = frame.WhyAgain();
     Status status = frame.BeginAttempt(roster.Refill(frame.roster()), HoldersOf(frame), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
       const Result<int> fit = FramesThatFit(frame.plan(), *frame.planned()->asked.resolved->summary, WorkerLimits());
-      if (fit.ok()) frame.SetFit(*fit);
-      status = fit.status();
+      if (fit.ok()) {
+        frame.SetFit(*fit);
+      } else {
+        status = {fit.status().code(), fmt::format("{} (attempt {}, since {})", fit.status().message(), frame.attempt(), why)};
+      }
     }
     if (!status.ok()) {
       FailFrame(frame, status);
     } else {
+      Tell(NoteAbout::kFrames, LogLevel::kWarning, "frame {} of client {}: attempt {}, since {}", frame.id(), frame.request().client,
+           frame.attempt(), why);
       SendProgress(frame);
     }
   }

@@ -101,6 +101,11 @@ bool RunningFrame::AttemptDue(Time now) const {
   return under_way()->handing_over && unfinished_groups() == 0;
 }
 
+std::string RunningFrame::WhyAgain() const {
+  const auto* const between = std::get_if<BetweenAttempts>(&state_);
+  return between != nullptr ? between->why : "workers are leaving";
+}
+
 RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
   CHECK(CanHandOut()) << "frame " << id_;
   if (unfinished_groups() == 0) last_progress_ = now;  // nothing was out: the wait begins here
@@ -254,7 +259,7 @@ Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_word, Time
   // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
   const bool died_of_it = last_word && *last_word > attempt_begin_;
   const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
-  state_ = BetweenAttempts{now, IsDisplay(worker) || display_in_doubt()};
+  state_ = BetweenAttempts{now, IsDisplay(worker) || display_in_doubt(), WorkerName(worker) + " is gone"};
   return status;
 }
 
@@ -284,7 +289,7 @@ WorkerId RunningFrame::WorkerForTrial(const Roster& roster, const std::set<Worke
 
 // Messages on the old connection may be lost, so another attempt sends all of them again. A worker that has done its part answers at once.
 void RunningFrame::OnReconnection(WorkerId worker, Time now) {
-  if (HasPart(worker) && !between_attempts()) state_ = BetweenAttempts{now};
+  if (HasPart(worker) && !between_attempts()) state_ = BetweenAttempts{now, false, WorkerName(worker) + " has another connection"};
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
@@ -306,27 +311,32 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
     return Status::Ok();
   }
   const Duration pause = message.elsewhere ? Duration::zero() : limits_.pause * stalls_;
-  return CountStall(reason, {now + pause, IsDisplay(message.worker)});
+  return CountStall(reason, now + pause, IsDisplay(message.worker));
 }
 
 Status RunningFrame::Expire(Time now) {
   if (between_attempts()) return Status::Ok();
   if (const std::optional<Suspicion> suspicion = under_way()->suspicion; suspicion && now >= suspicion->until) {
-    inability_ =
+    const Status reason =
         Status::Unavailable(WorkerName(suspicion->accuser) + " cannot reach " + WorkerName(suspicion->accused) + ", which is alive");
-    unable_.insert(CulpritOf(*suspicion));
-    return CountStall(inability_, {now});
+    if (const std::optional<WorkerId> culprit = CulpritOf(*suspicion)) {
+      inability_ = reason;
+      unable_.insert(*culprit);
+    }
+    return CountStall(reason, now);
   }
   if (waiting() && now >= last_progress_ + limits_.stall_timeout) {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.stall_timeout).count();
-    return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), {now});
+    return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), now);
   }
   return Status::Ok();
 }
 
-// Whoever had a part in more complaints; among equals the one that has not accumulated the frame, then the accused.
-WorkerId RunningFrame::CulpritOf(const Suspicion& suspicion) {
+// Nobody at first: a connection ends, too, if a busy machine takes nothing from it for some seconds, and then a new one is made. Else
+// whoever had a part in more complaints; among equals the one that has not accumulated the frame, then the accused.
+std::optional<WorkerId> RunningFrame::CulpritOf(const Suspicion& suspicion) {
   const int of_accused = ++complaints_[suspicion.accused], of_accuser = ++complaints_[suspicion.accuser];
+  if (of_accused == 1 && of_accuser == 1) return std::nullopt;
   if (of_accused != of_accuser) return of_accused > of_accuser ? suspicion.accused : suspicion.accuser;
   return suspicion.accused == plan_.display ? suspicion.accuser : suspicion.accused;
 }
@@ -338,12 +348,12 @@ void RunningFrame::Postpone(Duration duration) {
   under_way()->suspicion->until += duration;
 }
 
-Status RunningFrame::CountStall(const Status& reason, BetweenAttempts next) {
+Status RunningFrame::CountStall(const Status& reason, Time again, bool display_in_doubt) {
   if (++stalls_ >= limits_.max_stalls) {
     return Status(reason.code(), fmt::format("{} ({} of {} groups were done at attempt {}; {} failures in a row is the limit)",
                                              reason.message(), groups_done_, group_count(), attempt(), stalls_));
   }
-  state_ = next;
+  state_ = BetweenAttempts{again, display_in_doubt, reason.message()};
   return Status::Ok();
 }
 

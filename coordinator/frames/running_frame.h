@@ -93,6 +93,7 @@ class RunningFrame {
 
   bool AttemptDue(Time now) const;
   bool between_attempts() const { return std::holds_alternative<BetweenAttempts>(state_); }
+  std::string WhyAgain() const;  // of an attempt that is due: what ended the one before
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
   // changes; the Status is the last such worker's reason, or Unavailable if there is none. A `busy` worker does not try a suspect if there
   // is another worker for it.
@@ -142,6 +143,7 @@ class RunningFrame {
   struct BetweenAttempts {
     Time end;
     bool display_in_doubt;  // the next attempt begins with group 0
+    std::string why;
   };
   UnderWay* under_way() { return std::get_if<UnderWay>(&state_); }  // null: between attempts
   const UnderWay* under_way() const { return std::get_if<UnderWay>(&state_); }
@@ -158,8 +160,8 @@ class RunningFrame {
   bool IsNextOf(WorkerId worker) const;                          // it has a part in what is not handed out yet
   Status NoteDeath(WorkerId worker);
   WorkerId WorkerForTrial(const Roster& roster, const std::set<WorkerId>& busy) const;
-  Status CountStall(const Status& reason, BetweenAttempts next);
-  WorkerId CulpritOf(const Suspicion& suspicion);
+  Status CountStall(const Status& reason, Time again, bool display_in_doubt = false);
+  std::optional<WorkerId> CulpritOf(const Suspicion& suspicion);
 
   FrameId id_;
   OpenRequest request_;

@@ -474,6 +474,17 @@ TEST(CoordinatorNotes, TellWhatHappensOnceEach) {
   EXPECT_EQ(gone[0].level, LogLevel::kWarning);
 }
 
+TEST(CoordinatorNotes, SayWhyAFrameBeginsAgain) {
+  ScriptConfig config = TestConfig();
+  config.log_level = LogLevel::kWarning;
+  CoordinatorScript script(config);
+  const FakeWorker worker = script.Join(11, 1);
+  script.Join(12, 2);
+  const GroupAssignment group = HandedOut(script.Submit(kClient, Frame(1))).at(0);
+  const WorkerTrouble trouble{77, worker.id, group.key, 0, Status::ResourceExhausted("no memory"), true};
+  EXPECT_THAT(NotesOf(script.Worker(worker, trouble)), ElementsAre("frame 1 of client 21: attempt 2, since worker 1: no memory"));
+}
+
 TEST(CoordinatorNotes, AreNotMadeBelowTheLevelThatIsWanted) {
   ScriptConfig config = FilesConfig();
   config.log_level = LogLevel::kWarning;

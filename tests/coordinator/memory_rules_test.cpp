@@ -86,6 +86,7 @@ TEST_F(MemoryRules, WhatTheLossOfAWorkerMakesTooLargeFails) {
   const auto failed = ToClients<FrameFailed>(script.Kill(lost));
   ASSERT_THAT(failed, SizeIs(1));
   EXPECT_EQ(failed[0].message.status.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message.status.message(), testing::EndsWith("(attempt 2, since worker 1 is gone)"));
 }
 
 // ---------------------------------------------------------------- frames that end workers
