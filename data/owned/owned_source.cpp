@@ -90,7 +90,7 @@ class OwnedSource final : public VolumeSource {
     info_.version = XXH3_64bits(info_.owned.data(), info_.owned.size());
     for (std::uint32_t owner = 0; owner < of.field.owners.size(); ++owner) {
       if (const auto& memory = shared_->mapped[owner]; memory != nullptr) {
-        const std::vector<OwnedBox>& boxes = memory->layout().boxes;
+        const std::vector<HeldBox>& boxes = memory->layout().boxes;
         for (std::size_t i = 0; i < boxes.size(); ++i) {
           here_.Add(boxes[i].box, owner, i);
           ghosts_.Add(boxes[i].held, owner, i);

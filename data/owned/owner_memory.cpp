@@ -33,18 +33,18 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::uint64_t kPage = 4096;
 constexpr std::int64_t kMostStride = std::int64_t{1} << 40;  // so that no sum of steps within a volume overflows
 
-static_assert(std::atomic<double>::is_always_lock_free && sizeof(OwnerHeader) == 248 && sizeof(OwnedBox) == 80);
+static_assert(std::atomic<double>::is_always_lock_free && sizeof(OwnerHeader) == 248 && sizeof(HeldBox) == 80);
 
 std::uint64_t InPages(std::uint64_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
 std::uint64_t BeginOfSlot(std::size_t boxes, std::uint64_t slot_bytes, std::uint64_t slot) {
-  return InPages(sizeof(OwnerHeader) + boxes * sizeof(OwnedBox)) + slot * InPages(slot_bytes);
+  return InPages(sizeof(OwnerHeader) + boxes * sizeof(HeldBox)) + slot * InPages(slot_bytes);
 }
 
 }  // namespace
 
 void OwnerLayout::PlaceDense() {
   slot_bytes = 0;
-  for (OwnedBox& each : boxes) {
+  for (HeldBox& each : boxes) {
     const Index3 held = each.held.size();
     each.offset = slot_bytes;
     each.strides = {1, held.x, std::int64_t{held.x} * held.y};
@@ -65,7 +65,7 @@ Status OwnerLayout::Check() const {
     return wrong(fmt::format("{} slots of {} bytes, limit {} bytes", slots, slot_bytes, kMostOwnerBytes));
   }
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const OwnedBox& each = boxes[i];
+    const HeldBox& each = boxes[i];
     if (each.box.empty() || !each.held.Contains(each.box) || !Box{{}, size}.Contains(each.held)) {
       return wrong(fmt::format("box {} is empty, or not inside what is held of it, or that not inside the volume", i));
     }
@@ -98,7 +98,7 @@ Result<std::shared_ptr<OwnerMemory>> OwnerMemory::Create(std::uint64_t incarnati
   header.boxes = std::uint32_t(layout.boxes.size());
   header.slots = layout.slots;
   header.slot_bytes = layout.slot_bytes;
-  std::ranges::copy(layout.boxes, reinterpret_cast<OwnedBox*>(&header + 1));
+  std::ranges::copy(layout.boxes, reinterpret_cast<HeldBox*>(&header + 1));
   header.magic = kMagic;
   return owner;
 }
@@ -143,8 +143,8 @@ Result<std::shared_ptr<const MappedOwner>> MappedOwner::Open(const OwnerPlace& p
                      .slots = header.slots,
                      .slot_bytes = header.slot_bytes};
   const std::uint64_t boxes = header.boxes;
-  if (boxes > kMostOwnedBoxes || sizeof(OwnerHeader) + boxes * sizeof(OwnedBox) > memory->size()) return wrong("has too many boxes");
-  const auto* const first = reinterpret_cast<const OwnedBox*>(&header + 1);
+  if (boxes > kMostOwnedBoxes || sizeof(OwnerHeader) + boxes * sizeof(HeldBox) > memory->size()) return wrong("has too many boxes");
+  const auto* const first = reinterpret_cast<const HeldBox*>(&header + 1);
   layout.boxes.assign(first, first + boxes);
   if (Status status = layout.Check(); !status.ok()) return status;
   if (BeginOfSlot(boxes, layout.slot_bytes, layout.slots) > memory->size()) return wrong("is too short for its slots");
@@ -154,7 +154,7 @@ Result<std::shared_ptr<const MappedOwner>> MappedOwner::Open(const OwnerPlace& p
 }
 
 Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const {
-  const OwnedBox& from = layout_.boxes.at(box);
+  const HeldBox& from = layout_.boxes.at(box);
   CHECK(from.held.Contains(part)) << "voxels that the owner does not hold";
   const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
   const Index3 at = part.begin - from.held.begin;

@@ -1,7 +1,7 @@
 // OwnerMemory: where a process keeps the voxels of a volume that it owns, so that others of its host read them in place.
 //
 //   header    what is held (OwnerLayout), and for each slot its generation and time
-//   boxes     one OwnedBox after the other
+//   boxes     one HeldBox after the other
 //   slots     each has room for all boxes at one time, and begins at a page
 //
 // The owner writes a time into a slot while readers read another one. A slot's generation is odd while it is written and rises with each
@@ -27,19 +27,19 @@ inline constexpr std::size_t kMostOwnedBoxes = 4096;                      // of 
 inline constexpr std::uint32_t kMostOwnerSlots = 8;                       // at least 1
 inline constexpr std::uint64_t kMostOwnerBytes = std::uint64_t{1} << 40;  // of all slots
 
-struct OwnedBox {
+struct HeldBox {
   Box box;   // the voxels that it owns, not empty
   Box held;  // these, and copies of its neighbours' (ghosts); inside the volume
   // Of the samples of `held` in a slot: bytes to the first one, and samples from a voxel to the next along x, y and z, each at least 1.
   std::uint64_t offset = 0;
   std::array<std::int64_t, 3> strides = {};
-  friend bool operator==(const OwnedBox&, const OwnedBox&) = default;
+  friend bool operator==(const HeldBox&, const HeldBox&) = default;
 };
 
 struct OwnerLayout {
   SampleType samples = SampleType::kUint8;
   Index3 size;  // of the whole volume
-  std::vector<OwnedBox> boxes = {};
+  std::vector<HeldBox> boxes = {};
   std::uint32_t slots = 2;
   std::uint64_t slot_bytes = 0;
 

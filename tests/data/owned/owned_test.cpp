@@ -47,7 +47,7 @@ class OwnedVolumeOf {
     for (int owner = 0; owner < owners; ++owner) {
       OwnerLayout layout{.samples = SampleType::kFloat32, .size = size_};
       for (std::size_t i = std::size_t(owner); i < boxes.size(); i += std::size_t(owners)) {
-        OwnedBox& each = layout.boxes.emplace_back(OwnedBox{.box = boxes[i], .held = Grown(boxes[i], random.Integer(0, 2), Bounds())});
+        HeldBox& each = layout.boxes.emplace_back(HeldBox{.box = boxes[i], .held = Grown(boxes[i], random.Integer(0, 2), Bounds())});
         std::array<int, 3> order = {0, 1, 2};
         Shuffle(random, order);
         std::int64_t step = random.Integer(1, 2);
@@ -59,7 +59,7 @@ class OwnedVolumeOf {
         layout.slot_bytes += std::uint64_t(step) * sizeof(float);
       }
       volume.boxes.emplace_back();
-      for (const OwnedBox& each : layout.boxes) volume.boxes.back().push_back(each.box);
+      for (const HeldBox& each : layout.boxes) volume.boxes.back().push_back(each.box);
       const std::uint64_t incarnation = random.Integer<std::uint64_t>(1, 1ULL << 60);
       memory.push_back(OwnerMemory::Create(incarnation, layout).value());
       layouts_.push_back(layout);
@@ -90,7 +90,7 @@ class OwnedVolumeOf {
 
   void Write(std::size_t owner, std::uint32_t slot, std::uint64_t time) {
     const std::span<std::byte> bytes = memory[owner]->Begin(slot);
-    for (const OwnedBox& each : layouts_[owner].boxes) {
+    for (const HeldBox& each : layouts_[owner].boxes) {
       auto* const samples = reinterpret_cast<float*>(bytes.data() + each.offset);
       const Box& held = each.held;
       for (std::int32_t z = held.begin.z; z < held.end.z; ++z) {
