@@ -4,12 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "common/volume/box.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMaxSourceBytes = std::size_t{128} << 10;  // 4096 owners
+
+inline constexpr std::string_view kOwnersMark = "owned:";  // how the text of owners begins
+inline bool NamesOwners(std::string_view source) { return source.starts_with(kOwnersMark); }
 
 struct StoredAt {
   std::string source;         // an absolute path, perhaps with options for reading it, or owners (data/owned/owned_source.h)

@@ -22,8 +22,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::string_view kMark = "owned:";
-
 // The text up to the next `end`, which is taken away with it; nullopt: there is none.
 std::optional<std::string_view> TakeUpTo(std::string_view& text, char end) {
   const std::size_t at = text.find(end);
@@ -87,6 +85,13 @@ class OwnedSource final : public VolumeSource {
              .exact = of.exact,
              .growth = of.growth};
     info_.owned = of.field.Text();
+    if (!of.boxes.empty()) {
+      OwnedBoxes owned;
+      for (std::uint32_t owner = 0; owner < of.boxes.size(); ++owner) {
+        for (const Box& box : of.boxes[owner]) owned.push_back({box, owner});
+      }
+      info_.levels.front().owned = std::make_shared<const OwnedBoxes>(std::move(owned));
+    }
     info_.version = XXH3_64bits(info_.owned.data(), info_.owned.size());
     for (std::uint32_t owner = 0; owner < of.field.owners.size(); ++owner) {
       if (const auto& memory = shared_->mapped[owner]; memory != nullptr) {
@@ -197,10 +202,8 @@ std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& fiel
 
 }  // namespace
 
-bool NamesOwners(const std::string& source) { return source.starts_with(kMark); }
-
 std::string OwnedField::Text() const {
-  std::string text = fmt::format("{}{}:{:x}:", kMark, dataset, time);
+  std::string text = fmt::format("{}{}:{:x}:", kOwnersMark, dataset, time);
   std::uint64_t scope = 0;
   for (const OwnerPlace& owner : owners) {
     if (owner.scope != std::exchange(scope, owner.scope)) text += fmt::format("@{:x}.", owner.scope);
@@ -212,8 +215,8 @@ std::string OwnedField::Text() const {
 Result<OwnedField> OwnedField::Parse(const std::string& text) {
   const auto wrong = [] { return Status::InvalidArgument("a source of owners that nobody has written"); };
   std::string_view rest = text;
-  if (!rest.starts_with(kMark)) return wrong();
-  rest.remove_prefix(kMark.size());
+  if (!rest.starts_with(kOwnersMark)) return wrong();
+  rest.remove_prefix(kOwnersMark.size());
   OwnedField field;
   const std::optional<std::string_view> name = TakeUpTo(rest, ':');
   if (!name || !CheckDatasetName(std::string(*name)).ok() || !TakeNumber(rest, ':', field.time)) return wrong();

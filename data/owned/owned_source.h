@@ -30,7 +30,6 @@ struct OwnedField {
   static Result<OwnedField> Parse(const std::string& text);
   friend bool operator==(const OwnedField&, const OwnedField&) = default;
 };
-bool NamesOwners(const std::string& source);
 
 // Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest. Calls `done` once, on any thread, which it must
 // not hold up.
