@@ -173,7 +173,7 @@ struct Owners::State {
     const std::uint32_t number = m.owner;
     std::optional<Owner>& owner = field.places[number].owner;
     const bool changed = !owner || owner->registered != m;
-    if (!owner) owner = Owner{.peer = from, .registered = {}, .heard = now, .answered = now, .out = {}};
+    if (!owner) owner.emplace().peer = from;
     if (owner->peer != from) {  // another connection: what is out may be lost
       peers.erase(owner->peer);
       owner->peer = from;
