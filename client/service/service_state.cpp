@@ -173,8 +173,10 @@ const char* Variable(const char* name) {
 Result<ServiceAddress> AddressIn(const std::string& path) {
   const Result<ServiceFile> file = ReadServiceFile(path);
   if (!file.ok()) return file.status();
-  if (file->role == Role::kWorker)
-    return Status::InvalidArgument(fmt::format("service file '{}' is of role worker, but client or admin is needed here", path));
+  if (!IsOfClients(file->role)) {
+    return Status::InvalidArgument(
+        fmt::format("service file '{}' is of role {}, but client or admin is needed here", path, NameOf(file->role)));
+  }
   return ServiceAddress(file->endpoint, file->keys());
 }
 

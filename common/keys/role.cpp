@@ -6,6 +6,7 @@ std::string_view NameOf(Role role) {
   switch (role) {
     case Role::kClient: return "client";
     case Role::kWorker: return "worker";
+    case Role::kOwner: return "owner";
     case Role::kAdmin: break;
   }
   return "admin";

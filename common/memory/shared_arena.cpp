@@ -1,30 +1,18 @@
 #include "common/memory/shared_arena.h"
 
-#include <fcntl.h>
-#include <linux/magic.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
-#include <sys/vfs.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <iterator>
 #include <random>
 #include <string>
 
 #include "common/base/check.h"
-#include "common/files/file_descriptor.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x534c41424152454eULL;  // "SLABAREN"
-
-Status SystemError(StatusCode code, const char* what) {
-  return {code, std::string("shared memory: ") + what + ": " + std::strerror(errno)};
-}
 
 std::uint64_t RandomNumber() {
   std::random_device device;
@@ -36,47 +24,20 @@ std::size_t RoundedUp(std::size_t bytes) { return (bytes + kBlockAlignment - 1) 
 
 }  // namespace
 
-std::uint64_t SharedMemoryScope() {
-  std::ifstream boot("/proc/sys/kernel/random/boot_id");
-  std::string text;
-  struct stat pid_namespace {};
-  if (!std::getline(boot, text) || ::stat("/proc/self/ns/pid", &pid_namespace) != 0) return 0;
-  text += '/' + std::to_string(pid_namespace.st_dev) + '/' + std::to_string(pid_namespace.st_ino);
-  std::uint64_t key = 0xcbf29ce484222325ULL;  // FNV-1a, 64 bits
-  for (const char c : text) key = (key ^ std::uint8_t(c)) * 0x100000001b3ULL;
-  return key == 0 ? 1 : key;
-}
-
 // ---------------------------------------------------------------- the owner
 
 Result<std::unique_ptr<SharedArena>> SharedArena::Create() {
-  FileDescriptor file(::memfd_create("slabstream", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-  if (file.number() < 0) return SystemError(StatusCode::kUnavailable, "memfd_create");
-  if (::ftruncate(file.number(), off_t(kArenaBytes)) != 0) return SystemError(StatusCode::kUnavailable, "ftruncate");
-  // The file never shrinks under a reader's mapping.
-  if (::fcntl(file.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
-    return SystemError(StatusCode::kUnavailable, "sealing");
-  }
-  void* const base = ::mmap(nullptr, kArenaBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_NORESERVE, file.number(), 0);
-  if (base == MAP_FAILED) return SystemError(StatusCode::kUnavailable, "mmap");
-  (void)::madvise(base, kArenaBytes, MADV_DONTDUMP);
-  return std::unique_ptr<SharedArena>(new SharedArena(file.Release(), static_cast<std::byte*>(base), RandomNumber()));
+  Result<SealedMemory> memory = SealedMemory::Create(kArenaBytes);
+  if (!memory.ok()) return memory.status();
+  return std::unique_ptr<SharedArena>(new SharedArena(*std::move(memory), RandomNumber()));
 }
 
-SharedArena::SharedArena(int file_descriptor, std::byte* base, std::uint64_t id)
-    : file_descriptor_(file_descriptor),
-      base_(base),
-      name_{id, std::uint32_t(::getpid()), std::uint32_t(file_descriptor)},
-      last_generation_(RandomNumber()) {
+SharedArena::SharedArena(SealedMemory memory, std::uint64_t id)
+    : memory_(std::move(memory)), name_{id, std::uint32_t(::getpid()), memory_.file_descriptor()}, last_generation_(RandomNumber()) {
   header().magic = kMagic;
   header().id = id;
   free_[sizeof(ArenaHeader)] = kArenaBytes - sizeof(ArenaHeader);
   for (std::uint32_t slot = kArenaSlots; slot-- > 0;) free_slots_.push_back(slot);
-}
-
-SharedArena::~SharedArena() {
-  ::munmap(base_, kArenaBytes);
-  ::close(file_descriptor_);
 }
 
 void* SharedArena::Take(std::size_t bytes) {
@@ -137,34 +98,14 @@ BlockName SharedArena::NameOf(const void* block) const {
 // ---------------------------------------------------------------- a reader
 
 Result<std::shared_ptr<const MappedArena>> MappedArena::Open(const ArenaName& name) {
-  const std::string path = "/proc/" + std::to_string(name.pid) + "/fd/" + std::to_string(name.file_descriptor);
-  // Check before opening: opening a pipe or a device has side effects.
-  struct stat found {};
-  if (::stat(path.c_str(), &found) != 0) {
-    return SystemError(errno == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable, path.c_str());
+  Result<SealedMemory> memory = SealedMemory::Open(name.pid, name.file_descriptor, kArenaBytes, kArenaBytes);
+  if (!memory.ok()) return memory.status();
+  const auto* header = reinterpret_cast<const ArenaHeader*>(memory->data());
+  if (header->magic != kMagic || header->id != name.id) {
+    return Status::InvalidArgument("shared memory: " + PlaceOfMemory(name.pid, name.file_descriptor) + " is another one");
   }
-  if (!S_ISREG(found.st_mode) || found.st_size != off_t(kArenaBytes)) return Status::InvalidArgument("shared memory: " + path + " is none");
-  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (file.number() < 0) return SystemError(errno == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable, path.c_str());
-  const int seals = ::fcntl(file.number(), F_GET_SEALS);
-  if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || ::fstat(file.number(), &found) != 0 || found.st_size != off_t(kArenaBytes)) {
-    return Status::InvalidArgument("shared memory: " + path + " is none");
-  }
-  // One of huge pages, of which there may be none left, would end this process when it is read.
-  struct statfs system {};
-  if (::fstatfs(file.number(), &system) != 0 || system.f_type != TMPFS_MAGIC) {
-    return Status::InvalidArgument("shared memory: " + path + " is none");
-  }
-  void* const base = ::mmap(nullptr, kArenaBytes, PROT_READ, MAP_SHARED | MAP_NORESERVE, file.number(), 0);
-  if (base == MAP_FAILED) return SystemError(StatusCode::kUnavailable, "mmap");
-  (void)::madvise(base, kArenaBytes, MADV_DONTDUMP);
-  std::shared_ptr<const MappedArena> arena(new MappedArena(static_cast<const std::byte*>(base)));
-  const auto* header = static_cast<const ArenaHeader*>(base);
-  if (header->magic != kMagic || header->id != name.id) return Status::InvalidArgument("shared memory: " + path + " is another one");
-  return arena;
+  return std::shared_ptr<const MappedArena>(new MappedArena(*std::move(memory)));
 }
-
-MappedArena::~MappedArena() { ::munmap(const_cast<std::byte*>(base_), kArenaBytes); }
 
 const std::byte* MappedArena::Find(const BlockName& block, std::uint64_t bytes) const {
   const bool fits = block.slot < kArenaSlots && block.offset >= sizeof(ArenaHeader) && block.offset % kBlockAlignment == 0 &&

@@ -13,9 +13,11 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/memory/sealed_memory.h"
 
 namespace slabstream {
 
@@ -37,10 +39,6 @@ inline constexpr std::size_t kBlockAlignment = 4096;               // bytes: a p
 inline constexpr std::uint32_t kArenaSlots = 8190;                 // blocks at a time
 inline constexpr std::size_t kArenaBytes = std::size_t{64} << 30;  // addresses of an arena; memory is taken when it is written
 
-// Key of the space in which process ids and their descriptors can be looked up: the running kernel and the process id namespace. Two
-// processes with different keys cannot open each other's arenas. 0: unknown, for instance without /proc.
-std::uint64_t SharedMemoryScope();
-
 struct ArenaHeader {
   std::uint64_t magic;
   std::uint64_t id;
@@ -53,7 +51,6 @@ class SharedArena {
  public:
   // Unavailable: the system has no such memory to give.
   static Result<std::unique_ptr<SharedArena>> Create();
-  ~SharedArena();
   SharedArena(const SharedArena&) = delete;
   SharedArena& operator=(const SharedArena&) = delete;
 
@@ -70,7 +67,7 @@ class SharedArena {
   BlockName NameOf(const void* block) const;  // a block that is taken
 
  private:
-  SharedArena(int file_descriptor, std::byte* base, std::uint64_t id);
+  SharedArena(SealedMemory memory, std::uint64_t id);
   ArenaHeader& header() { return *reinterpret_cast<ArenaHeader*>(base_); }
 
   struct Block {
@@ -78,8 +75,8 @@ class SharedArena {
     std::uint32_t slot = 0;
     std::uint64_t generation = 0;
   };
-  const int file_descriptor_;
-  std::byte* const base_;
+  const SealedMemory memory_;
+  std::byte* const base_ = memory_.data();
   const ArenaName name_;
   std::uint64_t last_generation_;
   std::map<std::size_t, std::size_t> free_;  // offset -> bytes, no two adjacent
@@ -93,7 +90,6 @@ class MappedArena {
   // NotFound: there is no such arena. Unavailable: it may not be opened. InvalidArgument: there is something else, or another
   // arena. Never opens, reads or waits for anything else.
   static Result<std::shared_ptr<const MappedArena>> Open(const ArenaName& name);
-  ~MappedArena();
   MappedArena(const MappedArena&) = delete;
   MappedArena& operator=(const MappedArena&) = delete;
 
@@ -103,8 +99,9 @@ class MappedArena {
   bool Holds(const BlockName& block) const;
 
  private:
-  explicit MappedArena(const std::byte* base) : base_(base) {}
-  const std::byte* const base_;
+  explicit MappedArena(SealedMemory memory) : memory_(std::move(memory)) {}
+  const SealedMemory memory_;
+  const std::byte* const base_ = memory_.data();
 };
 
 }  // namespace slabstream

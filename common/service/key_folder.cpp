@@ -99,7 +99,7 @@ const AdmittedKey* KeyFolder::Find(const std::string& public_key) const {
 
 Status KeyFolder::WriteFile(Role role, const KeyPair& own, const std::string& made) const {
   return WriteServiceFile(FileOf(role), {.role = role,
-                                         .endpoint = role == Role::kWorker ? service_.worker_endpoint : service_.client_endpoint,
+                                         .endpoint = IsOfClients(role) ? service_.client_endpoint : service_.worker_endpoint,
                                          .server_key = server_.public_key,
                                          .own = own,
                                          .epoch = service_.epoch,
@@ -133,7 +133,7 @@ Result<AdmittedKey> KeyFolder::Rotate(Role role) {
 }
 
 Result<AdmittedKey> KeyFolder::Issue(const std::string& public_key, Role role, const std::string& name) {
-  if (role == Role::kWorker) return Status::InvalidArgument("a key with a name is of role client or admin; workers share worker.json");
+  if (!IsOfClients(role)) return Status::InvalidArgument("a key with a name is of role client or admin; others share the file of their role");
   if (!IsHolderName(name)) {
     return Status::InvalidArgument(
         fmt::format("name '{}' must be 1 to {} bytes of printable text that can name a file: no '/', no '.' at the beginning",

@@ -68,7 +68,7 @@ Result<ServiceFile> ReadServiceFile(const std::string& path) {
   Reader reader(path, *json);
   ServiceFile file;
   const std::optional<Role> role = FindRole(reader.Text("role"));
-  if (!role) reader.Complain("role", "is not client, worker or admin");
+  if (!role) reader.Complain("role", "is not client, worker, admin or owner");
   file.role = role.value_or(Role::kClient);
   file.endpoint = reader.Text("endpoint");
   if (const auto endpoint = ParseEndpoint(file.endpoint, false); !endpoint.ok()) reader.Complain("endpoint", endpoint.status().message());

@@ -13,7 +13,7 @@ namespace slabstream {
 
 struct ServiceFile {
   Role role = Role::kClient;
-  std::string endpoint;     // the endpoint of the plane that the role uses: the workers' for workers, else the clients'
+  std::string endpoint;     // the endpoint of the plane that the role uses: the workers' for workers and owners, else the clients'
   std::string server_key;   // the coordinator's public key
   KeyPair own;              // the role's own keys
   std::uint64_t epoch = 0;  // the epoch of the coordinator that wrote the file last

@@ -150,6 +150,8 @@ Result<Messages> Decode(std::span<const std::byte> header, std::size_t payload_b
 template Result<AnyMessage> Decode(std::span<const std::byte>);
 template Result<WorkerToCoordinator> Decode(std::span<const std::byte>, std::size_t);
 template Result<CoordinatorToWorker> Decode(std::span<const std::byte>, std::size_t);
+template Result<ToControl> Decode(std::span<const std::byte>, std::size_t);
+template Result<CoordinatorToOwner> Decode(std::span<const std::byte>, std::size_t);
 template Result<WorkerToVoxels> Decode(std::span<const std::byte>, std::size_t);
 template Result<VoxelsToWorker> Decode(std::span<const std::byte>, std::size_t);
 template Result<WorkerToWorker> Decode(std::span<const std::byte>, std::size_t);

@@ -19,6 +19,7 @@
 #include "common/wire/client_messages.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
+#include "common/wire/owner_messages.h"
 #include "common/wire/picture_messages.h"
 #include "common/wire/voxel_messages.h"
 
@@ -27,8 +28,8 @@ namespace slabstream {
 inline constexpr std::uint32_t kWireVersion = 3;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToVoxels, VoxelsToWorker, WorkerToWorker, WorkerToClient,
-                          ClientToCoordinator, CoordinatorToClient>;
+using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, OwnerMessage, WorkerToVoxels, VoxelsToWorker, WorkerToWorker,
+                          WorkerToClient, ClientToCoordinator, CoordinatorToClient>;
 
 // A message where it is: itself, or in a variant of messages.
 class MessageView {

@@ -100,6 +100,11 @@ void Rules(const AddVolume& m, Checker& check) {
       m.labels, [](const NewLabel& label) { return label.value; }, check);
 }
 
+void Rules(const RegisterOwner& m, Checker& check) {
+  check.That(!IsOfLabels(m.description.type), "description.type", "one of labels");
+  check.That(m.owner < m.owners, "owner", "not below owners");
+}
+
 void Rules(const VolumeCredit& m, Checker& check) {
   check.Range("allowed", m.allowed, m.received, std::numeric_limits<std::uint64_t>::max());
 }

@@ -54,6 +54,7 @@ void Rules(const ViewQuery&, Checker&);
 void Rules(const AddVolume&, Checker&);
 void Rules(const SentFile&, Checker&);
 void Rules(const VolumeCredit&, Checker&);
+void Rules(const RegisterOwner&, Checker&);
 
 // Each number is finite and above 0.
 void CheckPositive(std::string_view field, const Vec3& v, Checker& check);

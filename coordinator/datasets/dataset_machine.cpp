@@ -577,6 +577,8 @@ std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time 
 
 Time DatasetMachine::NextWake() const { return state_->NextWake(); }
 
+Status DatasetMachine::NameIsFree(const std::string& name) const { return state_->NameIsFree(name); }
+
 DatasetSizes DatasetMachine::sizes() const {
   State& state = *state_;
   std::size_t awaited = 0;

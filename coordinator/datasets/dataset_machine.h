@@ -15,6 +15,8 @@
 //   uploads    A client may send a dataset (AddVolume): it is admitted if its name is free and the memory suffices, its bytes come in order
 //              within a credit, and the executor stores them. It is a dataset once they are all there. If the client falls silent, gives
 //              it up or sends anything else than the next bytes, nothing stays.
+//   owned      Other processes hold the voxels of a dataset at a time (OwnedData). It is a dataset whose files change with each time. While
+//              nobody waits for it, an older time is given up, so that its memory may be overwritten.
 //
 // What the executor must do: call Step(DatasetTick) no later than NextWake(); carry out the actions in order; answer LoadDataset,
 // CheckDatasetFiles, CheckWatchedFolders, FindDatasets, AnswerQuestion, BeginUpload and FinishUpload with one event each, in any order.
@@ -23,6 +25,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -126,9 +129,17 @@ struct UploadFinished {
   UploadId upload = 0;
   Result<DataSource> source;
 };
+// Processes hold the voxels of a dataset, and something has changed: it has come, they have all left, or (neither) it has another time, or
+// an owner was lost or is there again.
+struct OwnedData {
+  std::string name;
+  std::optional<DataSource> came = {};
+  bool left = false;
+};
 struct DatasetTick {};
-using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetOpened, DatasetReading, DatasetFailed,
-                                  DatasetSeen, FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
+using DatasetEvent =
+    std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetOpened, DatasetReading, DatasetFailed, DatasetSeen, FoldersSeen,
+                 DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, OwnedData, DatasetTick>;
 
 // ---- actions
 // -> DatasetLoaded, DatasetOpened or DatasetFailed
@@ -219,6 +230,7 @@ class DatasetMachine {
   Time NextWake() const;  // Time::max(): nothing happens by itself
   DatasetSizes sizes() const;
   DatasetCounts counts() const;
+  Status NameIsFree(const std::string& name) const;  // InvalidArgument: a dataset of the catalogue has it
 
  private:
   struct State;

@@ -86,6 +86,17 @@ void DatasetMachine::State::RemoveData(const std::string& name, const std::strin
   Lose(name, removed);
 }
 
+void DatasetMachine::State::On(const OwnedData& event) {
+  if (event.came) {
+    if (!datasets.IsListed(event.name)) AddData(event.name, *event.came);
+    return;
+  }
+  const DatasetTable::Entry* const entry = datasets.Find(event.name);
+  if (entry == nullptr || !entry->source.open) return;  // an admin has removed it
+  if (event.left) return RemoveData(event.name, "its owners have left");
+  if (entry->state == DatasetState::kReady && !IsWanted(event.name)) datasets.Reset(event.name, now);
+}
+
 void DatasetMachine::State::StopWatching(const std::string& folder) {
   datasets.folders.erase(folder);
   complaints.erase(folder);

@@ -131,6 +131,7 @@ struct DatasetMachine::State {
   void On(const QuestionAnswered& event);
   void On(const UploadBegun& event);
   void On(const UploadFinished& event);
+  void On(const OwnedData& event);
   void On(const DatasetTick&) {}
 
   // ---- messages of clients

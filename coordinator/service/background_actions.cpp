@@ -201,7 +201,7 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
 }
 
 // Holds the voxels of the level if there is room for them. Those of an adaptive mesh stay where they are: most of a fine level would be
-// interpolated.
+// interpolated. So do those that other processes hold.
 Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell) {
   const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
   const auto bytes = std::uint64_t(description.voxel_bytes());
@@ -215,8 +215,8 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
       !SchemeOf(at.stored.source).empty() ? std::min(action.most_bytes, std::uint64_t(kFarSurvey.exact)) : action.most_bytes;
   VoxelServer::Samples samples;
   VolumeSummary summary;
-  const bool adaptive = at.source->info().levels.front().refined != nullptr;
-  if (!adaptive && with_coarser <= most / std::uint64_t(at.times) && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+  const bool stays = at.source->info().levels.front().refined != nullptr || !at.source->info().owned.empty();
+  if (!stays && with_coarser <= most / std::uint64_t(at.times) && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     ReadProgress progress(tell);
     const Result<LevelInMemory> level = at.source->ReadLevel(at.stored.level, &progress);
     // If its files have changed, the look that requests wait for sees that, and everything is opened anew.

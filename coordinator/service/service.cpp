@@ -22,6 +22,7 @@
 #include "common/transport/endpoint.h"
 #include "common/wire/other_version.h"
 #include "coordinator/service/coordinator_metrics.h"
+#include "coordinator/service/owners.h"
 #include "coordinator/service/peer_table.h"
 #include "coordinator/service/service_keys.h"
 #include "coordinator/service/voxel_server.h"
@@ -71,13 +72,18 @@ struct CoordinatorService::Impl {
         control(std::move(control_socket)),
         voxels(std::move(voxel_server)),
         background(std::move(service_options.make_plan), std::move(service_options.count_occupied), *voxels),
+        owners(
+            service_options.machine.epoch, [this](const std::string& name) { return datasets.NameIsFree(name); },
+            [this] { background.wakeup().Notify(); }),
         metrics(service_options.machine.memory_bytes) {}
 
   void Run();
   void Loop();
   void HandleEvent(CoordinatorEvent event);  // and what follows from it
   void ReceiveFromClients();
-  void ReceiveFromWorkers();
+  void ReceiveFromWorkers();  // and owners
+  void Hear(const Incoming& incoming, ToControl& message, Role role);
+  void Follow(Owners::News news);
   // True: a program of another version wrote the message. Its sender hears our version, so that both sides say both.
   bool AnswerOtherVersion(Socket& socket, const Incoming& incoming, Plane plane);
   // Tell the sender of a message that cannot be decoded, as far as it can be told. A refused request whose id can be read has an answer,
@@ -126,6 +132,7 @@ struct CoordinatorService::Impl {
   std::unique_ptr<VoxelServer> voxels;
   std::deque<CoordinatorEvent> following;  // what actions led to: heard after all actions of the event at hand
   BackgroundActions background;            // its wakeup also signals stop_requested
+  Owners owners;
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
   bool stop_now = false;  // a machine said so
@@ -168,6 +175,7 @@ void CoordinatorService::Impl::Loop() {
     ReceiveFromWorkers();
     ReceiveFromClients();
     const Time now = MonotonicNow();
+    Follow(owners.Tend(now));
     if (frames.NextWake() <= now) HandleEvent(CoordinatorTick{});
     if (datasets.NextWake() <= now) HandleEvent(DatasetTick{});
     if (stop_requested && stop_deadline == Time::max()) {
@@ -261,18 +269,40 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
     if (!incoming) return;
-    if (!RoleOf(*incoming)) continue;
-    Bytes payload = incoming->payload();
-    Result<WorkerToCoordinator> message =
-        Guarded("decoding", [&] { return Decode<WorkerToCoordinator>(incoming->header(), payload.size()); });
+    const std::optional<Role> role = RoleOf(*incoming);
+    if (!role) continue;
+    Result<ToControl> message = Guarded("decoding", [&] { return Decode<ToControl>(incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
       // Guarded, as decoding is: a message that nobody understands must not end the service.
       const Status refused = Guarded("refusing", [&] { RefuseWorker(*incoming, message.status()); });
       if (!refused.ok()) complaints.Warning("control plane: " + refused.message());
       continue;
     }
-    HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});
+    Hear(*incoming, *message, *role);
   }
+}
+
+void CoordinatorService::Impl::Hear(const Incoming& incoming, ToControl& message, Role role) {
+  const Time now = MonotonicNow();
+  std::visit(
+      [&]<class Message>(Message& each) {
+        constexpr bool of_worker = std::constructible_from<WorkerToCoordinator, Message>;
+        if (role == (of_worker ? Role::kOwner : Role::kWorker)) {
+          return complaints.Warning(fmt::format("control plane: {} needs a key of another role than {}", NameOf(each), NameOf(role)));
+        }
+        const PeerToken from = worker_peers.Heard(incoming.identity, now);
+        if constexpr (of_worker) {
+          HandleEvent(FromWorker{from, std::move(each), incoming.payload()});
+        } else {
+          Follow(owners.Hear(from, std::move(each), incoming.payload(), now));
+        }
+      },
+      message);
+}
+
+void CoordinatorService::Impl::Follow(Owners::News news) {
+  for (const auto& [owner, message] : news.messages) Send<WorkerGone>(control, worker_peers, std::span(&owner, 1), message, {});
+  for (OwnedData& data : news.datasets) HandleEvent(std::move(data));
 }
 
 void CoordinatorService::Impl::ReceiveFromClients() {

@@ -30,7 +30,8 @@ Status ServiceKeys::Publish(const std::string& client_endpoint, const std::strin
 void ServiceKeys::Admit() {
   Authenticator& authenticator = context_->authenticator();
   authenticator.AdmitOnly(NameOfPlane(Plane::kClient), folder_.KeysOf({Role::kClient, Role::kAdmin}));
-  for (const Plane plane : {Plane::kControl, Plane::kVoxels}) authenticator.AdmitOnly(NameOfPlane(plane), folder_.KeysOf({Role::kWorker}));
+  authenticator.AdmitOnly(NameOfPlane(Plane::kControl), folder_.KeysOf({Role::kWorker, Role::kOwner}));
+  authenticator.AdmitOnly(NameOfPlane(Plane::kVoxels), folder_.KeysOf({Role::kWorker}));
 }
 
 std::optional<Role> ServiceKeys::RoleOf(const Incoming& incoming) {

@@ -253,7 +253,9 @@ Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::strin
     auto known = std::make_shared<const VolumeSummary>(UnreadSummary(source->info().finest(), *statistics));
     return ReadableSource(OpenedSource{std::move(source), {0, true, std::move(known)}, std::move(place), nullptr, std::move(index)});
   }
-  Result<Survey> survey = SurveySource(*source, !SchemeOf(place).empty() ? kFarSurvey : SurveyBytes(), &progress);
+  // Each time of what others hold is surveyed, and perhaps they are far.
+  const bool far = !SchemeOf(place).empty() || !source->info().owned.empty();
+  Result<Survey> survey = SurveySource(*source, far ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
   if (labels != nullptr) {
     VolumeSummary with_labels = *survey->summary;
@@ -302,7 +304,8 @@ Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, c
 }
 
 // Other processes may run in other folders.
-std::string PlaceOf(const DataSource& data, const SourceText& text) {
+std::string PlaceOf(const DataSource& data, const SourceText& text, const SourceInfo& info) {
+  if (!info.owned.empty()) return info.owned;
   return IsUrl(text.path) ? data.path : fs::absolute(text.path).string() + text.options_text;
 }
 
@@ -323,10 +326,10 @@ Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uin
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
   text->options.describe = true;
-  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(text->path, text->options, ProcessReadContext(), beside);
+  const auto opened = data.open ? data.open() : OpenSource(text->path, text->options, ProcessReadContext(), beside);
   if (!opened.ok()) return opened.status();
   std::shared_ptr<VolumeSource> source = *opened;
-  std::string place = PlaceOf(data, *text);
+  std::string place = PlaceOf(data, *text, source->info());
   const bool labels_alone = source->info().labels && MayRoundLabels(source->info().exact.type);
   if (!data.is_field && data.labels == nullptr && labels_alone) {
     source = AsHollow(source);
@@ -336,7 +339,7 @@ Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uin
   const SourceInfo& info = source->info();
   WayToRead way{source, info.files, {}};
   const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
-  const bool is_large = info.levels.size() > 1 || info.finest().voxel_bytes() > most;
+  const bool is_large = info.levels.size() > 1 || info.finest().voxel_bytes() > most || !info.owned.empty();
   const bool labels = text->options.labels;
   // Their files; they are read again, with the voxels, once their stamp is taken.
   const Result<FoundColors> colors = labels ? ReadLabelColors(text->path, data.label_colors) : Result<FoundColors>(FoundColors());
@@ -524,6 +527,10 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     const Result<std::uint64_t> version = VersionOf(opened.files);
     if (!opened.files.empty() && (!version.ok() || *version != opened.version)) continue;  // they have changed since it was opened
     Result<ReadableSource> read = way->read();
+    if (!read.ok() && opened.growth != nullptr) {
+      const Result<bool> grown = HaveChanged(*opened.growth);
+      if (grown.ok() && *grown) continue;
+    }
     auto* const loaded = read.ok() ? std::get_if<LoadedSource>(&*read) : nullptr;
     if (loaded != nullptr && opened.in_parts()) loaded->source = way->source;
     if (read.ok()) AddOtherTimes(source, *read);

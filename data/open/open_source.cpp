@@ -13,6 +13,7 @@
 #include "data/open/file_times.h"
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
+#include "data/owned/owned_source.h"
 #include "data/positional/file_source.h"
 #include "data/sources/even_source.h"
 #include "data/sources/hollow_source.h"
@@ -171,6 +172,11 @@ Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const 
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, const SourceContext& context) {
+  if (NamesOwners(stored.source)) {
+    Result<std::shared_ptr<VolumeSource>> source = OpenOwned(stored.source, context);
+    return !source.ok() || IsSame((*source)->info(), stored) ? source
+                                                             : Status::Unavailable("owners of another volume than the coordinator's");
+  }
   Result<SourceText> text = ParseSourceText(stored.source);
   if (!text.ok()) return text.status();
   text->options.describe = true;

@@ -80,6 +80,7 @@ struct SourceInfo {
   // Where more times may come: the state of the folder of such files before they were counted, or of a store behind an address. Null:
   // `files` tell.
   std::shared_ptr<const FileStamp> growth = {};
+  std::string owned = {};                 // others hold its voxels (data/owned): the text by which any process opens it, to keep no copy
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
   // Of a rectilinear grid, before its voxels are placed (rectilinear_source.h) or made even (even_source.h): its coordinates along each
@@ -133,6 +134,9 @@ class VolumeSource {
   // Another time and channel of what is open, as `info` counts them. Reads nothing, so what has been read of it counts for this one, too.
   // Null: it must be opened for itself, since its format has metadata of each; or there is no such.
   virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
+
+  // Whether Read gets the voxels of this box of level 0. False, of what others hold (data/owned): another process must be asked.
+  virtual bool Reaches(const Box& /*box*/) const { return true; }
 
   using ReadDone = std::function<void(Status)>;
   // Fills `out` with the samples of `box`, of the level's type or, if out.exact, as they are stored, and writes nothing between its rows.

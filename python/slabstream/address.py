@@ -78,10 +78,10 @@ def read_service_file(path: str | os.PathLike[str]) -> Address:
             raise InvalidArgument(f"service file '{file}': {name} is missing or no text")
         if name in _KEYS and (len(value) != _KEY_CHARACTERS or not value.isascii()):
             raise InvalidArgument(f"service file '{file}': {name} is no key")
-    if fields["role"] == "worker":
-        raise InvalidArgument(f"service file '{file}' is of role worker, but client or admin is needed here")
+    if fields["role"] in ("worker", "owner"):
+        raise InvalidArgument(f"service file '{file}' is of role {fields['role']}, but client or admin is needed here")
     if fields["role"] not in ("client", "admin"):
-        raise InvalidArgument(f"service file '{file}': role is not client, worker or admin")
+        raise InvalidArgument(f"service file '{file}': role is not client, worker, admin or owner")
     return Address(fields["endpoint"], Keys(*(fields[name] for name in _KEYS)), file.resolve())
 
 

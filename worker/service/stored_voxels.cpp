@@ -16,6 +16,7 @@
 #include "common/threads/background_tasks.h"
 #include "common/threads/guarded.h"
 #include "data/open/open_source.h"
+#include "data/owned/owned_source.h"
 
 namespace slabstream {
 namespace {
@@ -46,8 +47,8 @@ struct StoredVoxels::Shared {
     const auto [found, is_new] = places.try_emplace({stored.source, stored.version});
     Place& place = found->second;
     place.used = asked = now;
-    if (is_new) place.source = Beside(stored);
-    if (place.source == nullptr && !place.looking && (is_new || now >= place.looked + kLookAgain)) {
+    if (is_new) place.source = AtOnce(stored);
+    if (place.source == nullptr && !place.looking && !NamesOwners(stored.source) && (is_new || now >= place.looked + kLookAgain)) {
       place.looking = true;
       place.looked = now;
       Find(stored, self);
@@ -57,6 +58,13 @@ struct StoredVoxels::Shared {
       places.erase(std::ranges::min_element(places, {}, [](const auto& each) { return each.second.used; }));
     }
     return source;
+  }
+
+  // What is opened without waiting, or null. Called with the mutex.
+  std::shared_ptr<VolumeSource> AtOnce(const StoredAt& stored) const {
+    if (!NamesOwners(stored.source)) return Beside(stored);
+    const Result<std::shared_ptr<VolumeSource>> source = OpenSameSource(stored, ProcessReadContext());
+    return source.ok() ? *source : nullptr;
   }
 
   // Another time or channel of what is open: to open it behind an address takes several requests, one after the other. Called with the
@@ -123,7 +131,7 @@ bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<St
   {
     const std::lock_guard lock(shared_->mutex);
     source = shared_->SourceAt(stored, now, shared_);
-    if (source == nullptr) return false;
+    if (source == nullptr || !source->Reaches(request.box)) return false;
     if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
   const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };

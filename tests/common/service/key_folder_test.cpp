@@ -33,7 +33,7 @@ TEST_F(KeyFolderTest, PublishesAFileForEachRole) {
     const Result<ServiceFile> file = ReadServiceFile(FileOf(role));
     ASSERT_TRUE(file.ok()) << file.status().message();
     EXPECT_EQ(file->role, role);
-    EXPECT_EQ(file->endpoint, role == Role::kWorker ? service_.worker_endpoint : service_.client_endpoint);
+    EXPECT_EQ(file->endpoint, IsOfClients(role) ? service_.client_endpoint : service_.worker_endpoint);
     EXPECT_EQ(file->server_key, folder->server().public_key);
     EXPECT_EQ(file->epoch, 3U);
     EXPECT_EQ(folder->KeysOf({role}), std::set<std::string>{file->own.public_key});

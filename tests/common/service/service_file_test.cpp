@@ -47,7 +47,7 @@ TEST_F(ServiceFileTest, MistakesAreNamedAndSecretsAreNot) {
   const struct {
     std::string what, with, says;
   } cases[] = {
-      {"\"worker\"", "\"boss\"", "role is not client, worker or admin"},
+      {"\"worker\"", "\"boss\"", "role is not client, worker, admin or owner"},
       {"tcp://10.0.0.1:7421", "tcp://10.0.0.1", "endpoint endpoint \"tcp://10.0.0.1\": no port"},
       {"\"server_key\"", "\"server\"", "server_key is missing or no text"},
       {file_.own.public_key, "abc", "public_key is no key"},

@@ -191,6 +191,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"coarser", kMaxLevels - 1},
       {"levels", kMaxLevels},
       {"peers", kMaxPeers},
+      {"boxes", 4096},
+      {"used", 64},
       {"reports", kMaxReports},
       {"spans", kMaxSpans},
       {"open", kMaxOpenRequests},

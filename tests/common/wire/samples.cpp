@@ -304,6 +304,42 @@ std::vector<Stop> SamplesOf() {
 }
 
 template <>
+std::vector<RegisterOwner> SamplesOf() {
+  return {{.dataset = "rho", .description = Description(), .samples = "uint16"},
+          {kMax64, kLongName, 4095, 4096, RectilinearDescription(), std::string(16, 's'), {kOneVoxel, kWholeBox}, kMax64, kMax32, kMax32}};
+}
+
+template <>
+std::vector<OwnerWelcome> SamplesOf() {
+  return {{1, 2}, {kMax64, kMax64, 60000, 600000}};
+}
+
+template <>
+std::vector<OwnerTime> SamplesOf() {
+  return {{1, 1, 0}, {kMax64, kMax64, -1e300}};
+}
+
+template <>
+std::vector<OwnerPing> SamplesOf() {
+  return {{}, {kMax64, kMax64}};
+}
+
+template <>
+std::vector<OwnerPong> SamplesOf() {
+  return {{}, {kMax64, kMax64, true, std::vector<std::uint64_t>(64, kMax64)}};
+}
+
+template <>
+std::vector<OwnerLeave> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<OwnerRefused> SamplesOf() {
+  return {{1, Status::InvalidArgument("owner 3 of 8")}, {kMax64, Status::Cancelled(kLongText)}};
+}
+
+template <>
 std::vector<ChunkRequest> SamplesOf() {
   return {{1, 2, 3, kOneVoxel, 0},
           {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1},

@@ -1,0 +1,65 @@
+// VolumeOwner: a process that keeps its part of a field in its own memory and lets a service draw it.
+//
+//   1. Start names the field, this process's place among its owners, and its boxes.
+//   2. For each time: Begin gives memory for the samples of all boxes; write them; Commit says that they are whole.
+// The process goes on whether there is a service or not: it registers when one is there, and again after it was away. Only while pictures
+// are made of a time, Begin waits rather than giving its memory away.
+//
+// A thread of its own talks with the coordinator and sends voxels to hosts that cannot map this process's memory. Begin and Commit are for
+// one thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/base/time.h"
+#include "common/transport/context.h"
+#include "common/transport/keys.h"
+#include "common/volume/volume.h"
+#include "data/owned/owner_memory.h"
+
+namespace slabstream {
+
+struct VolumeOwnerOptions {
+  std::string endpoint = {};      // for workers and owners; not used with a service file
+  std::string service_file = {};  // owner.json of a service with keys; empty: it has none
+  std::string dataset;            // common/frame/dataset_name.h
+  std::uint32_t owner = 0;        // below `owners`, each once
+  std::uint32_t owners = 1;       // that hold the field together, [1, 4096]
+  // Of the whole volume. The mapping is that of layout.samples; the type is filled in.
+  VolumeDescription description;
+  OwnerLayout layout;        // its size is filled in; 2 ... kMostOwnerSlots slots
+  bool share_memory = true;  // else voxels travel
+};
+
+class VolumeOwner {
+ public:
+  // InvalidArgument: an option, named with its limit. Errors of ReadServiceFile, OwnerMemory::Create and MappedOwner::Open. `context` must
+  // outlive the owner. Whether the coordinator takes it, Begin tells.
+  static Result<std::unique_ptr<VolumeOwner>> Start(Context& context, VolumeOwnerOptions options);
+  ~VolumeOwner();  // leaves
+
+  struct Slot {
+    std::span<std::byte> bytes;  // where layout.boxes say; what they held may still be there
+    Duration waited = {};
+  };
+  // Unavailable: the times of all slots are still used after `timeout`; or the coordinator refuses the key. What the coordinator said, if
+  // it has refused the registration.
+  Result<Slot> Begin(Duration timeout);
+  // InvalidArgument: nothing was begun, or `time` is not above that of the last call. `simulated`: the simulation's own time, in its own
+  // unit.
+  Status Commit(std::uint64_t time, double simulated);
+
+  bool looked_at() const;  // somebody has asked for a picture within the last seconds
+
+ private:
+  struct Impl;
+  explicit VolumeOwner(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,428 @@
+#include "coordinator/service/owners.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "common/base/overloaded.h"
+#include "common/files/file_stamp.h"
+#include "common/frame/dataset_name.h"
+#include "common/wire/payload.h"
+#include "data/open/open_source.h"
+#include "data/owned/owned_source.h"
+#include "data/sources/copy_samples.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+namespace {
+
+using AskDone = std::function<void(Result<Bytes>)>;
+
+struct Asked {
+  std::uint64_t time = 0;
+  Box box;
+  AskDone done;
+};
+
+struct Owner {
+  PeerToken peer = 0;
+  RegisterOwner registered;
+  std::uint64_t latest = 0;  // time; 0: none yet
+  Time heard, answered;      // answered: when `out` was empty or last became shorter
+  std::vector<Asked> out;    // at most kMostAskedOfOwner
+  std::deque<Asked> waiting = {};
+};
+
+struct Place {
+  std::optional<Owner> owner = {};
+  std::string why = "has not come yet";  // there is none
+};
+
+struct Field {
+  std::vector<Place> places;
+  std::uint64_t set = 0;    // another number when an owner comes or goes
+  std::uint64_t whole = 0;  // time; 0: not all owners are there, or one has no time yet
+  bool is_dataset = false;
+  std::optional<Time> looked = {};
+  OwnerPong told = {};  // last, without nonce
+};
+
+// Whether each voxel of `bounds` is in exactly one box, and no box has another voxel. The function of space that counts boxes is known by
+// its jumps at their corners, so those of the boxes add up to those of `bounds`.
+bool Tile(const Box& bounds, const std::vector<Box>& boxes) {
+  std::map<std::array<std::int32_t, 3>, std::int64_t> jumps;
+  const auto add = [&](const Box& box, int sign) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const auto at = [&](Axis axis, int bit) { return (corner & bit) != 0 ? box.end[axis] : box.begin[axis]; };
+      const bool odd = (((corner & 1) + (corner >> 1 & 1) + (corner >> 2)) & 1) != 0;
+      jumps[{at(Axis::kX, 1), at(Axis::kY, 2), at(Axis::kZ, 4)}] += odd ? -sign : sign;
+    }
+  };
+  for (const Box& box : boxes) add(box, 1);
+  add(bounds, -1);
+  return std::ranges::all_of(jumps, [](const auto& jump) { return jump.second == 0; });
+}
+
+bool OfOneField(const RegisterOwner& a, const RegisterOwner& b) {
+  return a.owners == b.owners && a.description == b.description && a.samples == b.samples;
+}
+
+}  // namespace
+
+struct Owners::State {
+  std::mutex mutex;  // guards everything
+  Epoch epoch = 0;
+  std::function<Status(const std::string&)> name_is_free;  // the service's thread
+  std::function<void()> wake;                              // null: the service has ended
+  std::map<std::string, Field> fields;                     // with at least one owner
+  std::map<PeerToken, std::pair<std::string, std::uint32_t>> peers;
+  std::map<std::string, std::map<std::uint64_t, std::size_t>> used;  // sources that live, by field and time
+  std::uint64_t sets = 0;
+  Time now;
+  News news;
+  std::vector<std::pair<AskDone, Result<Bytes>>> answers;  // given without the mutex
+
+  // Runs `work` with the mutex, then gives answers.
+  News Do(Time at, const auto& work) {
+    std::unique_lock lock(mutex);
+    now = at;
+    work();
+    const auto given = std::exchange(answers, {});
+    News result = std::exchange(news, {});
+    lock.unlock();
+    for (const auto& [done, answer] : given) done(answer);
+    return result;
+  }
+
+  // ---- owners
+  Owner* Find(PeerToken peer) {
+    const auto found = peers.find(peer);
+    return found == peers.end() ? nullptr : &*fields.at(found->second.first).places[found->second.second].owner;
+  }
+  static std::string Named(const std::string& name, const Field& field, std::size_t owner) {
+    return fmt::format("\"{}\": owner {} of {}", name, owner, field.places.size());
+  }
+
+  Status Check(const RegisterOwner& m, const Field* field) {
+    if (Status name = CheckDatasetName(m.dataset); !name.ok()) return name;
+    if (field == nullptr || !field->is_dataset) {
+      if (Status free = name_is_free(m.dataset); !free.ok()) return free;
+    }
+    if (field == nullptr && fields.size() >= kMostFields) {
+      return Status::ResourceExhausted(fmt::format("\"{}\": {} fields have owners, which is the limit", m.dataset, fields.size()));
+    }
+    const auto wrong = [&](const std::string& what) {
+      return Status::InvalidArgument(fmt::format("\"{}\": owner {} of {}: {}", m.dataset, m.owner, m.owners, what));
+    };
+    const std::optional<SampleType> samples = SampleTypeNamed(m.samples);
+    if (!samples) return wrong(fmt::format("samples is '{}', must be one of: {}", m.samples, SampleTypeNames()));
+    if (const ScalarType kept = KeptTypeOf(*samples).type; m.description.type != kept) {
+      return wrong(
+          fmt::format("description.type is {}, must be {} for samples of {}", NameOf(m.description.type), NameOf(kept), m.samples));
+    }
+    const Box bounds = m.description.geometry.bounds();
+    for (std::size_t i = 0; i < m.boxes.size(); ++i) {
+      if (m.boxes[i].empty() || !bounds.Contains(m.boxes[i])) return wrong(fmt::format("boxes[{}] is empty, or not inside the volume", i));
+    }
+    if (field == nullptr) return CheckTiled(m, {});
+    for (const Place& place : field->places) {
+      if (place.owner && place.owner->registered.incarnation != m.incarnation && !OfOneField(place.owner->registered, m)) {
+        return wrong(fmt::format("owners, description or samples differ from those of owner {}", place.owner->registered.owner));
+      }
+    }
+    if (m.owner >= field->places.size()) return wrong(fmt::format("owners is {}, of others {}", m.owners, field->places.size()));
+    const std::optional<Owner>& taken = field->places[m.owner].owner;
+    if (taken && taken->registered.incarnation != m.incarnation) return wrong("another process is this owner");
+    return CheckTiled(m, field->places);
+  }
+
+  // With the last owner of a field.
+  static Status CheckTiled(const RegisterOwner& m, const std::vector<Place>& places) {
+    std::vector<Box> boxes = m.boxes;
+    std::size_t there = 1;
+    for (const Place& place : places) {
+      if (!place.owner || place.owner->registered.owner == m.owner) continue;
+      ++there;
+      boxes.insert(boxes.end(), place.owner->registered.boxes.begin(), place.owner->registered.boxes.end());
+    }
+    if (boxes.size() > kMostFieldBoxes) {
+      return Status::InvalidArgument(fmt::format("\"{}\": {} boxes of all owners, limit {}", m.dataset, boxes.size(), kMostFieldBoxes));
+    }
+    if (there < m.owners || Tile(m.description.geometry.bounds(), boxes)) return Status::Ok();
+    return Status::InvalidArgument(
+        fmt::format("\"{}\": owner {} of {}: boxes of all owners overlap, or leave voxels out", m.dataset, m.owner, m.owners));
+  }
+
+  void Hear(PeerToken from, RegisterOwner m) {
+    const auto found = fields.find(m.dataset);
+    const auto refuse = [&](const Status& why) { news.messages.emplace_back(from, OwnerRefused{m.incarnation, Bounded(why)}); };
+    if (Status status = Check(m, found == fields.end() ? nullptr : &found->second); !status.ok()) return refuse(status);
+    if (const auto known = peers.find(from); known != peers.end() && known->second != std::pair(m.dataset, m.owner)) {
+      return refuse(Status::InvalidArgument(fmt::format("\"{}\": this connection is that of another owner", m.dataset)));
+    }
+    Field& field = fields[m.dataset];
+    field.places.resize(m.owners);
+    const std::string name = m.dataset;
+    const std::uint32_t number = m.owner;
+    std::optional<Owner>& owner = field.places[number].owner;
+    const bool changed = !owner || owner->registered != m;
+    if (!owner) owner.emplace().peer = from;
+    if (owner->peer != from) {  // another connection: what is out may be lost
+      peers.erase(owner->peer);
+      owner->peer = from;
+      for (const Asked& asked : owner->out) Request(*owner, asked);
+    }
+    owner->registered = std::move(m);
+    owner->heard = now;
+    peers[from] = {name, number};
+    news.messages.emplace_back(
+        from, OwnerWelcome{epoch, owner->registered.incarnation, 1000, std::uint32_t(kOwnerTimeout / std::chrono::milliseconds(1))});
+    news.messages.emplace_back(from, Pong(name, field));
+    if (!changed) return;
+    field.set = ++sets;
+    FindWhole(name, field);
+  }
+
+  void Hear(PeerToken from, const OwnerTime& m) {
+    Owner& owner = *Find(from);
+    if (m.time <= owner.latest) return;
+    owner.latest = m.time;
+    const std::string& name = owner.registered.dataset;
+    FindWhole(name, fields.at(name));
+  }
+
+  void Hear(PeerToken from, const OwnerPing& m) {
+    const std::string& name = Find(from)->registered.dataset;
+    OwnerPong pong = Pong(name, fields.at(name));
+    pong.nonce = m.nonce;
+    news.messages.emplace_back(from, std::move(pong));
+  }
+
+  void Hear(PeerToken from, const OwnerLeave&) { Lose(from, "has left"); }
+
+  void Lose(PeerToken peer, const std::string& why) {
+    const auto [name, number] = peers.extract(peer).mapped();
+    Field& field = fields.at(name);
+    FailAsked(*field.places[number].owner, Status::Unavailable(Named(name, field, number) + " " + why));
+    field.places[number] = {{}, why};
+    field.set = ++sets;
+    field.whole = 0;
+    if (std::ranges::any_of(field.places, [](const Place& place) { return place.owner.has_value(); })) return;
+    if (field.is_dataset) news.datasets.push_back({.name = name, .left = true});
+    fields.erase(name);
+  }
+
+  // ---- times
+  void FindWhole(const std::string& name, Field& field) {
+    std::uint64_t whole = ~std::uint64_t{0};
+    for (const Place& place : field.places) whole = std::min(whole, place.owner ? place.owner->latest : 0);
+    field.whole = whole;
+    if (whole == 0 || std::exchange(field.is_dataset, true)) return;
+    OwnedData& news_of = news.datasets.emplace_back(OwnedData{.name = name});
+    news_of.came.emplace().path = fmt::format("{} owners", field.places.size());  // for the log
+  }
+
+  bool IsLookedAt(const Field& field) const { return field.looked && now < *field.looked + kOwnerLooked; }
+
+  OwnerPong Pong(const std::string& name, const Field& field) const {
+    std::set<std::uint64_t> times;
+    if (const auto of = used.find(name); of != used.end()) {
+      for (const auto& [time, sources] : of->second) times.insert(time);
+    }
+    OwnerPong pong{.epoch = epoch, .looked_at = IsLookedAt(field)};
+    if (pong.looked_at && field.whole != 0) times.insert(field.whole);
+    constexpr std::size_t kMost = 64;
+    while (times.size() > kMost) times.erase(times.begin());  // no owner has so many slots
+    pong.used.assign(times.begin(), times.end());
+    return pong;
+  }
+
+  // ---- what owners are asked for
+  void Request(const Owner& owner, const Asked& asked) {
+    news.messages.emplace_back(owner.peer, ChunkRequest{.epoch = epoch, .dataset = asked.time, .box = asked.box});
+  }
+
+  void FailAsked(Owner& owner, const Status& why) {
+    for (Asked& asked : owner.out) answers.emplace_back(std::move(asked.done), why);
+    for (Asked& asked : owner.waiting) answers.emplace_back(std::move(asked.done), why);
+    owner.out.clear();
+    owner.waiting.clear();
+  }
+
+  void Answer(Owner& owner, std::uint64_t time, const Box& box, Result<Bytes> answer) {
+    const auto asked = std::ranges::find_if(owner.out, [&](const Asked& each) { return each.time == time && each.box == box; });
+    if (asked == owner.out.end()) return;  // nobody waits for it any more
+    answers.emplace_back(std::move(asked->done), std::move(answer));
+    owner.out.erase(asked);
+    owner.answered = now;
+  }
+
+  void Hear(PeerToken from, const ChunkRefused& m) {
+    Owner& owner = *Find(from);
+    const std::string& name = owner.registered.dataset;
+    Answer(owner, m.dataset, m.box,
+           Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), owner.registered.owner), m.status.message())));
+  }
+
+  void Hear(PeerToken from, const Chunk& m, const Bytes& payload) {
+    std::vector<std::byte> samples(m.raw_bytes);
+    const Status unpacked = UnpackChunk(m, payload.span(), samples);
+    Answer(*Find(from), m.dataset, m.box, unpacked.ok() ? Result(Bytes(std::move(samples))) : unpacked);
+  }
+
+  void Tend() {
+    std::vector<PeerToken> silent;
+    for (auto& [name, field] : fields) {
+      for (Place& place : field.places) {
+        if (!place.owner) continue;
+        Owner& owner = *place.owner;
+        if (now >= owner.heard + kOwnerTimeout) silent.push_back(owner.peer);
+        if (owner.out.empty()) owner.answered = now;
+        if (now >= owner.answered + kOwnerAnswers) {
+          FailAsked(owner, Status::Unavailable(Named(name, field, owner.registered.owner) + " answers no request for voxels"));
+        }
+        for (; !owner.waiting.empty() && owner.out.size() < kMostAskedOfOwner; owner.waiting.pop_front()) {
+          Request(owner, owner.waiting.front());
+          owner.out.push_back(std::move(owner.waiting.front()));
+        }
+      }
+      const OwnerPong pong = Pong(name, field);
+      if (pong != field.told) {
+        for (const Place& place : field.places) {
+          if (place.owner) news.messages.emplace_back(place.owner->peer, pong);
+        }
+        field.told = pong;
+      }
+      // The machine gives another time up as soon as nobody waits for it.
+      if (field.is_dataset && !pong.used.empty() && pong.used.front() != field.whole) news.datasets.push_back({.name = name});
+    }
+    for (const PeerToken peer : silent) Lose(peer, "is silent");
+  }
+
+  // ---- from any thread
+  void Look(Field& field, Time at) {
+    const bool begins = !IsLookedAt(field);
+    field.looked = at;
+    if (begins && wake) wake();
+  }
+
+  static Result<std::shared_ptr<VolumeSource>> Open(const std::shared_ptr<State>& state, const std::string& name);
+  static std::shared_ptr<const void> Use(const std::shared_ptr<State>& state, const std::string& name,
+                                         std::uint64_t time);  // with the mutex
+  void Ask(const std::string& name, std::uint32_t number, Incarnation incarnation, Asked asked);
+};
+
+void Owners::State::Ask(const std::string& name, std::uint32_t number, Incarnation incarnation, Asked asked) {
+  std::unique_lock lock(mutex);
+  const auto field = fields.find(name);
+  std::optional<Owner>* const owner = field == fields.end() ? nullptr : &field->second.places.at(number).owner;
+  if (wake && owner != nullptr && *owner && (*owner)->registered.incarnation == incarnation) {
+    (*owner)->waiting.push_back(std::move(asked));
+    return wake();
+  }
+  lock.unlock();
+  asked.done(Status::Unavailable(fmt::format("\"{}\": owner {} has left", name, number)));
+}
+
+std::shared_ptr<const void> Owners::State::Use(const std::shared_ptr<State>& state, const std::string& name, std::uint64_t time) {
+  ++state->used[name][time];
+  return {state.get(), [state, name, time](const void*) {
+            const std::lock_guard lock(state->mutex);
+            std::map<std::uint64_t, std::size_t>& of = state->used.at(name);
+            if (--of.at(time) == 0) of.erase(time);
+            if (of.empty()) state->used.erase(name);
+            if (state->wake) state->wake();
+          }};
+}
+
+Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::shared_ptr<State>& state, const std::string& name) {
+  std::unique_lock lock(state->mutex);
+  const auto found = state->fields.find(name);
+  if (found == state->fields.end()) return Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
+  Field& field = found->second;
+  state->Look(field, MonotonicNow());
+  OwnedVolume volume{.field = {name, field.whole, {}}};
+  std::vector<Incarnation> incarnations;
+  for (std::size_t i = 0; i < field.places.size(); ++i) {
+    const Place& place = field.places[i];
+    if (!place.owner) return Status::Unavailable(Named(name, field, i) + " " + place.why);
+    if (place.owner->latest == 0) return Status::Unavailable(Named(name, field, i) + " has no time yet");
+    const RegisterOwner& owner = place.owner->registered;
+    volume.field.owners.push_back({owner.memory_scope, owner.pid, owner.file_descriptor, owner.incarnation});
+    volume.boxes.push_back(owner.boxes);
+    incarnations.push_back(owner.incarnation);
+  }
+  const RegisterOwner& any = field.places.front().owner->registered;
+  volume.description = any.description;
+  volume.exact = {*SampleTypeNamed(any.samples), any.description.mapping};
+  volume.description.mapping.offset = any.description.mapping.FromStored(KeptTypeOf(volume.exact.type).shift);
+  volume.ask = [state, name, time = field.whole, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
+    state->Ask(name, owner, incarnations[owner], {time, box, std::move(done)});
+  };
+  volume.growth = std::make_shared<const FileStamp>(FileStamp{.ask = [state, name, time = field.whole, set = field.set](Time now) {
+    const std::lock_guard of_state(state->mutex);
+    const auto known = state->fields.find(name);
+    if (known == state->fields.end()) return true;
+    state->Look(known->second, now);
+    return known->second.whole != time || known->second.set != set;
+  }});
+  volume.use = Use(state, name, field.whole);
+  lock.unlock();
+  return MakeOwnedSource(std::move(volume), ProcessReadContext());
+}
+
+Owners::Owners(Epoch epoch, std::function<Status(const std::string&)> name_is_free, std::function<void()> wake)
+    : state_(std::make_shared<State>()) {
+  state_->epoch = epoch;
+  state_->name_is_free = std::move(name_is_free);
+  state_->wake = std::move(wake);
+}
+
+Owners::~Owners() {
+  (void)state_->Do(MonotonicNow(), [this] {
+    state_->wake = nullptr;
+    for (auto& [name, field] : state_->fields) {
+      for (Place& place : field.places) {
+        if (place.owner) state_->FailAsked(*place.owner, Status::Unavailable("the coordinator ends"));
+      }
+    }
+  });
+}
+
+Owners::News Owners::Hear(PeerToken from, OwnerToCoordinator message, const Bytes& payload, Time now) {
+  News news = state_->Do(now, [&] {
+    if (auto* const registration = std::get_if<RegisterOwner>(&message)) return state_->Hear(from, std::move(*registration));
+    const Epoch epoch = std::visit(
+        []<class Message>(const Message& each) -> Epoch {
+          if constexpr (std::is_same_v<Message, RegisterOwner>) {
+            return 0;
+          } else {
+            return each.epoch;
+          }
+        },
+        message);
+    Owner* const owner = state_->Find(from);
+    if (owner == nullptr || epoch != state_->epoch) return void(state_->news.messages.emplace_back(from, Retire{state_->epoch}));
+    owner->heard = now;
+    std::visit(Overloaded{[&](const Chunk& chunk) { state_->Hear(from, chunk, payload); }, [](const RegisterOwner&) {},
+                          [&](const auto& each) { state_->Hear(from, each); }},
+               message);
+  });
+  for (OwnedData& data : news.datasets) {
+    if (data.came) data.came->open = [state = state_, name = data.name] { return State::Open(state, name); };
+  }
+  return news;
+}
+
+Owners::News Owners::Tend(Time now) {
+  return state_->Do(now, [this] { state_->Tend(); });
+}
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// Owners: processes that hold the voxels of datasets in their own memory, as the coordinator knows them (common/wire/owner_messages.h).
+//
+// The owners of a field have numbers and boxes that tile its volume. Once all are there, the field's whole time is the least of the latest
+// times that they have committed; then it is a dataset, whose source (data/owned/owned_source.h) has the voxels of that time. Owners are
+// told which times may not be overwritten: those of sources that live, and the whole one while somebody looks.
+//
+// An owner is lost when it leaves, or is silent for kOwnerTimeout. Until another one takes its place, the field cannot be opened. When all
+// are lost, the dataset goes.
+//
+// For the service's thread. Sources that are open may outlive this; what they ask then fails.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/time.h"
+#include "common/wire/any_message.h"
+#include "coordinator/datasets/dataset_machine.h"
+#include "coordinator/peer_token.h"
+
+namespace slabstream {
+
+inline constexpr Duration kOwnerTimeout = std::chrono::seconds(5);
+inline constexpr Duration kOwnerLooked = std::chrono::seconds(10);   // how long somebody looks who has asked for a field
+inline constexpr Duration kOwnerAnswers = std::chrono::seconds(10);  // without any, what an owner is asked for fails
+inline constexpr std::size_t kMostAskedOfOwner = 16;                 // requests that are out; others wait
+inline constexpr std::size_t kMostFieldBoxes = 65536;                // of all owners of a field
+inline constexpr std::size_t kMostFields = 1024;
+
+class Owners {
+ public:
+  // What follows: messages to send, and events for the DatasetMachine, in order.
+  struct News {
+    std::vector<std::pair<PeerToken, CoordinatorToOwner>> messages;
+    std::vector<OwnedData> datasets;
+  };
+
+  // `name_is_free`: as DatasetMachine::NameIsFree. `wake` is called from any thread: Tend has something to do.
+  Owners(Epoch epoch, std::function<Status(const std::string&)> name_is_free, std::function<void()> wake);
+  ~Owners();
+
+  News Hear(PeerToken from, OwnerToCoordinator message, const Bytes& payload, Time now);
+  // What time has brought, and other threads: at least every second, after each event, and when `wake` was called.
+  News Tend(Time now);
+
+ private:
+  struct State;
+  const std::shared_ptr<State> state_;  // shared with sources
+};
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// A volume whose voxels stay with the processes that own them (owners), at one time. Those of owners on this host are read in their memory
+// (owner_memory.h); those of others by a function of whoever can ask them: the coordinator.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/memory/bytes.h"
+#include "common/volume/volume.h"
+#include "data/owned/owner_memory.h"
+#include "data/sources/read_context.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+inline constexpr std::uint32_t kMostAskedBytes = 1U << 20;  // of samples that an owner is asked for at a time
+
+// All owners of a volume at a time. Its text is StoredAt::source.
+struct OwnedField {
+  std::string dataset;
+  std::uint64_t time = 0;
+  std::vector<OwnerPlace> owners;
+
+  std::string Text() const;
+  // InvalidArgument: not a text of owners.
+  static Result<OwnedField> Parse(const std::string& text);
+  friend bool operator==(const OwnedField&, const OwnedField&) = default;
+};
+
+// Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest. Calls `done` once, on any thread, which it must
+// not hold up.
+using AskOwner = std::function<void(std::uint32_t owner, const Box& box, std::function<void(Result<Bytes>)> done)>;
+
+// What the coordinator knows of a field.
+struct OwnedVolume {
+  OwnedField field;
+  VolumeDescription description = {};        // of kept samples (KeptTypeOf)
+  ExactType exact = {};                      // as they are held
+  std::vector<std::vector<Box>> boxes = {};  // of each owner; together they tile the volume
+  AskOwner ask = {};
+  std::shared_ptr<const FileStamp> growth = {};  // tells when there is another time
+  std::shared_ptr<const void> use = {};          // kept as long as the source
+};
+std::shared_ptr<VolumeSource> MakeOwnedSource(OwnedVolume volume, const SourceContext& context);
+
+// The same in any other process, which reaches what owners on its host hold. It knows no place in the world and no mapping. Waits for
+// nothing. Unavailable: none of them is here. Errors of OwnedField::Parse.
+Result<std::shared_ptr<VolumeSource>> OpenOwned(const std::string& text, const SourceContext& context);
+
+}  // namespace slabstream

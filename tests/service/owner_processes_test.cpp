@@ -1,0 +1,257 @@
+// Owners that are processes: whoever holds which voxels, and whether others can map them, the picture is that of the same array as one
+// dataset, and of one time. An owner that has gone is named; pictures come again with the next one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/client.h"
+#include "client/owner/volume_owner.h"
+#include "coordinator/service/service.h"
+#include "laboratory/experiments/owner_arrangements.h"
+#include "tests/service/pictures.h"
+#include "tests/support/random_volume.h"
+#include "tests/support/renderers.h"
+#include "tests/support/temporary_directory.h"
+#include "worker/service/service.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+using testing::AnyOf;
+using testing::HasSubstr;
+
+constexpr Index3 kSize = {44, 36, 52};
+constexpr Duration kPatience = seconds(60);
+
+// Another array at each time.
+std::shared_ptr<const Volume> AtTime(std::uint64_t time) {
+  const auto value = [&](const Index3& v) {
+    const auto distance = [&](const Vec3& center) { return Length(ToVec3(v) - center); };
+    return std::max({0.0, 250 - 12 * distance({12 + double(time % 20), 10, 14}), 250 - 10 * distance({30, 22, 36})});
+  };
+  return std::make_shared<const Volume>(MakeTestVolume(kSize, ScalarType::kUint8, value));
+}
+
+FrameRequest Request(double azimuth = 30) {
+  FrameRequest request = TestRequest(FindRenderer("raycast"), azimuth, 0);
+  request.termination = 0;
+  return request;
+}
+
+class OwnerProcessesTest : public testing::Test {
+ protected:
+  void Start(const std::string& keys_folder = {}) {
+    CoordinatorOptions options;
+    const bool keys = !keys_folder.empty();
+    options.client_endpoint = keys ? "tcp://127.0.0.1:*" : "inproc://clients";
+    options.worker_endpoint = keys ? "tcp://127.0.0.1:*" : "inproc://workers";
+    options.voxels_endpoint = keys ? "tcp://127.0.0.1:*" : "inproc://voxels";
+    options.keys_folder = keys_folder;
+    coordinator_ = CoordinatorService::Start(context_, std::move(options)).value();
+    if (keys) return;
+    for (int i = 0; i < 3; ++i) {
+      WorkerOptions worker;
+      worker.coordinator_endpoint = coordinator_->worker_endpoint();
+      worker.machine.threads = 1;
+      workers_.push_back(WorkerService::Start(context_, worker).value());
+    }
+    for (const auto& worker : workers_) worker->WaitUntilRegistered();
+    client_.emplace(Client::Connect(context_, coordinator_->client_endpoint(), kPatience).value());
+  }
+  ~OwnerProcessesTest() override {
+    owners_.clear();
+    workers_.clear();
+  }
+
+  VolumeOwnerOptions OptionsOf(const OwnedBoxes& boxes, std::uint32_t owner, std::uint32_t owners, bool share_memory) const {
+    VolumeOwnerOptions options{.endpoint = coordinator_->worker_endpoint(), .dataset = "ball", .owner = owner, .owners = owners};
+    options.description.geometry.size = kSize;
+    options.share_memory = share_memory;
+    options.layout.samples = SampleType::kUint8;
+    for (const OwnedBox& each : boxes) {
+      if (each.owner == owner) options.layout.boxes.push_back({.box = each.box, .held = each.box});
+    }
+    options.layout.PlaceDense();
+    return options;
+  }
+  void StartOwners(const OwnerArrangement& arrangement, std::uint32_t owners, bool share_memory) {
+    owners_.clear();
+    boxes_ = Arrange(arrangement, kSize, owners);
+    for (std::uint32_t owner = 0; owner < owners; ++owner) {
+      options_.push_back(OptionsOf(boxes_, owner, owners, share_memory));
+      owners_.push_back(VolumeOwner::Start(context_, options_.back()).value());
+      options_.back().owner = owner;
+    }
+  }
+  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time) {
+    const std::shared_ptr<const Volume> volume = AtTime(time);
+    const Result<VolumeOwner::Slot> slot = owner.Begin(kPatience);
+    ASSERT_TRUE(slot.ok()) << slot.status().message();
+    std::size_t to = 0;
+    for (const OwnedBox& each : boxes) {
+      if (each.owner != number) continue;
+      for (std::int32_t z = each.box.begin.z; z < each.box.end.z; ++z) {
+        for (std::int32_t y = each.box.begin.y; y < each.box.end.y; ++y) {
+          const auto row = std::size_t(each.box.size().x);
+          std::copy_n(volume->block.bytes.begin() + volume->block.Offset({each.box.begin.x, y, z}), row, slot->bytes.begin() + long(to));
+          to += row;
+        }
+      }
+    }
+    EXPECT_TRUE(owner.Commit(time, double(time)).ok());
+  }
+  void WriteAll(std::uint64_t time) {
+    for (std::uint32_t owner = 0; owner < owners_.size(); ++owner) Write(*owners_[owner], boxes_, owner, time);
+  }
+  // What a frame ends with, once it does not end with `status` any more: owners come when they come.
+  Result<Picture> RenderUnless(const std::string& status, const FrameRequest& request = Request()) {
+    for (const Time end = MonotonicNow() + kPatience;;) {
+      Result<Picture> picture = client_->Render(request, kPatience);
+      if (picture.ok() || picture.status().message().find(status) == std::string::npos || MonotonicNow() > end) return picture;
+    }
+  }
+  static float Difference(const Picture& picture, std::uint64_t time) {
+    FrameRequest request = Request();
+    return LargestDifference(picture.image, RenderDirectly(request, *AtTime(time)), request.size);
+  }
+
+  Context context_;
+  std::unique_ptr<CoordinatorService> coordinator_;
+  std::vector<std::unique_ptr<WorkerService>> workers_;
+  std::vector<std::unique_ptr<VolumeOwner>> owners_;
+  std::vector<VolumeOwnerOptions> options_;
+  OwnedBoxes boxes_;
+  std::optional<Client> client_;
+};
+
+TEST_F(OwnerProcessesTest, PicturesAreThoseOfOneArray) {
+  for (const OwnerArrangement& arrangement : OwnerArrangements()) {
+    for (const bool share_memory : {true, false}) {
+      SCOPED_TRACE(testing::Message() << arrangement.name << (share_memory ? ", in place" : ", asked"));
+      owners_.clear();
+      workers_.clear();
+      client_.reset();
+      coordinator_.reset();
+      ASSERT_NO_FATAL_FAILURE(Start());
+      StartOwners(arrangement, 4, share_memory);
+      WriteAll(7);
+      const Result<Picture> picture = RenderUnless("\"ball\"");
+      ASSERT_TRUE(picture.ok()) << picture.status().message();
+      EXPECT_LE(Difference(*picture, 7), 1e-6F);
+      EXPECT_EQ(picture->statistics.assignment, "owner");
+    }
+  }
+}
+
+TEST_F(OwnerProcessesTest, AnOwnerThatHasGoneIsNamedUntilItIsBack) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  StartOwners(OwnerArrangements().front(), 3, false);
+  WriteAll(1);
+  ASSERT_TRUE(RenderUnless("\"ball\"").ok());
+  owners_[1].reset();
+  Result<Picture> picture = Status::Internal("");
+  for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end;) {
+    picture = client_->Render(Request(), kPatience);
+    if (!picture.ok()) break;
+    EXPECT_LE(Difference(*picture, 1), 1e-6F);
+  }
+  EXPECT_THAT(picture.status().message(), AnyOf(HasSubstr("owner 1 of 3 has left"), HasSubstr("owner 1 has left")));
+  EXPECT_EQ(picture.status().message().find('\n'), std::string::npos);
+  owners_[1] = VolumeOwner::Start(context_, OptionsOf(boxes_, 1, 3, false)).value();
+  Write(*owners_[1], boxes_, 1, 1);
+  picture = RenderUnless("ball");
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_LE(Difference(*picture, 1), 1e-6F);
+  owners_.clear();
+  for (const Time end = MonotonicNow() + kPatience; picture.ok() && MonotonicNow() < end;) picture = client_->Render(Request(), kPatience);
+  EXPECT_FALSE(picture.ok());
+}
+
+TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  for (const bool share_memory : {true, false}) {
+    SCOPED_TRACE(share_memory);
+    StartOwners(OwnerArrangements()[2], 3, share_memory);
+    std::atomic<std::uint64_t> committed = 0;
+    std::vector<std::jthread> simulation;
+    for (std::uint32_t owner = 0; owner < 3; ++owner) {
+      simulation.emplace_back([&, owner](const std::stop_token& stop) {
+        for (std::uint64_t time = 1; !stop.stop_requested(); ++time) {
+          Write(*owners_[owner], boxes_, owner, time);
+          committed = std::max<std::uint64_t>(committed, time);
+        }
+      });
+    }
+    int pictures = 0;
+    std::string why;
+    for (const Time end = MonotonicNow() + kPatience; pictures < 10 && MonotonicNow() < end;) {
+      const Result<Picture> picture = client_->Render(Request(), kPatience);
+      if (!picture.ok()) {
+        why = picture.status().message();
+        continue;
+      }
+      ++pictures;
+      float least = 1;  // times repeat after 20
+      for (std::uint64_t time = 0; time < 20; ++time) least = std::min(least, Difference(*picture, time));
+      EXPECT_LE(least, 1e-6F);
+    }
+    EXPECT_EQ(pictures, 10) << why;
+    EXPECT_TRUE(owners_[0]->looked_at());
+    simulation.clear();
+  }
+}
+
+TEST_F(OwnerProcessesTest, WrongRegistrationsAreRefusedInOneLine) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const OwnedBoxes boxes = Arrange(OwnerArrangements().front(), kSize, 3);
+  std::vector<std::unique_ptr<VolumeOwner>> others;
+  for (const std::uint32_t owner : {0U, 1U}) {
+    others.push_back(VolumeOwner::Start(context_, OptionsOf(boxes, owner, 3, true)).value());
+    Write(*others.back(), boxes, owner, 1);
+  }
+  while (client_->Render(Request(), kPatience).status().message().find("ball") == std::string::npos) {
+  }
+  const auto error = [&](std::uint32_t number, auto change) {
+    VolumeOwnerOptions options = OptionsOf(boxes, number, 3, true);
+    change(options);
+    const auto owner = VolumeOwner::Start(context_, options);
+    if (!owner.ok()) return owner.status().message();
+    for (std::uint64_t time = 1;; ++time) {
+      const auto slot = (*owner)->Begin(kPatience);
+      if (!slot.ok()) return slot.status().message();
+      EXPECT_TRUE((*owner)->Commit(time, 0).ok());
+      std::this_thread::yield();
+    }
+  };
+  EXPECT_THAT(error(1, [](auto&) {}), HasSubstr("\"ball\": owner 1 of 3: another process is this owner"));
+  EXPECT_THAT(error(2, [](auto& o) { o.dataset = "a b"; }), HasSubstr("dataset name \"a b\""));
+  EXPECT_THAT(error(2, [](auto& o) { o.layout.boxes.pop_back(); }), HasSubstr("boxes of all owners overlap, or leave voxels out"));
+  EXPECT_THAT(error(2, [](auto& o) { o.layout.boxes.push_back(o.layout.boxes[0]); }), HasSubstr("overlap, or leave voxels out"));
+  EXPECT_THAT(error(2, [](auto& o) { o.description.mapping.scale = 2; }), HasSubstr("differ from those of owner 0"));
+  EXPECT_THAT(error(2, [](auto& o) { o.owners = 4; }), HasSubstr("differ from those of owner 0"));
+  EXPECT_THAT(error(2, [](auto& o) { o.owner = 3; }), HasSubstr("owner 3 of 3"));
+  EXPECT_THAT(error(2, [](auto& o) { o.layout.slots = 1; }), HasSubstr("1 slots of an owner, must be in [2, 8]"));
+}
+
+TEST_F(OwnerProcessesTest, AnOwnersKeyIsForOwnersAlone) {
+  const TemporaryDirectory directory("/tmp");
+  ASSERT_NO_FATAL_FAILURE(Start(directory / "keys"));
+  const auto file_of = [&](const char* role) { return directory / "keys/" + std::string(role) + ".json"; };
+  VolumeOwnerOptions options = OptionsOf({{Box{{0, 0, 0}, kSize}, 0}}, 0, 1, true);
+  options.service_file = file_of("worker");
+  EXPECT_THAT(VolumeOwner::Start(context_, options).status().message(), HasSubstr("is of role worker, but owner is needed here"));
+  options.service_file = file_of("owner");
+  const auto owner = VolumeOwner::Start(context_, options).value();
+  Write(*owner, {{Box{{0, 0, 0}, kSize}, 0}}, 0, 1);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,169 @@
+// What the coordinator does with owners as time goes by: silence, requests that wait, requests that nobody answers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/wire/payload.h"
+#include "coordinator/service/owners.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+constexpr Epoch kEpoch = 9;
+constexpr Index3 kSize = {512, 512, 32};  // eight times what an owner is asked for at once
+
+RegisterOwner Registration(std::uint32_t owner, std::uint64_t incarnation) {
+  RegisterOwner m{.incarnation = incarnation, .dataset = "rho", .owner = owner, .owners = 2, .samples = "uint8"};
+  m.description.geometry.size = kSize;
+  m.boxes = {{{0, 0, std::int32_t(owner) * 16}, {512, 512, std::int32_t(owner) * 16 + 16}}};
+  return m;
+}
+
+template <class Message>
+std::vector<std::pair<PeerToken, Message>> Of(const Owners::News& news) {
+  std::vector<std::pair<PeerToken, Message>> found;
+  for (const auto& [to, message] : news.messages) {
+    if (const auto* each = std::get_if<Message>(&message)) found.emplace_back(to, *each);
+  }
+  return found;
+}
+
+class OwnerRulesTest : public testing::Test {
+ protected:
+  Owners::News Hear(PeerToken from, OwnerToCoordinator message, const Bytes& payload = {}) {
+    return owners_->Hear(from, std::move(message), payload, now_);
+  }
+  // Both owners, at time 5.
+  void Register() {
+    for (const std::uint32_t owner : {0U, 1U}) {
+      EXPECT_EQ(Of<OwnerWelcome>(Hear(owner + 1, Registration(owner, owner + 100))).size(), 1U);
+      const Owners::News news = Hear(owner + 1, OwnerTime{kEpoch, 5, 0});
+      ASSERT_EQ(news.datasets.size(), owner);
+      if (owner == 1) source_ = news.datasets[0].came->open;
+    }
+  }
+  // The volume, of this thread; what it is asked for is out after the next Tend.
+  void Read() {
+    opened_ = source_().value();
+    samples_.assign(std::size_t(CountIn(kSize)), std::byte{0});
+    opened_->Read(0, {{0, 0, 0}, kSize}, BoxRoom::Dense({{0, 0, 0}, kSize}, samples_.data(), false), {}, [this](const Status& status) {
+      read_ = status;
+      done_ = true;
+      done_.notify_all();
+    });
+  }
+  Status AwaitRead() {
+    done_.wait(false);
+    return read_;
+  }
+
+  Time now_ = MonotonicNow();
+  std::unique_ptr<Owners> owners_ = std::make_unique<Owners>(
+      kEpoch, [](const std::string&) { return Status::Ok(); }, [] {});
+  std::function<Result<std::shared_ptr<VolumeSource>>()> source_;
+  std::shared_ptr<VolumeSource> opened_;
+  std::vector<std::byte> samples_;
+  std::atomic<bool> done_ = false;
+  Status read_;
+};
+
+TEST_F(OwnerRulesTest, SilenceLosesAnOwnerAndThenTheDataset) {
+  Register();
+  now_ += seconds(4);
+  Hear(1, OwnerPing{kEpoch, 7});
+  now_ += seconds(2);
+  EXPECT_TRUE(owners_->Tend(now_).datasets.empty());
+  EXPECT_EQ(source_().status().message(), "\"rho\": owner 1 of 2 is silent");
+  EXPECT_EQ(Of<Retire>(Hear(2, OwnerPing{kEpoch, 8})).size(), 1U) << "it registers again";
+  now_ += seconds(6);
+  const Owners::News news = owners_->Tend(now_);
+  ASSERT_EQ(news.datasets.size(), 1U);
+  EXPECT_TRUE(news.datasets[0].left);
+  EXPECT_EQ(source_().status().message(), "\"rho\": its owners have left");
+}
+
+TEST_F(OwnerRulesTest, TimesOfSourcesAreToldAndGivenUp) {
+  Register();
+  opened_ = source_().value();
+  EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_)).size(), 2U) << "somebody begins to look";
+  for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 6, 0});
+  const Owners::News news = owners_->Tend(now_);
+  const auto pongs = Of<OwnerPong>(news);
+  ASSERT_EQ(pongs.size(), 2U);
+  EXPECT_EQ(pongs[0].second.used, (std::vector<std::uint64_t>{5, 6}));
+  ASSERT_EQ(news.datasets.size(), 1U) << "time 5 may be given up";
+  EXPECT_FALSE(news.datasets[0].left);
+  EXPECT_TRUE(opened_->info().growth->ask(now_));
+  opened_.reset();
+  EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_))[0].second.used, (std::vector<std::uint64_t>{6}));
+}
+
+TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
+  Register();
+  Read();
+  auto asked = Of<ChunkRequest>(owners_->Tend(now_));
+  ASSERT_EQ(asked.size(), 8U);
+  const Owners::News again = Hear(3, Registration(0, 100));  // another connection
+  EXPECT_EQ(Of<ChunkRequest>(again).size(), 4U);
+  for (auto& [peer, request] : asked) {
+    if (peer == 1) peer = 3;
+    Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
+    const Bytes payload =
+        PackChunk(Bytes(std::vector<std::byte>(std::size_t(request.box.voxel_count()), std::byte(peer))), Codec::kZstd, chunk);
+    Hear(peer, chunk, payload);
+  }
+  EXPECT_TRUE(AwaitRead().ok()) << read_.message();
+  EXPECT_EQ(samples_.front(), std::byte{3});
+  EXPECT_EQ(samples_.back(), std::byte{2});
+}
+
+TEST_F(OwnerRulesTest, ReadsFailInOneLine) {
+  Register();
+  Read();
+  const auto asked = Of<ChunkRequest>(owners_->Tend(now_));
+  ASSERT_FALSE(asked.empty());
+  const ChunkRequest& first = asked.front().second;
+  Hear(asked.front().first, ChunkRefused{kEpoch, first.dataset, first.box, 0, Status::Unavailable("time 5 is not held any more")});
+  for (int i = 0; i < 11; ++i) {  // neither answers what is left, but both are alive
+    now_ += seconds(1);
+    for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{kEpoch, 1});
+    owners_->Tend(now_);
+  }
+  EXPECT_EQ(AwaitRead().message(), "\"rho\": owner 0 of 2: time 5 is not held any more");
+  done_ = false;
+  Read();
+  owners_.reset();
+  EXPECT_EQ(AwaitRead().message(), "the coordinator ends");
+}
+
+TEST_F(OwnerRulesTest, OthersAreRefused) {
+  Register();
+  const auto refusal = [&](PeerToken from, const RegisterOwner& m) {
+    return Of<OwnerRefused>(Hear(from, m)).at(0).second.status.message();
+  };
+  EXPECT_THAT(refusal(3, Registration(1, 7)), HasSubstr("another process is this owner"));
+  EXPECT_THAT(refusal(1, Registration(1, 101)), HasSubstr("this connection is that of another owner"));
+  RegisterOwner wrong = Registration(0, 3);
+  wrong.dataset = "other";
+  wrong.samples = "int7";
+  EXPECT_THAT(refusal(3, wrong), HasSubstr("samples is 'int7', must be one of: int8"));
+  wrong.samples = "float32";
+  EXPECT_THAT(refusal(3, wrong), HasSubstr("description.type is uint8, must be float32 for samples of float32"));
+  wrong.samples = "int8";
+  wrong.boxes[0].end.z = 33;
+  EXPECT_THAT(refusal(3, wrong), HasSubstr("boxes[0] is empty, or not inside the volume"));
+  EXPECT_EQ(Of<Retire>(Hear(3, OwnerPing{kEpoch, 1})).size(), 1U);
+  EXPECT_EQ(Of<Retire>(Hear(1, OwnerPing{kEpoch + 1, 1})).size(), 1U) << "of another life of the coordinator";
+}
+
+}  // namespace
+}  // namespace slabstream
