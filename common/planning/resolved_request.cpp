@@ -103,7 +103,7 @@ Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& data
 namespace {
 
 // Voxels of processes stay there, unless the request names how boxes are assigned.
-Status CheckOwners(const VolumeSummary& summary, FrameRequest& request) {
+Status ResolveOwners(const VolumeSummary& summary, FrameRequest& request) {
   Policy& policy = request.policy;
   if (summary.stored && NamesOwners(summary.stored->source) && policy.assignment == Policy().assignment && !IsDynamic(policy)) {
     policy.assignment = std::ranges::find_if(Assignments(), &AssignmentEntry::by_owner)->name;
@@ -219,7 +219,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
-  if (Status status = CheckOwners(*summary, request); !status.ok()) return status;
+  if (Status status = ResolveOwners(*summary, request); !status.ok()) return status;
   if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
   const Result<bool> as_channel = ShowsAsChannel(request, fields);
   if (!as_channel.ok()) return as_channel.status();
