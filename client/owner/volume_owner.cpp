@@ -25,6 +25,7 @@ namespace slabstream {
 namespace {
 
 constexpr Duration kRegisterAgain = std::chrono::seconds(1);
+constexpr Duration kOthersLeave = std::chrono::seconds(10);  // what an owner before this one needs to be lost
 
 }  // namespace
 
@@ -72,8 +73,9 @@ struct VolumeOwner::Impl {
   Epoch epoch = 0;  // 0: not known to the coordinator
   Time heard, next_send = Time::min();
   Duration heartbeat = kRegisterAgain, timeout = {};
-  std::uint64_t told = 0;  // time
-  std::jthread thread;     // last member: ends first
+  std::optional<Time> refused_since;  // with Unavailable, and not taken since
+  std::uint64_t told = 0;             // time
+  std::jthread thread;                // last member: ends first
 };
 
 void VolumeOwner::Impl::Forget() {
@@ -90,6 +92,7 @@ void VolumeOwner::Impl::Hear(CoordinatorToOwner message, Time now) {
   std::visit(Overloaded{[&](const OwnerWelcome& m) {
                           if (m.incarnation != registration.incarnation) return;
                           epoch = m.epoch;
+                          refused_since.reset();
                           heartbeat = std::chrono::milliseconds(m.heartbeat_ms);
                           timeout = std::chrono::milliseconds(m.timeout_ms);
                           next_send = now;
@@ -103,7 +106,10 @@ void VolumeOwner::Impl::Hear(CoordinatorToOwner message, Time now) {
                           });
                         },
                         [&](const OwnerRefused& m) {
-                          if (m.incarnation == registration.incarnation) Tell([&] { refused = m.status; });
+                          if (m.incarnation != registration.incarnation) return;
+                          if (!refused_since) refused_since = now;
+                          if (m.status.code() == StatusCode::kUnavailable && now < *refused_since + kOthersLeave) return;
+                          Tell([&] { refused = m.status; });
                         },
                         [&](const Retire&) {
                           if (epoch != 0) Forget();

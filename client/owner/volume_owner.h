@@ -48,7 +48,7 @@ class VolumeOwner {
     Duration waited = {};
   };
   // Unavailable: the times of all slots are still used after `timeout`; or the coordinator refuses the key. What the coordinator said, if
-  // it has refused the registration.
+  // it has refused the registration: at once, or after 10 s if other owners are in the way, who may leave.
   Result<Slot> Begin(Duration timeout);
   // InvalidArgument: nothing was begun, or `time` is not above that of the last call. `simulated`: the simulation's own time, in its own
   // unit.

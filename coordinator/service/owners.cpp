@@ -118,9 +118,7 @@ struct Owners::State {
     if (field == nullptr && fields.size() >= kMostFields) {
       return Status::ResourceExhausted(fmt::format("\"{}\": {} fields have owners, which is the limit", m.dataset, fields.size()));
     }
-    const auto wrong = [&](const std::string& what) {
-      return Status::InvalidArgument(fmt::format("\"{}\": owner {} of {}: {}", m.dataset, m.owner, m.owners, what));
-    };
+    const auto wrong = [&](const std::string& what) { return Wrong(StatusCode::kInvalidArgument, m, what); };
     const std::optional<SampleType> samples = SampleTypeNamed(m.samples);
     if (!samples) return wrong(fmt::format("samples is '{}', must be one of: {}", m.samples, SampleTypeNames()));
     if (const ScalarType kept = KeptTypeOf(*samples).type; m.description.type != kept) {
@@ -133,14 +131,21 @@ struct Owners::State {
     }
     if (field == nullptr) return CheckTiled(m, {});
     for (const Place& place : field->places) {
-      if (place.owner && place.owner->registered.incarnation != m.incarnation && !OfOneField(place.owner->registered, m)) {
-        return wrong(fmt::format("owners, description or samples differ from those of owner {}", place.owner->registered.owner));
+      if (place.owner && !OfOneField(place.owner->registered, m)) {
+        return Wrong(StatusCode::kUnavailable, m,
+                     fmt::format("owners, description or samples differ from those of owner {}", place.owner->registered.owner));
       }
     }
-    if (m.owner >= field->places.size()) return wrong(fmt::format("owners is {}, of others {}", m.owners, field->places.size()));
     const std::optional<Owner>& taken = field->places[m.owner].owner;
-    if (taken && taken->registered.incarnation != m.incarnation) return wrong("another process is this owner");
+    if (taken && taken->registered.incarnation != m.incarnation) {
+      return Wrong(StatusCode::kUnavailable, m, "another process is this owner");
+    }
     return CheckTiled(m, field->places);
+  }
+
+  // Unavailable: because of other owners, who may leave.
+  static Status Wrong(StatusCode code, const RegisterOwner& m, const std::string& what) {
+    return {code, fmt::format("\"{}\": owner {} of {}: {}", m.dataset, m.owner, m.owners, what)};
   }
 
   // With the last owner of a field.
@@ -153,11 +158,10 @@ struct Owners::State {
       boxes.insert(boxes.end(), place.owner->registered.boxes.begin(), place.owner->registered.boxes.end());
     }
     if (boxes.size() > kMostFieldBoxes) {
-      return Status::InvalidArgument(fmt::format("\"{}\": {} boxes of all owners, limit {}", m.dataset, boxes.size(), kMostFieldBoxes));
+      return Wrong(StatusCode::kUnavailable, m, fmt::format("{} boxes of all owners, limit {}", boxes.size(), kMostFieldBoxes));
     }
     if (there < m.owners || Tile(m.description.geometry.bounds(), boxes)) return Status::Ok();
-    return Status::InvalidArgument(
-        fmt::format("\"{}\": owner {} of {}: boxes of all owners overlap, or leave voxels out", m.dataset, m.owner, m.owners));
+    return Wrong(StatusCode::kUnavailable, m, "boxes of all owners overlap, or leave voxels out");
   }
 
   void Hear(PeerToken from, RegisterOwner m) {

@@ -28,7 +28,7 @@ inline constexpr Duration kOwnerLooked = std::chrono::seconds(10);   // how long
 inline constexpr Duration kOwnerAnswers = std::chrono::seconds(10);  // without any, what an owner is asked for fails
 inline constexpr std::size_t kMostAskedOfOwner = 16;                 // requests that are out; others wait
 inline constexpr std::size_t kMostFieldBoxes = 65536;                // of all owners of a field
-inline constexpr std::size_t kMostFields = 1024;
+inline constexpr std::size_t kMostFields = 64;
 
 class Owners {
  public:

@@ -53,6 +53,35 @@ class DataRules : public testing::Test {
   CoordinatorScript script;
 };
 
+// ---------------------------------------------------------------- voxels of other processes
+
+class OwnedDataRules : public DataRules {
+ protected:
+  static ScriptConfig Config() {
+    ScriptConfig config = TestConfig();
+    config.datasets = {{"other", DataSource("/named/other.nrrd", "")}};
+    return config;
+  }
+  OwnedDataRules() : DataRules(Config()) {}
+};
+
+TEST_F(OwnedDataRules, ComeAreGivenUpWhileNobodyWaitsAndGo) {
+  DataSource source("2 owners", "");
+  source.open = [] { return Result<std::shared_ptr<VolumeSource>>(Status::Unavailable("an owner has left")); };
+  script.Step(OwnedData{"block", source});
+  EXPECT_EQ(StateOf("block"), DatasetState::kUnloaded);
+  script.Client(kClient, Frame(1, 1));
+  script.Step(OwnedData{"block"});
+  EXPECT_EQ(StateOf("block"), DatasetState::kLoading) << "a frame waits for it";
+  EXPECT_THAT(HandedOut(Loaded(1)), SizeIs(1));
+  EXPECT_EQ(StateOf("block"), DatasetState::kReady);
+  script.Step(OwnedData{"block"});
+  EXPECT_EQ(StateOf("block"), DatasetState::kUnloaded) << "the frame ends with what it has begun with";
+  script.Step(OwnedData{.name = "block", .left = true});
+  script.Step(OwnedData{.name = "other", .left = true});
+  EXPECT_THAT(NamesOf(script.QueryStatus().datasets), ElementsAre("other"));
+}
+
 // ---------------------------------------------------------------- files
 
 TEST_F(DataRules, AFrameWaitsForALookThatBeganAfterItsRequest) {

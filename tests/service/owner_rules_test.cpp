@@ -19,11 +19,11 @@ using std::chrono::seconds;
 using testing::HasSubstr;
 
 constexpr Epoch kEpoch = 9;
-constexpr Index3 kSize = {512, 512, 32};  // eight times what an owner is asked for at once
+constexpr Index3 kSides = {512, 512, 32};  // eight times what an owner is asked for at once
 
 RegisterOwner Registration(std::uint32_t owner, std::uint64_t incarnation) {
   RegisterOwner m{.incarnation = incarnation, .dataset = "rho", .owner = owner, .owners = 2, .samples = "uint8"};
-  m.description.geometry.size = kSize;
+  m.description.geometry.size = kSides;
   m.boxes = {{{0, 0, std::int32_t(owner) * 16}, {512, 512, std::int32_t(owner) * 16 + 16}}};
   return m;
 }
@@ -54,8 +54,8 @@ class OwnerRulesTest : public testing::Test {
   // The volume, of this thread; what it is asked for is out after the next Tend.
   void Read() {
     opened_ = source_().value();
-    samples_.assign(std::size_t(CountIn(kSize)), std::byte{0});
-    opened_->Read(0, {{0, 0, 0}, kSize}, BoxRoom::Dense({{0, 0, 0}, kSize}, samples_.data(), false), {}, [this](const Status& status) {
+    samples_.assign(std::size_t(CountIn(kSides)), std::byte{0});
+    opened_->Read(0, {{0, 0, 0}, kSides}, BoxRoom::Dense({{0, 0, 0}, kSides}, samples_.data(), false), {}, [this](const Status& status) {
       read_ = status;
       done_ = true;
       done_.notify_all();
@@ -152,6 +152,18 @@ TEST_F(OwnerRulesTest, OthersAreRefused) {
   };
   EXPECT_THAT(refusal(3, Registration(1, 7)), HasSubstr("another process is this owner"));
   EXPECT_THAT(refusal(1, Registration(1, 101)), HasSubstr("this connection is that of another owner"));
+  Hear(2, OwnerLeave{kEpoch});
+  RegisterOwner other = Registration(1, 8);
+  other.boxes[0].begin.z = 15;
+  EXPECT_THAT(refusal(4, other), HasSubstr("\"rho\": owner 1 of 2: boxes of all owners overlap, or leave voxels out"));
+  other.boxes[0].begin.z = 17;
+  EXPECT_THAT(refusal(4, other), HasSubstr("overlap, or leave voxels out"));
+  other.boxes = {{{0, 0, 15}, {512, 512, 31}}};  // as many voxels as are missing
+  EXPECT_THAT(refusal(4, other), HasSubstr("overlap, or leave voxels out"));
+  other = Registration(1, 8);
+  other.description.mapping.scale = 2;
+  EXPECT_THAT(refusal(4, other), HasSubstr("owners, description or samples differ from those of owner 0"));
+  EXPECT_EQ(Of<OwnerWelcome>(Hear(4, Registration(1, 8))).size(), 1U);
   RegisterOwner wrong = Registration(0, 3);
   wrong.dataset = "other";
   wrong.samples = "int7";
