@@ -183,13 +183,13 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
   for (const bool share_memory : {true, false}) {
     SCOPED_TRACE(share_memory);
     StartOwners(OwnerArrangements()[2], 3, share_memory);
-    std::atomic<std::uint64_t> committed = 0;
+    std::atomic<std::uint64_t> committed = 0, last = ~std::uint64_t{0};
     std::vector<std::jthread> simulation;
     for (std::uint32_t owner = 0; owner < 3; ++owner) {
-      simulation.emplace_back([&, owner](const std::stop_token& stop) {
-        for (std::uint64_t time = 1; !stop.stop_requested(); ++time) {
+      simulation.emplace_back([&, owner] {
+        for (std::uint64_t time = 1; time <= last && !HasFailure(); ++time) {
           Write(*owners_[owner], boxes_, owner, time);
-          committed = std::max<std::uint64_t>(committed, time);
+          if (owner == 0) committed = time;
         }
       });
     }
@@ -208,6 +208,7 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
     }
     EXPECT_EQ(pictures, 10) << why;
     EXPECT_TRUE(owners_[0]->looked_at());
+    last = committed + 10;  // the same for all: while somebody looks, they wait for each other
     simulation.clear();
   }
 }
