@@ -13,6 +13,8 @@
 
 #include "client/client.h"
 #include "client/owner/volume_owner.h"
+#include "common/service/service_file.h"
+#include "common/wire/any_message.h"
 #include "coordinator/service/service.h"
 #include "laboratory/experiments/owner_arrangements.h"
 #include "tests/service/pictures.h"
@@ -243,6 +245,27 @@ TEST_F(OwnerProcessesTest, AnOwnersKeyIsForOwnersAlone) {
   options.service_file = file_of("owner");
   const auto owner = VolumeOwner::Start(context_, options).value();
   Write(*owner, {{Box{{0, 0, 0}, kSize}, 0}}, 0, 1);
+
+  // Of two messages, the coordinator answers the one that the key may send.
+  RegisterOwner as{.incarnation = 1, .dataset = "other", .samples = "uint8"};
+  as.description.geometry.size = kSize;
+  as.boxes = {{{0, 0, 0}, kSize}};
+  const auto answered = [&](const char* role) {
+    const ServiceFile file = ReadServiceFile(file_of(role)).value();
+    SocketOptions keys;
+    keys.client_keys = file.keys();
+    Socket socket = Socket::Dealer(context_, keys).value();
+    EXPECT_TRUE(socket.Connect(file.endpoint).ok());
+    EXPECT_TRUE(socket.Send({}, Encode(role == std::string("owner") ? MessageView(Heartbeat()) : MessageView(as))).ok());
+    EXPECT_TRUE(socket.Send({}, Encode(role == std::string("owner") ? MessageView(as) : MessageView(Heartbeat()))).ok());
+    const std::array<Socket*, 1> sockets = {&socket};
+    for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end; Wait(sockets, nullptr, end - MonotonicNow())) {
+      if (const auto incoming = socket.TryReceive()) return std::string(NameOf(Decode<AnyMessage>(incoming->header()).value()));
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(answered("owner"), "OwnerWelcome");
+  EXPECT_EQ(answered("worker"), "Retire");
 }
 
 }  // namespace
