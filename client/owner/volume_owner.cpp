@@ -138,7 +138,8 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
 
 void VolumeOwner::Impl::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket};
-  while (!stop.stop_requested()) {
+  bool ended = false;  // it was refused
+  while (!stop.stop_requested() && !ended) {
     const Status done = Guarded("an owner of voxels", [&] {
       Wait(sockets, &wakeup, std::clamp(next_send - MonotonicNow(), Duration::zero(), heartbeat));
       while (const std::optional<Incoming> incoming = socket.TryReceive()) {
@@ -151,7 +152,8 @@ void VolumeOwner::Impl::Run(const std::stop_token& stop) {
       OwnerTime time{.epoch = epoch};
       {
         const std::lock_guard lock(mutex);
-        if (!refused.ok()) return;
+        ended = !refused.ok();
+        if (ended) return;
         time.time = latest;
         time.simulated = simulated;
       }
