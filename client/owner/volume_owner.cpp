@@ -71,7 +71,7 @@ struct VolumeOwner::Impl {
   // Of the thread:
   Socket socket;
   Epoch epoch = 0;  // 0: not known to the coordinator
-  Time heard, next_send = Time::min();
+  Time heard, next_send = {};
   Duration heartbeat = kRegisterAgain, timeout = {};
   std::optional<Time> refused_since;  // with Unavailable, and not taken since
   std::uint64_t told = 0;             // time
@@ -80,7 +80,7 @@ struct VolumeOwner::Impl {
 
 void VolumeOwner::Impl::Forget() {
   epoch = told = 0;
-  next_send = Time::min();
+  next_send = {};
   Tell([this] {
     used.clear();
     looked_at = false;
