@@ -71,7 +71,7 @@ struct VolumeOwner::Impl {
   // Of the thread:
   Socket socket;
   Epoch epoch = 0;  // 0: not known to the coordinator
-  Time heard, next_send = Time::min();
+  Time heard, next_send = {};
   Duration heartbeat = kRegisterAgain, timeout = {};
   std::optional<Time> refused_since;  // with Unavailable, and not taken since
   std::uint64_t told = 0;             // time
@@ -80,7 +80,7 @@ struct VolumeOwner::Impl {
 
 void VolumeOwner::Impl::Forget() {
   epoch = told = 0;
-  next_send = Time::min();
+  next_send = {};
   Tell([this] {
     used.clear();
     looked_at = false;
@@ -138,7 +138,8 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
 
 void VolumeOwner::Impl::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket};
-  while (!stop.stop_requested()) {
+  bool ended = false;  // it was refused
+  while (!stop.stop_requested() && !ended) {
     const Status done = Guarded("an owner of voxels", [&] {
       Wait(sockets, &wakeup, std::clamp(next_send - MonotonicNow(), Duration::zero(), heartbeat));
       while (const std::optional<Incoming> incoming = socket.TryReceive()) {
@@ -151,7 +152,8 @@ void VolumeOwner::Impl::Run(const std::stop_token& stop) {
       OwnerTime time{.epoch = epoch};
       {
         const std::lock_guard lock(mutex);
-        if (!refused.ok()) return;
+        ended = !refused.ok();
+        if (ended) return;
         time.time = latest;
         time.simulated = simulated;
       }

@@ -527,7 +527,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     const Result<std::uint64_t> version = VersionOf(opened.files);
     if (!opened.files.empty() && (!version.ok() || *version != opened.version)) continue;  // they have changed since it was opened
     Result<ReadableSource> read = way->read();
-    if (!read.ok() && opened.growth != nullptr) {
+    if (!read.ok() && opened.growth != nullptr && attempt + 1 < kAttempts) {
       const Result<bool> grown = HaveChanged(*opened.growth);
       if (grown.ok() && *grown) continue;
     }

@@ -13,6 +13,8 @@
 
 #include "client/client.h"
 #include "client/owner/volume_owner.h"
+#include "common/service/service_file.h"
+#include "common/wire/any_message.h"
 #include "coordinator/service/service.h"
 #include "laboratory/experiments/owner_arrangements.h"
 #include "tests/service/pictures.h"
@@ -183,13 +185,13 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
   for (const bool share_memory : {true, false}) {
     SCOPED_TRACE(share_memory);
     StartOwners(OwnerArrangements()[2], 3, share_memory);
-    std::atomic<std::uint64_t> committed = 0;
+    std::atomic<std::uint64_t> committed = 0, last = ~std::uint64_t{0};
     std::vector<std::jthread> simulation;
     for (std::uint32_t owner = 0; owner < 3; ++owner) {
-      simulation.emplace_back([&, owner](const std::stop_token& stop) {
-        for (std::uint64_t time = 1; !stop.stop_requested(); ++time) {
+      simulation.emplace_back([&, owner] {
+        for (std::uint64_t time = 1; time <= last && !HasFailure(); ++time) {
           Write(*owners_[owner], boxes_, owner, time);
-          committed = std::max<std::uint64_t>(committed, time);
+          if (owner == 0) committed = time;
         }
       });
     }
@@ -208,6 +210,7 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
     }
     EXPECT_EQ(pictures, 10) << why;
     EXPECT_TRUE(owners_[0]->looked_at());
+    last = committed + 10;  // the same for all: while somebody looks, they wait for each other
     simulation.clear();
   }
 }
@@ -242,6 +245,27 @@ TEST_F(OwnerProcessesTest, AnOwnersKeyIsForOwnersAlone) {
   options.service_file = file_of("owner");
   const auto owner = VolumeOwner::Start(context_, options).value();
   Write(*owner, {{Box{{0, 0, 0}, kSize}, 0}}, 0, 1);
+
+  // Of two messages, the coordinator answers the one that the key may send.
+  RegisterOwner as{.incarnation = 1, .dataset = "other", .samples = "uint8"};
+  as.description.geometry.size = kSize;
+  as.boxes = {{{0, 0, 0}, kSize}};
+  const auto answered = [&](const char* role) {
+    const ServiceFile file = ReadServiceFile(file_of(role)).value();
+    SocketOptions keys;
+    keys.client_keys = file.keys();
+    Socket socket = Socket::Dealer(context_, keys).value();
+    EXPECT_TRUE(socket.Connect(file.endpoint).ok());
+    EXPECT_TRUE(socket.Send({}, Encode(role == std::string("owner") ? MessageView(Heartbeat()) : MessageView(as))).ok());
+    EXPECT_TRUE(socket.Send({}, Encode(role == std::string("owner") ? MessageView(as) : MessageView(Heartbeat()))).ok());
+    const std::array<Socket*, 1> sockets = {&socket};
+    for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end; Wait(sockets, nullptr, end - MonotonicNow())) {
+      if (const auto incoming = socket.TryReceive()) return std::string(NameOf(Decode<AnyMessage>(incoming->header()).value()));
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(answered("owner"), "OwnerWelcome");
+  EXPECT_EQ(answered("worker"), "Retire");
 }
 
 }  // namespace
