@@ -58,7 +58,7 @@ class LevelBorders {
     }
     const LevelMap map = MapOf(levels);
     const auto value = [&](int level, const Index3& v) {
-      return double(voxels.at(std::size_t(level))[NumberIn(Uniform(kSide >> level), v)]);
+      return double(voxels.at(std::size_t(level)).at(NumberIn(Uniform(kSide >> level), v)));
     };
     const auto sample = [&](int level, const Vec3& place) {
       double sum = 0;
@@ -81,12 +81,13 @@ class LevelBorders {
         if (++next[axis] == map.counts[axis] || map.Of(next) == map.Of(zone)) continue;
         const int finer = std::min(map.Of(zone), map.Of(next)), coarser = std::max(map.Of(zone), map.Of(next));
         for (int i = 0; i < 40; ++i) {
-          // Not at a corner of the zone. In one of two cases beside one of its edges.
-          constexpr double kCell = 1 << (kLevels - 1);
+          // Two cells of any level away from a corner of the zone, so the bends there are of voxels of the domain. In one of two cases
+          // beside one of the zone's edges.
+          constexpr double kMargin = 2 << (kLevels - 1);
           Vec3 place;
           for (const Axis a : kAxes) {
             const double begin = double(zone[a]) * map.side[a], end = begin + map.side[a];
-            place[a] = a == axis ? end : random_.Real(begin + kCell, end - kCell);
+            place[a] = a == axis ? end : random_.Real(begin + kMargin, end - kMargin);
           }
           const Axis beside = kAxes.at(std::size_t(random_.Integer(0, 2)));
           if (beside != axis && zone[beside] > 0 && random_.Chance(0.75)) {
