@@ -379,8 +379,9 @@ void DeclareKeys(const CommandLine& line) {
   issue.AddText("-o,--output", issue_options.output, "The service file, which must not exist yet").TypeName("FILE").Default("NAME.json");
   const auto [rotate, rotate_options] =
       declare("rotate", "Put a new key into the service file of a role; old keys stay valid until they are revoked", KeysAction::kRotate);
-  AddChoice<Role, kRoles.size()>(rotate, "ROLE", rotate_options.order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2]), NameOf(kRoles[3])},
-                                 kRoles, "client, worker, admin or owner")
+  AddChoice<Role, kRoles.size()>(rotate, "ROLE", rotate_options.order.role,
+                                 {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2]), NameOf(kRoles[3])}, kRoles,
+                                 "client, worker, admin or owner")
       .Required();
   const auto [revoke, revoke_options] = declare("revoke", "Revoke a key and end its connections", KeysAction::kRevoke);
   revoke

@@ -133,7 +133,8 @@ Result<AdmittedKey> KeyFolder::Rotate(Role role) {
 }
 
 Result<AdmittedKey> KeyFolder::Issue(const std::string& public_key, Role role, const std::string& name) {
-  if (!IsOfClients(role)) return Status::InvalidArgument("a key with a name is of role client or admin; others share the file of their role");
+  if (!IsOfClients(role))
+    return Status::InvalidArgument("a key with a name is of role client or admin; others share the file of their role");
   if (!IsHolderName(name)) {
     return Status::InvalidArgument(
         fmt::format("name '{}' must be 1 to {} bytes of printable text that can name a file: no '/', no '.' at the beginning",

@@ -1,6 +1,6 @@
 // KeyFolder: the keys of a service, in a folder that only their owner can open: keys.json holds the service's own pair and the public keys
-// that it admits, and client.json, worker.json, admin.json and owner.json are what users of each role get (ServiceFile). Files are written whole or not
-// at all. One process at a time writes; one thread at a time.
+// that it admits, and client.json, worker.json, admin.json and owner.json are what users of each role get (ServiceFile). Files are written
+// whole or not at all. One process at a time writes; one thread at a time.
 #pragma once
 
 #include <set>

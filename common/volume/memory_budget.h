@@ -43,9 +43,9 @@ inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit >
 // Limits of a process that may be stated.
 inline constexpr std::uint64_t kLeastMemoryBytes = std::uint64_t{256} << 20, kMostMemoryBytes = std::uint64_t{1} << 50;
 
-// A limit of a process: a whole number with one of the units M, G, T, or MiB, GiB, TiB, which mean the same: powers of 1024 bytes. Or a part
-// of what the machine has, as 1/4.
-// InvalidArgument, naming `option`: the text is no such number, or it is out of [kLeastMemoryBytes, kMostMemoryBytes].
+// A limit of a process: a whole number with one of the units M, G, T, or MiB, GiB, TiB, which mean the same: powers of 1024 bytes. Or a
+// part of what the machine has, as 1/4. InvalidArgument, naming `option`: the text is no such number, or it is out of [kLeastMemoryBytes,
+// kMostMemoryBytes].
 Result<std::uint64_t> ParseMemoryLimit(const std::string& option, const std::string& text);
 
 // The limits of the processes of a service on one machine.

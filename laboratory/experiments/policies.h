@@ -24,8 +24,8 @@ NamedPolicy BalancedTree();
 // axis becomes the traversal axis.
 std::vector<NamedPolicy> PartitionsAlongTheView();
 // Ways to keep workers evenly loaded while a view moves. First those that never look at a time: "slabs", the paper's; "equal", boxes of
-// equal volume; "bricks", BrickTree(), and "rebuilt", BalancedTree(), cut anew when the transfer function changes. Then that tree with every
-// balance that changes boxes, the compared ones too, by its name; those that hand over whole boxes get four of equal volume a worker.
+// equal volume; "bricks", BrickTree(), and "rebuilt", BalancedTree(), cut anew when the transfer function changes. Then that tree with
+// every balance that changes boxes, the compared ones too, by its name; those that hand over whole boxes get four of equal volume a worker.
 std::vector<NamedPolicy> BalanceMethods();
 inline constexpr int kBoxesAWorker = 4;                      // where a worker has several: with one box each there is no choice
 inline constexpr std::string_view kUsualScheme = "radix-k";  // wherever boxes alone are compared
