@@ -10,9 +10,9 @@
 
 namespace slabstream {
 
-// A long option of sbatch, with or without its dashes, such as "partition=long". Returned with them, as it stands on an #SBATCH line.
-// InvalidArgument: the script decides the option itself (array, nodes, ntasks), or the text has a control character, which may end the
-// line. What else is wrong, sbatch says.
+// `text` is a long option of sbatch, such as "partition=long" or "--partition=long". The result is the option with its dashes, as an
+// #SBATCH line has it. InvalidArgument: the script itself decides the option (array, nodes, ntasks), or the text has a control character,
+// which may end the line. sbatch reports all other errors.
 Result<std::string> ParseDirective(std::string_view text);
 
 // `options`: their paths are absolute, and may hold any bytes but zero; directives begin with dashes (ParseDirective), and of two that

@@ -24,6 +24,7 @@
 namespace slabstream {
 namespace {
 
+constexpr std::uint32_t kMostOwners = 4096;  // as of RegisterOwner
 constexpr Duration kRegisterAgain = std::chrono::seconds(1);
 constexpr Duration kOthersLeave = std::chrono::seconds(10);  // what an owner before this one needs to be lost
 
@@ -190,9 +191,9 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
     options.endpoint = file->endpoint;
     socket_options.client_keys = file->keys();
   }
-  if (options.owner >= options.owners || options.owners > 4096) {
+  if (options.owner >= options.owners || options.owners > kMostOwners) {
     return Status::InvalidArgument(
-        fmt::format("owner {} of {}: must be below it, and there are at most 4096", options.owner, options.owners));
+        fmt::format("owner {} of {}: must be below it, and there are at most {}", options.owner, options.owners, kMostOwners));
   }
   OwnerLayout& layout = options.layout;
   if (layout.slots < 2)

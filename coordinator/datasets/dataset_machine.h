@@ -15,8 +15,8 @@
 //   uploads    A client may send a dataset (AddVolume): it is admitted if its name is free and the memory suffices, its bytes come in order
 //              within a credit, and the executor stores them. It is a dataset once they are all there. If the client falls silent, gives
 //              it up or sends anything else than the next bytes, nothing stays.
-//   owned      Other processes hold the voxels of a dataset at a time (OwnedData). It is a dataset whose files change with each time. While
-//              nobody waits for it, an older time is given up, so that its memory may be overwritten.
+//   owned      Other processes hold the voxels of a dataset, one time after the other (OwnedData). A new time is like a change of the
+//              dataset's files. Once nobody waits for an older time, it is unloaded, so that its owners may overwrite it.
 //
 // What the executor must do: call Step(DatasetTick) no later than NextWake(); carry out the actions in order; answer LoadDataset,
 // CheckDatasetFiles, CheckWatchedFolders, FindDatasets, AnswerQuestion, BeginUpload and FinishUpload with one event each, in any order.

@@ -186,8 +186,8 @@ struct Owners::State {
     owner->registered = std::move(m);
     owner->heard = now;
     peers[from] = {name, number};
-    news.messages.emplace_back(
-        from, OwnerWelcome{epoch, owner->registered.incarnation, 1000, std::uint32_t(kOwnerTimeout / std::chrono::milliseconds(1))});
+    const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
+    news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
     if (!changed) return;
     field.set = ++sets;

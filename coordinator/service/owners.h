@@ -23,7 +23,7 @@
 
 namespace slabstream {
 
-inline constexpr Duration kOwnerTimeout = std::chrono::seconds(5);
+inline constexpr Duration kOwnerHeartbeat = std::chrono::seconds(1), kOwnerTimeout = std::chrono::seconds(5);
 inline constexpr Duration kOwnerLooked = std::chrono::seconds(10);   // how long somebody looks who has asked for a field
 inline constexpr Duration kOwnerAnswers = std::chrono::seconds(10);  // without any, what an owner is asked for fails
 inline constexpr std::size_t kMostAskedOfOwner = 16;                 // requests that are out; others wait

@@ -3,16 +3,12 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
-#include <array>
 #include <atomic>
 #include <charconv>
-#include <cstring>
-#include <mutex>
 #include <optional>
 #include <string_view>
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/frame/dataset_name.h"
 #include "common/volume/box_assembly.h"
 #include "common/volume/stored_at.h"

@@ -447,7 +447,8 @@ TEST_F(Hdf5ImageTest, EvenBoundsPlaceAnAxisBeforeItsCoordinates) {
   EXPECT_THAT(source->info().notes, Contains(HasSubstr("bounds of the coordinates lon place its axis: 0 and steps of 1")));
   EXPECT_THAT(source->info().notes, Contains("coordinates depth place its axis: 10 and steps of 20")) << "its cells are not even";
 
-  // A row for each corner, borders alone, cells with gaps, and one that is not known: its coordinates place it.
+  // Bounds that place nothing, so that the coordinates do: an array of another shape (three times), cells with gaps between them, and an
+  // end that is not a number.
   const double nan = std::nan("");
   for (const auto& [size, bounds] :
        std::vector<std::pair<std::vector<hsize_t>, std::vector<double>>>{{{2, 4}, {-0.5, 0.5, 1.5, 2.5, 0.5, 1.5, 2.5, 3.5}},

@@ -118,7 +118,8 @@ TEST(PlainArrayTest, EvenBoundsPlaceAnAxisBeforeItsCoordinates) {
     EXPECT_EQ(first, 8) << "the axis of lat falls";
     EXPECT_THAT(source->info().notes, Contains(HasSubstr("spacing and origin are those of the coordinates x_bnds, lat_bnds, depth")));
 
-    // Borders alone, cells with gaps, one that is not known, and bounds that are not there: coordinates place the axis.
+    // Bounds that place nothing, so that the coordinates do: an array of another shape, cells with gaps between them, an end that is not a
+    // number, and an array that is not there.
     const auto uneven = [&] {
       EXPECT_THAT(Opened(Open(folder.path()))->info().notes,
                   Contains(HasSubstr("the 4 voxels along x, 0.75 to 1.25 apart, lie at their own places")));
