@@ -35,7 +35,12 @@ class NumbersTest(WithService):
         for number in range(frames):
             self.assertEqual(self.render(number)[0], 200)
         self.assertEqual(self.render(dataset="none")[0], 404)
-        wait_until(lambda: self.service.measure(self.service.coordinator)("coordinator_running_frames") == 0, "rest")
+        # Metrics may be those of 50 ms ago, before the frames.
+        def measured():
+            values = self.service.measure(self.service.coordinator)
+            return values("coordinator_running_frames") == 0 and values("coordinator_refused_total", reason="unknown dataset") == 1
+
+        wait_until(measured, "rest")
 
         coordinator = self.service.measure(self.service.coordinator)
         self.assertEqual(coordinator("coordinator_frames_total", result="done"), frames)
