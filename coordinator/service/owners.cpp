@@ -51,7 +51,8 @@ struct Field {
   std::uint64_t whole = 0;  // time; 0: not all owners are there, or one has no time yet
   bool is_dataset = false;
   std::optional<Time> looked = {};
-  OwnerPong told = {};  // last, without nonce
+  OwnerPong told = {};                            // last, without nonce
+  std::vector<SteeredParameter> parameters = {};  // as they are now; they outlive owner 0
 };
 
 // Whether each voxel of `bounds` is in exactly one box, and no box has another voxel. The function of space that counts boxes is known by
@@ -189,6 +190,7 @@ struct Owners::State {
     const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
     news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
+    if (number == 0) TakeParameters(field);
     if (!changed) return;
     field.set = ++sets;
     FindWhole(name, field);
@@ -246,6 +248,26 @@ struct Owners::State {
     while (times.size() > kMost) times.erase(times.begin());  // no owner has so many slots
     pong.used.assign(times.begin(), times.end());
     return pong;
+  }
+
+  // ---- parameters
+  // Values that were steered stay if owner 0 comes again with the same names, within its limits.
+  void TakeParameters(Field& field) {
+    std::vector<SteeredParameter> declared = field.places[0].owner->registered.steered;
+    if (std::ranges::equal(declared, field.parameters, {}, &SteeredParameter::name, &SteeredParameter::name)) {
+      for (std::size_t i = 0; i < declared.size(); ++i) {
+        declared[i].value = std::clamp(field.parameters[i].value, declared[i].least, declared[i].most);
+      }
+    }
+    field.parameters = std::move(declared);
+    TellParameters(field);
+  }
+
+  void TellParameters(const Field& field) {
+    if (field.parameters.empty() || !field.places[0].owner) return;
+    OwnerSteered& steered =
+        std::get<OwnerSteered>(news.messages.emplace_back(field.places[0].owner->peer, OwnerSteered{.epoch = epoch}).second);
+    for (const SteeredParameter& each : field.parameters) steered.values.push_back(each.value);
   }
 
   // ---- what owners are asked for

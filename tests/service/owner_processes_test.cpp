@@ -233,6 +233,7 @@ TEST_F(OwnerProcessesTest, WrongRegistrationsAreRefusedInOneLine) {
   EXPECT_THAT(error([](auto& o) { o.owner = 3; }), HasSubstr("owner 3 of 1"));
   EXPECT_THAT(error([](auto& o) { o.layout.slots = 1; }), HasSubstr("1 slots of an owner, must be in [2, 8]"));
   EXPECT_THAT(error([](auto& o) { o.layout.boxes[0].held.end.x = 99; }), HasSubstr("memory of an owner: box 0"));
+  EXPECT_THAT(error([](auto& o) { o.parameters = {{"feed", 0, 1, 2}}; }), HasSubstr("RegisterOwner.steered[0].value: 2 is not in [0, 1]"));
 }
 
 TEST_F(OwnerProcessesTest, AnOwnersKeyIsForOwnersAlone) {

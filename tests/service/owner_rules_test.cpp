@@ -148,6 +148,16 @@ TEST_F(OwnerRulesTest, ReadsFailInOneLine) {
   EXPECT_EQ(AwaitRead().message(), "the coordinator ends");
 }
 
+TEST_F(OwnerRulesTest, SteeredValuesOutliveOwnerZeroWithinItsLimits) {
+  RegisterOwner first = Registration(0, 100);
+  EXPECT_TRUE(Of<OwnerSteered>(Hear(1, first)).empty());
+  first.steered = {{"feed", 0, 0.1, 0.03}, {"kill", 0, 1, 0.5}};
+  const auto told = [](const Owners::News& news) { return Of<OwnerSteered>(news).at(0); };
+  EXPECT_EQ(told(Hear(1, first)).second.values, (std::vector<double>{0.03, 0.5}));
+  Hear(2, Registration(1, 101));
+  EXPECT_TRUE(Of<OwnerSteered>(Hear(2, Registration(1, 101))).empty());
+}
+
 TEST_F(OwnerRulesTest, OthersAreRefused) {
   Register();
   const auto refusal = [&](PeerToken from, const RegisterOwner& m) {

@@ -193,6 +193,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"peers", kMaxPeers},
       {"boxes", 4096},
       {"used", 64},
+      {"steered", 64},
+      {"values", 64},
       {"reports", kMaxReports},
       {"spans", kMaxSpans},
       {"open", kMaxOpenRequests},

@@ -305,7 +305,10 @@ std::vector<Stop> SamplesOf() {
 
 template <>
 std::vector<RegisterOwner> SamplesOf() {
-  return {{.dataset = "rho", .description = Description(), .samples = "uint16"},
+  return {{.dataset = "rho",
+           .description = Description(),
+           .samples = "uint16",
+           .steered = {{"feed", 0, 0.1, 0.03}, {std::string(64, '_'), -1e300, 1e300, 1e300}, {"K2", 1, 1, 1}}},
           {kMax64, kLongName, 4095, 4096, RectilinearDescription(), std::string(16, 's'), {kOneVoxel, kWholeBox}, kMax64, kMax32, kMax32}};
 }
 
@@ -337,6 +340,11 @@ std::vector<OwnerLeave> SamplesOf() {
 template <>
 std::vector<OwnerRefused> SamplesOf() {
   return {{1, Status::InvalidArgument("owner 3 of 8")}, {kMax64, Status::Cancelled(kLongText)}};
+}
+
+template <>
+std::vector<OwnerSteered> SamplesOf() {
+  return {{1, {0.5}}, {kMax64, std::vector<double>(64, -1e300)}};
 }
 
 template <>
