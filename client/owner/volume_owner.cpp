@@ -52,7 +52,7 @@ struct VolumeOwner::Impl {
     changed.notify_all();
   }
 
-  const RegisterOwner registration;
+  RegisterOwner registration;  // steered: the thread changes values, with the mutex
   const OwnerLayout layout;
   const std::shared_ptr<OwnerMemory> memory;
   const std::shared_ptr<const MappedOwner> own;  // the same memory, to be read while it is written
@@ -104,6 +104,12 @@ void VolumeOwner::Impl::Hear(CoordinatorToOwner message, Time now) {
                           Tell([&] {
                             used = std::move(m.used);
                             looked_at = m.looked_at;
+                          });
+                        },
+                        [&](const OwnerSteered& m) {
+                          if (m.epoch != epoch || m.values.size() != registration.steered.size()) return;
+                          Tell([&] {
+                            for (std::size_t i = 0; i < m.values.size(); ++i) registration.steered[i].value = m.values[i];
                           });
                         },
                         [&](const OwnerRefused& m) {
@@ -206,10 +212,13 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
                    .owner = options.owner,
                    .owners = options.owners,
                    .description = options.description,
-                   .samples = std::string(ToString(layout.samples))};
+                   .samples = std::string(ToString(layout.samples)),
+                   .steered = std::move(options.parameters)};
   for (const HeldBox& each : layout.boxes) as.boxes.push_back(each.box);
   Result<std::shared_ptr<OwnerMemory>> memory = OwnerMemory::Create(as.incarnation, layout);
   if (!memory.ok()) return memory.status();
+  // The coordinator would drop what it cannot decode.
+  if (const auto checked = Decode(Encode(as)); !checked.ok()) return checked.status();
   as.pid = std::uint32_t(::getpid());
   as.file_descriptor = (*memory)->file_descriptor();
   const Result<std::shared_ptr<const MappedOwner>> own =
@@ -254,6 +263,13 @@ Status VolumeOwner::Commit(std::uint64_t time, double simulated) {
   impl_->begun.reset();
   impl_->wakeup.Notify();
   return Status::Ok();
+}
+
+std::vector<double> VolumeOwner::parameters() const {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<double> values;
+  for (const SteeredParameter& each : impl_->registration.steered) values.push_back(each.value);
+  return values;
 }
 
 bool VolumeOwner::looked_at() const {

@@ -14,12 +14,14 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/transport/context.h"
 #include "common/transport/keys.h"
 #include "common/volume/volume.h"
+#include "common/wire/owners_structs.h"
 #include "data/owned/owner_memory.h"
 
 namespace slabstream {
@@ -34,6 +36,8 @@ struct VolumeOwnerOptions {
   VolumeDescription description;
   OwnerLayout layout;        // its size is filled in; 2 ... kMostOwnerSlots slots
   bool share_memory = true;  // else voxels travel
+  // What whoever watches may change, of owner 0 alone: at most 64, no name twice; names are identifiers of at most 64 characters.
+  std::vector<SteeredParameter> parameters = {};
 };
 
 class VolumeOwner {
@@ -54,6 +58,8 @@ class VolumeOwner {
   // unit.
   Status Commit(std::uint64_t time, double simulated);
 
+  // The present value of each of the options' parameters, in that order. Any thread.
+  std::vector<double> parameters() const;
   bool looked_at() const;  // somebody has asked for a picture within the last seconds
 
  private:

@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <limits>
+#include <set>
+#include <string>
+#include <string_view>
 
 #include "common/frame/dataset_name.h"
 #include "common/renderers/registry.h"
@@ -13,6 +16,12 @@ namespace {
 template <class Items, class Value>
 void CheckRising(const Items& labels, const Value& value, Checker& check) {
   for (std::size_t i = 1; i < labels.size(); ++i) check.That(value(labels[i - 1]) < value(labels[i]), "labels", "values do not rise");
+}
+
+bool IsIdentifier(std::string_view name) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto is_letter = [](char c) { return c == '_' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  return !name.empty() && !is_digit(name.front()) && std::ranges::all_of(name, [&](char c) { return is_letter(c) || is_digit(c); });
 }
 
 }  // namespace
@@ -100,9 +109,17 @@ void Rules(const AddVolume& m, Checker& check) {
       m.labels, [](const NewLabel& label) { return label.value; }, check);
 }
 
+void Rules(const SteeredParameter& m, Checker& check) {
+  check.That(IsIdentifier(m.name), "name", "'" + m.name + "' is no identifier");
+  check.Between("value", m.value, m.least, m.most);
+}
+
 void Rules(const RegisterOwner& m, Checker& check) {
   check.That(!IsOfLabels(m.description.type), "description.type", "one of labels");
   check.That(m.owner < m.owners, "owner", "not below owners");
+  check.That(m.owner == 0 || m.steered.empty(), "steered", "of another owner than 0");
+  std::set<std::string_view> names;
+  for (const SteeredParameter& each : m.steered) check.That(names.insert(each.name).second, "steered", "two of one name");
 }
 
 void Rules(const VolumeCredit& m, Checker& check) {

@@ -6,6 +6,7 @@
 //   OwnerTime     -------------------->            its boxes are whole at this time
 //   OwnerPing     -------------------->            every heartbeat interval, and to learn what is used; OwnerPong answers
 //                 <--------------------  OwnerPong
+//                 <--------------------  OwnerSteered    what its parameters are now
 //                 <--------------------  ChunkRequest    samples of a box at a time, as they are held
 //   Chunk + payload or ChunkRefused -->            Unavailable: it holds another time now
 //   OwnerLeave    -------------------->            an owner ends now
@@ -21,9 +22,9 @@
 
 namespace slabstream {
 
-using OwnerMessage = std::variant<RegisterOwner, OwnerWelcome, OwnerTime, OwnerPing, OwnerPong, OwnerLeave, OwnerRefused>;
+using OwnerMessage = std::variant<RegisterOwner, OwnerWelcome, OwnerTime, OwnerPing, OwnerPong, OwnerLeave, OwnerRefused, OwnerSteered>;
 using OwnerToCoordinator = std::variant<RegisterOwner, OwnerTime, OwnerPing, OwnerLeave, Chunk, ChunkRefused>;
-using CoordinatorToOwner = std::variant<OwnerWelcome, OwnerPong, OwnerRefused, Retire, ChunkRequest>;
+using CoordinatorToOwner = std::variant<OwnerWelcome, OwnerPong, OwnerRefused, OwnerSteered, Retire, ChunkRequest>;
 // What comes to the coordinator's control plane.
 using ToControl = Merged<WorkerToCoordinator, OwnerToCoordinator>;
 

@@ -54,6 +54,7 @@ void Rules(const ViewQuery&, Checker&);
 void Rules(const AddVolume&, Checker&);
 void Rules(const SentFile&, Checker&);
 void Rules(const VolumeCredit&, Checker&);
+void Rules(const SteeredParameter&, Checker&);
 void Rules(const RegisterOwner&, Checker&);
 
 // Each number is finite and above 0.

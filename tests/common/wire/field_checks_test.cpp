@@ -76,6 +76,25 @@ TEST(FieldChecks, Workers) {
   });
 }
 
+TEST(FieldChecks, ParametersOfOwnerZero) {
+  const auto parameter = [](v1::Envelope& e, int i = 0) { return e.mutable_register_owner()->mutable_steered(i); };
+  Check<RegisterOwner>({
+      {[&](auto& e) { parameter(e)->set_name("2k"); }, "RegisterOwner.steered[0].name: '2k' is no identifier"},
+      {[&](auto& e) { parameter(e)->set_name("f-k"); }, "RegisterOwner.steered[0].name: 'f-k' is no identifier"},
+      {[&](auto& e) { parameter(e)->set_name(std::string(65, 'k')); }, "RegisterOwner.steered[0].name: a text of 65 bytes"},
+      {[&](auto& e) { parameter(e)->set_name(""); }, "RegisterOwner.steered[0].name: a text of 0 bytes, expected 1 to 64"},
+      {[&](auto& e) { parameter(e)->set_value(0.2); }, "RegisterOwner.steered[0].value: 0.2 is not in [0, 0.1]"},
+      {[&](auto& e) { parameter(e)->set_least(0.2); }, "RegisterOwner.steered[0].value: 0.03 is not in [0.2, 0.1]"},
+      {[&](auto& e) { parameter(e)->set_most(INFINITY); }, "RegisterOwner.steered[0].most: inf is not a finite number"},
+      {[&](auto& e) { parameter(e, 2)->set_name("feed"); }, "RegisterOwner.steered: two of one name"},
+      {[](auto& e) {
+         e.mutable_register_owner()->set_owners(2);
+         e.mutable_register_owner()->set_owner(1);
+       },
+       "RegisterOwner.steered: of another owner than 0"},
+  });
+}
+
 TEST(FieldChecks, EachFieldHasALightVolumeIfTheFrameHasLight) {
   const std::vector<GroupAssignment> samples = Samples<GroupAssignment>();
   const auto of_fields = std::ranges::find_if(samples, [](const GroupAssignment& m) { return m.setup.fields.size() == 2; });

@@ -305,7 +305,10 @@ std::vector<Stop> SamplesOf() {
 
 template <>
 std::vector<RegisterOwner> SamplesOf() {
-  return {{.dataset = "rho", .description = Description(), .samples = "uint16"},
+  return {{.dataset = "rho",
+           .description = Description(),
+           .samples = "uint16",
+           .steered = {{"feed", 0, 0.1, 0.03}, {std::string(64, '_'), -1e300, 1e300, 1e300}, {"K2", 1, 1, 1}}},
           {kMax64, kLongName, 4095, 4096, RectilinearDescription(), std::string(16, 's'), {kOneVoxel, kWholeBox}, kMax64, kMax32, kMax32}};
 }
 
@@ -337,6 +340,11 @@ std::vector<OwnerLeave> SamplesOf() {
 template <>
 std::vector<OwnerRefused> SamplesOf() {
   return {{1, Status::InvalidArgument("owner 3 of 8")}, {kMax64, Status::Cancelled(kLongText)}};
+}
+
+template <>
+std::vector<OwnerSteered> SamplesOf() {
+  return {{1, {0.5}}, {kMax64, std::vector<double>(64, -1e300)}};
 }
 
 template <>
@@ -580,7 +588,20 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64},
+            {"b", DatasetState::kLoading, {}, {}, "", 0, 0, 0, {}, {}, SimulationStatus{7, 0.5, {{"feed", 0, 0.1, 0.03}}}}}}};
+}
+
+template <>
+std::vector<SteerDataset> SamplesOf() {
+  return {{1, "rho", {{"feed", 0.03}}}, {kMax64, kLongName, std::vector<SteeredValue>(64, {std::string(64, 'k'), -1e300})}};
+}
+
+template <>
+std::vector<SteerReply> SamplesOf() {
+  return {{}, {kMax64, {kMax64, -1e300, {{"feed", 0, 0.1, 0.03}}}}};
 }
 
 template <>
