@@ -27,7 +27,7 @@ for language in "${languages[@]}"; do
   read -r said <&"${owner[0]}"
   echo "$language: $said"
   for _ in {1..200}; do  # until the service has heard of a time
-    "$prefix/bin/slabstream" render "$language" --size 64 --azimuth 30 --range 0:200 -o "$language.png" > render.log 2>&1 && break
+    "$prefix/bin/slabstream" render "$language" --size 64 --azimuth 30 -o "$language.png" > render.log 2>&1 && break
   done
   [[ -f "$language.png" ]] || cat render.log
   exec {owner[1]}>&-
