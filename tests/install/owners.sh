@@ -30,6 +30,6 @@ for language in "${languages[@]}"; do
     "$prefix/bin/slabstream" render "$language" --size 64 --azimuth 30 -o "$language.png" > render.log 2>&1 && break
   done
   [[ -f "$language.png" ]] || cat render.log
-  exec {owner[1]}>&-
+  eval "exec ${owner[1]}>&-"
   wait "$owner_pid"
 done
