@@ -4,8 +4,10 @@
 Ranks are processes that compute a slab of a cube each (heat flow by numpy) and meet after every step. All of them run on the first core, and
 the service and who looks on the last one, so that a worker has a core of its own.
 
-  steps    time of a step, by rank count and by what watches. The ways alternate in one run; a ratio is the median of rounds, each against
-           the same round without an owner. `begin`: computed in the library's memory. `publish`: copied there. Two slots or three
+  steps    time of a step, by rank count and by what watches: processor time of all ranks, with the library's threads, and the share of the
+           time that the rank waits in `begin` or `publish` that waits longest. Both bear other programs on this machine. The ways alternate
+           in one run; a ratio is the median of rounds, each against the same round without an owner. `begin`: computed in the library's
+           memory. `publish`: copied there. Two slots or three
   latency  from the moment when the last rank commits a time until a picture of it has arrived, while one looks all the time
   faults   pictures while a rank is killed and comes again, while a worker is killed, and while workers are added
 
@@ -88,29 +90,31 @@ def advance(now: numpy.ndarray, after: numpy.ndarray) -> None:
         now = to
 
 
-WAYS = {  # whether a service is there, slots, how, whether somebody looks
-    "no owner": (False, 0, "", False),
-    "no service, begin": (False, 2, "begin", False),
-    "nobody looks, begin": (True, 2, "begin", False),
-    "nobody looks, publish": (True, 2, "publish", False),
-    "looked at, begin, 2 slots": (True, 2, "begin", True),
-    "looked at, publish, 2 slots": (True, 2, "publish", True),
-    "looked at, begin, 3 slots": (True, 3, "begin", True),
-    "looked at, publish, 3 slots": (True, 3, "publish", True),
+WAYS = {  # whether a service is there, slots, how, what somebody looks at
+    "no owner": (False, 0, "", ""),
+    "no owner, other data looked at": (True, 0, "", "other"),
+    "no service, begin": (False, 2, "begin", ""),
+    "nobody looks, begin": (True, 2, "begin", ""),
+    "nobody looks, publish": (True, 2, "publish", ""),
+    "looked at, begin, 2 slots": (True, 2, "begin", "heat"),
+    "looked at, publish, 2 slots": (True, 2, "publish", "heat"),
+    "looked at, begin, 3 slots": (True, 3, "begin", "heat"),
+    "looked at, publish, 3 slots": (True, 3, "publish", "heat"),
 }
 
 
 def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, told) -> None:
-    """Steps until `stop`. Rank 0 tells when each began and each rank, how long it waited in all: (rank, waited, begins)."""
+    """Steps until `stop`. Tells (rank, seconds that each step waited, when each began, and the processor time until then)."""
     os.sched_setaffinity(0, {0})
     begin, end = slab(rank, ranks, side)
     now = numpy.random.default_rng(rank).uniform(0, 255, (end - begin, side, side)).astype(numpy.float32)
     own = [numpy.empty_like(now), numpy.empty_like(now)]
     owner = owner_of(rank, ranks, side, service, slots) if how else None
-    begins, waited, step = [], [], 0
+    begins, used, waited, step = [], [], [], 0
     while not last.value:
         step += 1
         begins.append(time.monotonic())
+        used.append(time.process_time())
         if how == "begin":
             with owner.begin(step, timeout=PATIENCE) as (after,):
                 advance(now, after)
@@ -127,18 +131,20 @@ def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: st
         together.wait()
     if owner:
         owner.close()
-    told.put((rank, waited, begins))
+    told.put((rank, waited, begins, used))
 
 
-def look(endpoint: str, stop, arrivals) -> None:
+def look(endpoint: str, dataset: str, side: int, stop, arrivals) -> None:
     """Asks for one picture after the other, and tells when each came, or why not."""
     os.sched_setaffinity(0, {LAST_CORE})
     with ss.connect(endpoint=endpoint) as service:
+        if dataset == "other":  # what a busy worker alone costs a simulation beside it
+            service.add(dataset, numpy.random.default_rng(0).uniform(0, 255, (side, side, side)).astype(numpy.float32))
         azimuth = 0.0
         while not stop.is_set():
             azimuth += 7
             try:
-                service.render("heat", azimuth=azimuth % 360, **PICTURE)
+                service.render(dataset, azimuth=azimuth % 360, **PICTURE)
                 arrivals.put((time.monotonic(), ""))
             except ss.SlabstreamError as error:
                 arrivals.put((time.monotonic(), str(error)))
@@ -152,15 +158,15 @@ def next_picture(arrivals) -> float:
     return arrived[0]
 
 
-def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float]:
-    """Median seconds of a step, the share of the time that the rank waited that waited longest, pictures a second."""
+def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float, float]:
+    """Mean processor seconds of a step, its median seconds, the greatest share of the time that a rank waited, pictures a second."""
     there, slots, how, looked = WAYS[way]
     together, stop, last, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Value("b", 0), FORK.Queue(), FORK.Queue()
     service = running.for_owners if there else "ipc:///nowhere/s"
     simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, told))
                   for rank in range(ranks)]
-    viewer = FORK.Process(target=look, args=(running.endpoint, stop, arrivals))
-    for process in simulation + [viewer] * looked:
+    viewer = FORK.Process(target=look, args=(running.endpoint, looked, side, stop, arrivals))
+    for process in simulation + [viewer] * bool(looked):
         process.start()
     since = next_picture(arrivals) if looked else time.monotonic() + 0.5
     time.sleep(max(since - time.monotonic(), 0) + seconds)
@@ -172,24 +178,27 @@ def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running
             pictures += not arrivals.get(timeout=0.1)[1]
     for process in simulation:
         process.join()
-    begins = [begin for rank, _, begin in of_ranks if rank == 0][0]
+    begins = of_ranks[0][2]
     first = next(i for i, begin in enumerate(begins) if begin >= since)
     spans = [after - before for before, after in zip(begins[first:], begins[first + 1 :])]
-    return statistics.median(spans), max(sum(waited[first:]) for _, waited, _ in of_ranks) / sum(spans), pictures / sum(spans)
+    cpu = sum(used[-1] - used[first] for _, _, _, used in of_ranks) / len(spans)
+    return cpu, statistics.median(spans), max(sum(waited[first:-1]) for _, waited, _, _ in of_ranks) / sum(spans), pictures / sum(spans)
 
 
-def measure_steps(side: int, seconds: float, rounds: int) -> None:
-    print("ranks | way | median step, ms | ratio to no owner | share of time that it waited | pictures a second\n---|---|---|---|---|---")
-    for ranks in (1, 3, 7, 8):
-        found: dict[str, list[tuple[float, float, float]]] = {way: [] for way in WAYS}
+def measure_steps(side: int, seconds: float, rounds: int, rank_counts: list[int]) -> None:
+    print("ranks | way | processor time of a step, ms | ratio to no owner | least and greatest | median step, ms | waits | pictures a second")
+    print("---|---|---|---|---|---|---|---")
+    for ranks in rank_counts:
+        found: dict[str, list[tuple[float, float, float, float]]] = {way: [] for way in WAYS}
         for _ in range(rounds):
             for way in WAYS:
                 with running_service(1) as running:
                     found[way].append(time_steps(way, ranks, side, seconds, running))
         for way, rows in found.items():
-            ratio = statistics.median(row[0] / alone[0] for row, alone in zip(rows, found["no owner"]))
-            step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(3))
-            print(f"{ranks} | {way} | {1e3 * step:.2f} | {ratio:.3f} | {waited:.3f} | {pictures:.1f}", flush=True)
+            ratios = sorted(row[0] / alone[0] for row, alone in zip(rows, found["no owner"]))
+            cpu, step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(4))
+            print(f"{ranks} | {way} | {1e3 * cpu:.2f} | {statistics.median(ratios):.3f} | {ratios[0]:.3f} ... {ratios[-1]:.3f} | {1e3 * step:.1f} | "
+                  f"{100 * waited:.1f} % | {pictures:.1f}", flush=True)
 
 
 def show_numbers(rank: int, ranks: int, side: int, service: str, commits, stop) -> None:
@@ -255,7 +264,7 @@ def measure_faults(side: int) -> None:
     with running_service(2) as running:
         simulation = [FORK.Process(target=keep_showing, args=(rank, ranks, side, running.for_owners)) for rank in range(ranks)]
         stop, arrivals = FORK.Event(), FORK.Queue()
-        viewer = FORK.Process(target=look, args=(running.endpoint, stop, arrivals))
+        viewer = FORK.Process(target=look, args=(running.endpoint, "heat", side, stop, arrivals))
         for process in [*simulation, viewer]:
             process.start()
         next_picture(arrivals)
@@ -315,9 +324,10 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=128, help="voxels a side (default 128)")
     parser.add_argument("--seconds", type=float, default=3, help="of each measurement (default 3)")
     parser.add_argument("--rounds", type=int, default=3, help="of `steps` (default 3)")
+    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 3, 7, 8], help="of `steps` (default 1 3 7 8)")
     options = parser.parse_args()
     print(f"bench/insitu.py {' '.join(sys.argv[1:])}: {checkout()}, {machine()}")
-    measures = {"steps": lambda: measure_steps(options.side, options.seconds, options.rounds),
+    measures = {"steps": lambda: measure_steps(options.side, options.seconds, options.rounds, options.ranks),
                 "latency": lambda: measure_latency(options.side, 4 * options.seconds), "faults": lambda: measure_faults(options.side)}
     for what in options.what:
         if what not in measures:

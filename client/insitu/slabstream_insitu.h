@@ -50,7 +50,7 @@ typedef struct {
   double origin[3];    /* centre of voxel 0, 0, 0 */
   uint32_t owner;      /* [0, owners) */
   uint32_t owners;     /* [1, 4096]; default 1 */
-  uint32_t slots;      /* times that the owner has memory for, [2, 8]; default 2. More of them: fewer waits while somebody looks */
+  uint32_t slots;      /* times that the owner has memory for, [2, 8]; default 3. More of them: fewer waits while somebody looks */
   /* owner.json of a service with keys, or the endpoint of a service for its workers, "tcp://HOST:PORT". Default: what
    * $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host, else tcp://127.0.0.1:7421. */
   const char* service;

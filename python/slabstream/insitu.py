@@ -68,7 +68,7 @@ class Owner:
 
     def __init__(self, dataset: str, shape: Sequence[int], dtype: numpy.typing.DTypeLike, boxes: Sequence[Box] | None = None, *,
                  held: Sequence[Box] | None = None, owner: int = 0, owners: int = 1, spacing: Sequence[float] = (1, 1, 1),
-                 origin: Sequence[float] = (0, 0, 0), slots: int = 2, parameters: Mapping[str, tuple[float, float, float]] | None = None,
+                 origin: Sequence[float] = (0, 0, 0), slots: int = 3, parameters: Mapping[str, tuple[float, float, float]] | None = None,
                  service: str | None = None):
         self.dtype = numpy.dtype(dtype).newbyteorder("=")
         self.waited = 0.0  # seconds, in the last begin() or publish()
