@@ -1,6 +1,7 @@
 #include "coordinator/service/owners.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -9,9 +10,11 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "common/base/overloaded.h"
+#include "common/base/printable.h"
 #include "common/files/file_stamp.h"
 #include "common/frame/dataset_name.h"
 #include "common/wire/payload.h"
@@ -52,7 +55,10 @@ struct Field {
   bool is_dataset = false;
   std::optional<Time> looked = {};
   OwnerPong told = {};                            // last, without nonce
+  double simulated = 0;                           // of `whole`
   std::vector<SteeredParameter> parameters = {};  // as they are now; they outlive owner 0
+
+  SimulationStatus simulation() const { return {whole, simulated, parameters}; }
 };
 
 // Whether each voxel of `bounds` is in exactly one box, and no box has another voxel. The function of space that counts boxes is known by
@@ -201,7 +207,9 @@ struct Owners::State {
     if (m.time <= owner.latest) return;
     owner.latest = m.time;
     const std::string& name = owner.registered.dataset;
-    FindWhole(name, fields.at(name));
+    Field& field = fields.at(name);
+    FindWhole(name, field);
+    if (field.whole == m.time) field.simulated = m.simulated;
   }
 
   void Hear(PeerToken from, const OwnerPing& m) {
@@ -268,6 +276,37 @@ struct Owners::State {
     OwnerSteered& steered =
         std::get<OwnerSteered>(news.messages.emplace_back(field.places[0].owner->peer, OwnerSteered{.epoch = epoch}).second);
     for (const SteeredParameter& each : field.parameters) steered.values.push_back(each.value);
+  }
+
+  Result<SimulationStatus> Steer(const SteerDataset& order) {
+    const auto found = fields.find(order.dataset);
+    if (found == fields.end()) {
+      if (name_is_free(order.dataset).ok()) return Status::NotFound(fmt::format("no dataset \"{}\"", Printable(order.dataset)));
+      return Status::InvalidArgument(fmt::format("\"{}\": no simulation holds it", Printable(order.dataset)));
+    }
+    std::vector<SteeredParameter> steered = found->second.parameters;
+    for (const SteeredValue& each : order.values) {
+      const auto parameter = std::ranges::find(steered, each.name, &SteeredParameter::name);
+      if (parameter == steered.end()) return NoSuchParameter(order.dataset, each.name, steered);
+      if (each.value < parameter->least || each.value > parameter->most) {
+        return Status::InvalidArgument(
+            fmt::format("\"{}\": {} is {}, must be in [{}, {}]", order.dataset, each.name, each.value, parameter->least, parameter->most));
+      }
+      parameter->value = each.value;
+    }
+    if (!order.values.empty()) {
+      found->second.parameters = std::move(steered);
+      TellParameters(found->second);
+    }
+    return found->second.simulation();
+  }
+
+  static Status NoSuchParameter(const std::string& dataset, const std::string& name, const std::vector<SteeredParameter>& known) {
+    if (known.empty()) return Status::InvalidArgument(fmt::format("\"{}\" has no parameters", dataset));
+    std::vector<std::string_view> names;
+    for (const SteeredParameter& each : known) names.push_back(each.name);
+    return Status::InvalidArgument(
+        fmt::format("\"{}\" has no parameter '{}', must be one of: {}", dataset, Printable(name), fmt::join(names, ", ")));
   }
 
   // ---- what owners are asked for
@@ -445,6 +484,18 @@ Owners::News Owners::Hear(PeerToken from, OwnerToCoordinator message, const Byte
     if (data.came) data.came->open = [state = state_, name = data.name] { return State::Open(state, name); };
   }
   return news;
+}
+
+Result<SimulationStatus> Owners::Steer(const SteerDataset& order) {
+  const std::lock_guard lock(state_->mutex);
+  return state_->Steer(order);
+}
+
+void Owners::Describe(std::vector<DatasetStatus>& datasets) const {
+  const std::lock_guard lock(state_->mutex);
+  for (DatasetStatus& each : datasets) {
+    if (const auto field = state_->fields.find(each.name); field != state_->fields.end()) each.simulation = field->second.simulation();
+  }
 }
 
 Owners::News Owners::Tend(Time now) {

@@ -46,6 +46,12 @@ class Owners {
   // What time has brought, and other threads: at least every second, after each event, and when `wake` was called.
   News Tend(Time now);
 
+  // Changes parameters, all or none; what to tell the owner comes with the next Tend. NotFound, InvalidArgument: there is nothing to steer,
+  // no such parameter, or a value beyond its limits.
+  Result<SimulationStatus> Steer(const SteerDataset& order);
+  // Fills in what each dataset's simulation is at.
+  void Describe(std::vector<DatasetStatus>& datasets) const;
+
  private:
   struct State;
   const std::shared_ptr<State> state_;  // shared with sources

@@ -215,6 +215,27 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
   }
 }
 
+TEST_F(OwnerProcessesTest, OwnersHearOfParametersThatClientsChange) {
+  ASSERT_NO_FATAL_FAILURE(Start());
+  boxes_ = Arrange(OwnerArrangements().front(), kSize, 2);
+  for (std::uint32_t owner = 0; owner < 2; ++owner) {
+    VolumeOwnerOptions options = OptionsOf(boxes_, owner, 2, true);
+    if (owner == 0) options.parameters = {{"feed", 0, 0.1, 0.03}, {"kill", 0, 1, 0.5}};
+    owners_.push_back(VolumeOwner::Start(context_, options).value());
+  }
+  EXPECT_EQ(owners_[0]->parameters(), (std::vector<double>{0.03, 0.5}));
+  WriteAll(3);
+  ASSERT_TRUE(RenderUnless("\"ball\"").ok());
+  const Result<SimulationStatus> steered = client_->Steer({.dataset = "ball", .values = {{"kill", 0.75}}});
+  ASSERT_TRUE(steered.ok()) << steered.status().message();
+  EXPECT_EQ(*steered, (SimulationStatus{3, 3, {{"feed", 0, 0.1, 0.03}, {"kill", 0, 1, 0.75}}}));
+  for (const Time end = MonotonicNow() + kPatience; owners_[0]->parameters()[1] != 0.75 && MonotonicNow() < end;) std::this_thread::yield();
+  EXPECT_EQ(owners_[0]->parameters(), (std::vector<double>{0.03, 0.75}));
+  EXPECT_TRUE(owners_[1]->parameters().empty());
+  EXPECT_EQ(client_->QueryStatus().value().datasets.at(0).simulation, *steered);
+  EXPECT_EQ(client_->Steer({.dataset = "ball", .values = {{"feed", 1}}}).status().message(), "\"ball\": feed is 1, must be in [0, 0.1]");
+}
+
 TEST_F(OwnerProcessesTest, WrongRegistrationsAreRefusedInOneLine) {
   ASSERT_NO_FATAL_FAILURE(Start());
   const auto error = [&](auto change) {

@@ -148,14 +148,49 @@ TEST_F(OwnerRulesTest, ReadsFailInOneLine) {
   EXPECT_EQ(AwaitRead().message(), "the coordinator ends");
 }
 
-TEST_F(OwnerRulesTest, SteeredValuesOutliveOwnerZeroWithinItsLimits) {
+TEST_F(OwnerRulesTest, ParametersAreSteeredAllOrNone) {
   RegisterOwner first = Registration(0, 100);
-  EXPECT_TRUE(Of<OwnerSteered>(Hear(1, first)).empty());
   first.steered = {{"feed", 0, 0.1, 0.03}, {"kill", 0, 1, 0.5}};
-  const auto told = [](const Owners::News& news) { return Of<OwnerSteered>(news).at(0); };
-  EXPECT_EQ(told(Hear(1, first)).second.values, (std::vector<double>{0.03, 0.5}));
-  Hear(2, Registration(1, 101));
+  const auto values = [](const Owners::News& news) { return Of<OwnerSteered>(news).at(0).second.values; };
+  EXPECT_EQ(values(Hear(1, first)), (std::vector<double>{0.03, 0.5}));
   EXPECT_TRUE(Of<OwnerSteered>(Hear(2, Registration(1, 101))).empty());
+  for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 5, 0.25});
+  const SimulationStatus steered = owners_->Steer({.dataset = "rho", .values = {{"kill", 1}, {"feed", 0}}}).value();
+  EXPECT_EQ(steered, (SimulationStatus{5, 0.25, {{"feed", 0, 0.1, 0}, {"kill", 0, 1, 1}}}));
+  EXPECT_EQ(values(owners_->Tend(now_)), (std::vector<double>{0, 1}));
+
+  const auto refusal = [&](const std::string& dataset, std::vector<SteeredValue> wanted) {
+    return owners_->Steer({.dataset = dataset, .values = std::move(wanted)}).status().message();
+  };
+  EXPECT_EQ(refusal("rho", {{"kill", 0}, {"feed", 0.2}}), "\"rho\": feed is 0.2, must be in [0, 0.1]");
+  EXPECT_EQ(refusal("rho", {{"kil\nl", 0}}), "\"rho\" has no parameter 'kil?l', must be one of: feed, kill");
+  EXPECT_EQ(refusal("eta", {}), "no dataset \"eta\"");
+  EXPECT_TRUE(Of<OwnerSteered>(owners_->Tend(now_)).empty());
+  std::vector<DatasetStatus> datasets = {{.name = "eta"}, {.name = "rho"}};
+  owners_->Describe(datasets);
+  EXPECT_FALSE(datasets[0].simulation);
+  EXPECT_EQ(datasets[1].simulation, steered);
+}
+
+TEST_F(OwnerRulesTest, SteeredValuesOutliveOwnerZero) {
+  RegisterOwner first = Registration(0, 100);
+  first.steered = {{"feed", 0, 0.1, 0.03}, {"kill", 0, 1, 0.5}};
+  Hear(1, first);
+  Hear(2, Registration(1, 101));
+  EXPECT_TRUE(owners_->Steer({.dataset = "rho", .values = {{"feed", 0.1}, {"kill", 0.75}}}).ok());
+  Hear(1, OwnerLeave{kEpoch});
+  EXPECT_TRUE(owners_->Steer({.dataset = "rho", .values = {{"kill", 0.25}}}).ok()) << "for the one that comes";
+  first.incarnation = 102;
+  first.steered[0].most = 0.05;
+  const auto values = [](const Owners::News& news) { return Of<OwnerSteered>(news).at(0).second.values; };
+  EXPECT_EQ(values(Hear(3, first)), (std::vector<double>{0.05, 0.25}));
+  Hear(3, OwnerLeave{kEpoch});
+  first.steered[0].name = "fed";
+  EXPECT_EQ(values(Hear(4, first)), (std::vector<double>{0.03, 0.5})) << "others begin as they are declared";
+  Hear(4, OwnerLeave{kEpoch});
+  first.steered.clear();
+  Hear(5, first);
+  EXPECT_EQ(owners_->Steer({.dataset = "rho", .values = {{"feed", 0}}}).status().message(), "\"rho\" has no parameters");
 }
 
 TEST_F(OwnerRulesTest, OthersAreRefused) {

@@ -79,6 +79,12 @@ export class Session {
     this.socket.send(JSON.stringify({ type: "view", seq, ...view }));
   }
 
+  // The same view, of a dataset that has another time now.
+  again(): void {
+    this.lastSent = "";
+    if (this.wanted) this.show(this.wanted);
+  }
+
   end(): void {
     this.ended = true;
     clearTimeout(this.timer);

@@ -588,7 +588,20 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64},
+            {"b", DatasetState::kLoading, {}, {}, "", 0, 0, 0, {}, {}, SimulationStatus{7, 0.5, {{"feed", 0, 0.1, 0.03}}}}}}};
+}
+
+template <>
+std::vector<SteerDataset> SamplesOf() {
+  return {{1, "rho", {{"feed", 0.03}}}, {kMax64, kLongName, std::vector<SteeredValue>(64, {std::string(64, 'k'), -1e300})}};
+}
+
+template <>
+std::vector<SteerReply> SamplesOf() {
+  return {{}, {kMax64, {kMax64, -1e300, {{"feed", 0, 0.1, 0.03}}}}};
 }
 
 template <>
