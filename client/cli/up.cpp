@@ -101,7 +101,6 @@ class LocalService {
   }
 
   const ServiceState& state() const { return state_; }
-  const std::string& worker_endpoint() const { return worker_endpoint_; }
 
  private:
   struct Watched {
@@ -179,8 +178,8 @@ class LocalService {
       return StartFailure(0, *child.Ended());
     }
     state_.endpoint = ValueIn(*line, "client");
-    worker_endpoint_ = ValueIn(*line, "workers");
-    if (!state_.endpoint.empty() && !worker_endpoint_.empty()) return Status::Ok();
+    state_.worker_endpoint = ValueIn(*line, "workers");
+    if (!state_.endpoint.empty() && !state_.worker_endpoint.empty()) return Status::Ok();
     return Status::Internal(fmt::format("{} said '{}' instead of its endpoints", kCoordinatorProgram, *line));
   }
 
@@ -197,7 +196,7 @@ class LocalService {
                                           "--memory",          MemoryArgument(memory_.worker), "--log-level",
                                           LogLevelOfChildren()};
     if (state_.keys_folder.empty()) {
-      arguments.insert(arguments.end(), {"--coordinator", worker_endpoint_});
+      arguments.insert(arguments.end(), {"--coordinator", state_.worker_endpoint});
     } else {
       arguments.insert(arguments.end(), {"--service", ServiceFileOf(Role::kWorker)});
     }
@@ -224,7 +223,6 @@ class LocalService {
   const UpOptions& options_;
   const MemoryShares memory_;
   ServiceState state_;
-  std::string worker_endpoint_;
   std::vector<Watched> children_;  // the coordinator, then the workers
 };
 
@@ -250,14 +248,14 @@ Result<std::string> KeysFolder(const UpOptions& options, const std::string& stat
   return fmt::format("{}/keys-{}", state_directory, FileNameOf(fmt::format("{}-{}", listen->host, listen->port)));
 }
 
-Status PrintReady(const UpOptions& options, const ServiceState& state, const std::string& worker_endpoint) {
+Status PrintReady(const UpOptions& options, const ServiceState& state) {
   const bool default_endpoint = state.endpoint == kDefaultEndpoint || !state.keys_folder.empty();
   const std::string endpoint = default_endpoint ? "" : fmt::format(" --endpoint {}", state.endpoint);
   std::cout << fmt::format("slabstream is up at {} (coordinator pid {}, {} workers); logs are in {}\n", state.endpoint, state.coordinator,
                            state.workers.size(), state.log_directory);
   std::cout << fmt::format("  slabstream render NAME -o picture.png{0}\n  slabstream status{0}\n", endpoint);
   if (state.keys_folder.empty()) {
-    std::cout << fmt::format("  slabstream-worker --coordinator {} adds a worker\n", worker_endpoint);
+    std::cout << fmt::format("  slabstream-worker --coordinator {} adds a worker\n", state.worker_endpoint);
   } else {
     std::cout << fmt::format(
         "Service files for other hosts are in {}: client.json, worker.json, admin.json. Everybody who has one has its role.\n"
@@ -325,7 +323,7 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
     if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
   }
-  Status told = PrintReady(options, service.state(), service.worker_endpoint());
+  Status told = PrintReady(options, service.state());
   if (told.ok() && ready) told = LeaveTerminal(log_directory + "/up.log", *ready);
   if (!told.ok()) {
     service.Stop(true);

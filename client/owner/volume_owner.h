@@ -48,7 +48,8 @@ class VolumeOwner {
   ~VolumeOwner();  // leaves
 
   struct Slot {
-    std::span<std::byte> bytes;  // where layout.boxes say; what they held may still be there
+    // Where layout.boxes say; what they held may still be there. Never those of the last commit, from which the next time is computed.
+    std::span<std::byte> bytes;
     Duration waited = {};
   };
   // Unavailable: the times of all slots are still used after `timeout`; or the coordinator refuses the key. What the coordinator said, if

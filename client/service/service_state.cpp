@@ -37,9 +37,13 @@ std::optional<ServiceState> Load(const std::string& path) {
   const Result<Json> json = Json::Parse(*text);
   if (!json.ok()) return std::nullopt;
   try {
-    return ServiceState{json->at("endpoint").text(),          json->at("started_unix").get<double>(),
-                        json->at("coordinator").get<pid_t>(), json->at("workers").get<std::vector<pid_t>>(),
-                        json->at("log_directory").text(),     json->value("keys_folder", std::string()),
+    return ServiceState{json->at("endpoint").text(),
+                        json->at("started_unix").get<double>(),
+                        json->at("coordinator").get<pid_t>(),
+                        json->at("workers").get<std::vector<pid_t>>(),
+                        json->at("log_directory").text(),
+                        json->value("keys_folder", std::string()),
+                        json->value("worker_endpoint", std::string()),
                         json->value("unlisted", false)};
   } catch (const std::runtime_error&) {
     return std::nullopt;
@@ -79,13 +83,10 @@ Result<std::string> StateDirectory() {
 Status SaveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
-  const Json json = {{"coordinator", state.coordinator},
-                     {"endpoint", state.endpoint},
-                     {"keys_folder", state.keys_folder},
-                     {"log_directory", state.log_directory},
-                     {"started_unix", state.started_unix},
-                     {"unlisted", state.unlisted},
-                     {"workers", state.workers}};
+  const Json json = {{"coordinator", state.coordinator},         {"endpoint", state.endpoint},
+                     {"keys_folder", state.keys_folder},         {"log_directory", state.log_directory},
+                     {"started_unix", state.started_unix},       {"unlisted", state.unlisted},
+                     {"worker_endpoint", state.worker_endpoint}, {"workers", state.workers}};
   return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
 }
 
@@ -211,6 +212,20 @@ Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
   if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
   if (!named->endpoint.empty()) return ServiceAddress(named->endpoint);
   return ServiceAddress(state ? state->endpoint : std::string(kDefaultEndpoint));
+}
+
+Result<ServiceChoice> ResolveOwnerService(std::string text) {
+  if (const char* named = Variable("SLABSTREAM_OWNER_SERVICE"); text.empty() && named != nullptr) text = named;
+  if (text.find("://") != std::string::npos) {
+    const Result<Endpoint> endpoint = ParseEndpoint(text, false);
+    if (!endpoint.ok()) return endpoint.status();
+    return ServiceChoice{.endpoint = text};
+  }
+  if (!text.empty()) return ServiceChoice{.file = text};
+  const std::optional<ServiceState> state = FindState("");
+  if (!state) return ServiceChoice{.endpoint = WorkerEndpointFor(*ParseEndpoint(kDefaultEndpoint, false)).ToString()};
+  if (state->keys_folder.empty()) return ServiceChoice{.endpoint = state->worker_endpoint};
+  return ServiceChoice{.file = fmt::format("{}/{}.json", state->keys_folder, NameOf(Role::kOwner))};
 }
 
 bool IsRunning(pid_t pid, const std::string& program) {

@@ -24,9 +24,10 @@ struct ServiceState {
   double started_unix = 0;  // seconds; two services may start within one
   pid_t coordinator = 0;
   std::vector<pid_t> workers;
-  std::string log_directory;  // a subdirectory of StateDirectory()
-  std::string keys_folder;    // empty: it has no keys
-  bool unlisted = false;      // one `view` started it: only who names its endpoint means it
+  std::string log_directory;    // a subdirectory of StateDirectory()
+  std::string keys_folder;      // empty: it has no keys
+  std::string worker_endpoint;  // and for owners
+  bool unlisted = false;        // one `view` started it: only who names its endpoint means it
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 
@@ -60,6 +61,10 @@ bool NoServiceHere(const ServiceChoice& choice);
 // that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its admin. Errors: of
 // NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
+// Where an owner of voxels finds its service: `text`, the path of a service file of role owner, or an endpoint for workers; if it is empty,
+// what $SLABSTREAM_OWNER_SERVICE names; else the last service started here; else where one listens for workers by default.
+// InvalidArgument: the endpoint is none.
+Result<ServiceChoice> ResolveOwnerService(std::string text);
 
 // Whether `pid` runs (a zombie does not) and is one of ours: its /proc/PID/stat names `program` (the kernel keeps 15 characters).
 bool IsRunning(pid_t pid, const std::string& program);
