@@ -3,7 +3,7 @@
 #   cli                 the command line; needs client-runtime
 #   gateway             HTTP and the viewer's page; needs client-runtime
 #   client-runtime      libslabstream.so.N, and the module that writes EXR, TIFF, PDF and SVG
-#   client-development  header, CMake package, pkg-config file, examples; needs client-runtime
+#   client-development  headers, Fortran module as source, CMake package, pkg-config file, examples; needs client-runtime
 #   python              the Python client
 #   lab                 slabstream-laboratory, which `slabstream bench` and `slabstream experiment` start, and slabstream-lab, the pages of experiments
 include(CMakePackageConfigHelpers)
@@ -24,6 +24,8 @@ if(SLABSTREAM_PICTURES)
   install(TARGETS slabstream_pictures_module LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/slabstream COMPONENT client-runtime)
 endif()
 install(FILES ${CMAKE_SOURCE_DIR}/client/api/slabstream/client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/slabstream COMPONENT client-development)
+install(FILES ${CMAKE_SOURCE_DIR}/client/insitu/slabstream_insitu.h ${CMAKE_SOURCE_DIR}/client/insitu/slabstream_insitu.f90
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT client-development)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT client-development USE_SOURCE_PERMISSIONS)
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Slabstream)

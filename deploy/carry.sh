@@ -28,6 +28,9 @@ pick_programs() {
   for program in "${@:2}"; do cp "$work/programs/usr/bin/$program" "$root/usr/bin/"; done
 }
 
+# The client library, into a root.
+pick_library() { (cd "$work/programs" && find usr/lib -name 'libslabstream.so.*' -exec cp -d --parents -t "$1" {} +); }
+
 # What writes EXR, TIFF, PDF and SVG, into a root.
 pick_modules() { (cd "$work/programs" && find usr/lib -path '*/slabstream/*.so' -exec cp --parents -t "$1" {} +); }
 

@@ -218,7 +218,7 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
   Result<std::shared_ptr<OwnerMemory>> memory = OwnerMemory::Create(as.incarnation, layout);
   if (!memory.ok()) return memory.status();
   // The coordinator would drop what it cannot decode.
-  if (const auto checked = Decode<OwnerToCoordinator>(Encode(as), 0); !checked.ok()) return checked.status();
+  if (const auto checked = Decode(Encode(as)); !checked.ok()) return checked.status();
   as.pid = std::uint32_t(::getpid());
   as.file_descriptor = (*memory)->file_descriptor();
   const Result<std::shared_ptr<const MappedOwner>> own =

@@ -17,6 +17,7 @@ from .errors import (
 )
 from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
+from .insitu import Owner
 from .loading import Volume, load, render, show
 from .local import shutdown
 from .presets import presets
@@ -31,7 +32,7 @@ __version__ = "0.2.0"
 
 __all__ = [
     "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image", "Internal",
-    "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Progress", "Region", "ResourceExhausted",
+    "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Progress", "Region", "ResourceExhausted",
     "Sample", "Service", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status", "TransferFunction", "Unavailable",
     "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open", "presets", "render", "show", "shutdown",
 ]

@@ -75,6 +75,17 @@ def find_program() -> str:
     return found
 
 
+def find_library() -> str:
+    """`libslabstream.so.0`: beside the program, or in a folder of libraries there; else its name, for the loader to find."""
+    name = "libslabstream.so.0"
+    try:
+        folder = pathlib.Path(find_program()).resolve().parent
+    except NotFound:
+        return name
+    places = [folder, folder / "lib", folder.parent / "lib", *folder.parent.glob("lib/*-linux-gnu")]
+    return next((str(place / name) for place in places if (place / name).exists()), name)
+
+
 def run_program(program: str, command: str, *arguments: str, given: bytes = b"") -> bytes:
     """What a command of `slabstream` prints, which reads `given`. InvalidArgument, Unavailable: it failed, and says why."""
     done = subprocess.run([program, command, *arguments], input=given, capture_output=True)

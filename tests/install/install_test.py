@@ -79,18 +79,18 @@ class Installed(unittest.TestCase):
         for program in ("slabstream-coordinator", "slabstream-worker"):
             self.assertNotIn("OpenImageIO", run("ldd", self.prefix / "bin" / program), program)
 
-    def test_library_exports_its_namespace_alone(self) -> None:
+    def test_library_exports_its_namespace_and_the_interface_in_c(self) -> None:
         version = f"SLABSTREAM_{VERSION.split('.')[0]}"
         library = self.prefix / LIB / "libslabstream.so"
         symbols = [line.split(maxsplit=2)[2] for line in run("nm", "--dynamic", "--defined-only", library).splitlines()]
         self.assertIn(version, symbols)
         for symbol in symbols:
-            self.assertRegex(symbol, rf"^({version}|_Z(TI|TS|TV|NK|N)?N?10slabstream2v0\w+@@{version})$")
+            self.assertRegex(symbol, rf"^({version}|slabstream_insitu_\w+@@{version}|_Z(TI|TS|TV|NK|N)?N?10slabstream2v0\w+@@{version})$")
 
-    def test_header_includes_the_standard_library_alone(self) -> None:
-        header = (self.prefix / "include/slabstream/client.h").read_text()
-        for name in re.findall(r"^#include (.*)", header, re.MULTILINE):
-            self.assertRegex(name, r"^<[a-z]+>$")
+    def test_headers_include_the_standard_library_alone(self) -> None:
+        for header in ("slabstream/client.h", "slabstream_insitu.h"):
+            for name in re.findall(r"^#include (.*)", (self.prefix / "include" / header).read_text(), re.MULTILINE):
+                self.assertRegex(name, r"^<[a-z]+(int\.h)?>$")
 
     def test_nothing_names_the_folders_of_the_build(self) -> None:
         source = re.search(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.*)$", (pathlib.Path(BUILD) / "CMakeCache.txt").read_text(), re.MULTILINE).group(1)
@@ -110,6 +110,17 @@ class Installed(unittest.TestCase):
                 self.assertTrue((read_png(file.read_bytes()) == read_png(picture)).all(), client)
             else:
                 self.assertEqual(file.read_bytes(), picture, client)
+
+    def test_owners_in_c_and_fortran_show_the_same_field(self) -> None:
+        folder = self.new_folder()
+        said = run(HERE / "owners.sh", self.prefix, LIB, HERE, folder)
+        pictures = sorted(path.name for path in folder.glob("*.png"))
+        self.assertEqual(pictures, ["c.png", "fortran.png"] if shutil.which("gfortran") else ["c.png"], said)
+        if len(pictures) == 1:
+            print("skipped: an owner in Fortran, because gfortran is missing")
+        self.assertGreater(read_png((folder / "c.png").read_bytes())[..., 3].max(), 100)
+        for picture in pictures:
+            self.assertEqual((folder / picture).read_bytes(), (folder / "c.png").read_bytes(), picture)
 
     def test_examples_make_the_picture_of_the_command_line(self) -> None:
         folder = self.new_folder()
