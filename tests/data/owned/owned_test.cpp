@@ -25,6 +25,8 @@
 
 #include "common/volume/stored_at.h"
 #include "data/owned/owned_source.h"
+#include "data/owned/process_memory.h"
+#include "data/sources/copy_samples.h"
 #include "tests/support/random_box.h"
 
 namespace slabstream {
@@ -253,6 +255,37 @@ struct OwnerOfArray {
 Status ReadWhole(const MappedOwner& owner, std::vector<float>& samples) {
   samples.assign(OwnerOfArray::kBytes / sizeof(float), 0);
   return owner.Read(0, OwnerOfArray::kBox, 1, BoxRoom::Dense(OwnerOfArray::kBox, reinterpret_cast<std::byte*>(samples.data())));
+}
+
+// As CopySamples in this process, whatever lies between samples: parts near each other are copied with what is between them, and a large
+// box half by half.
+TEST(ProcessMemory, CopiesAreThoseOfCopySamples) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 100; ++i) {
+    const Index3 count = {random.Integer(1, 30), random.Integer(1, 30), random.Integer(1, 30)};
+    const auto type = SampleType(random.Integer(0, 10));
+    std::array<int, 3> order = {0, 1, 2};
+    Shuffle(random, order);
+    std::array<std::int64_t, 3> steps = {};
+    std::int64_t step = random.Integer(1, 3);
+    for (const int axis : order) {
+      steps.at(std::size_t(axis)) = step;
+      step = step * count[axis] + (random.Integer(0, 1) == 0 ? random.Integer(0, 2) : random.Integer(0, 3000));
+    }
+    std::vector<std::byte> array(std::size_t(step) * BytesPerSample(type));
+    for (std::size_t at = 0; at < array.size(); ++at) array[at] = std::byte(at * 37 >> 3);
+    const bool exact = random.Integer(0, 1) == 0;
+    const std::size_t room = std::size_t(count.x + 3) * std::size_t(count.y) * std::size_t(count.z);
+    std::vector<std::byte> expected(room * 8), copied(room * 8);
+    const auto to = [&](std::vector<std::byte>& bytes) {
+      return BoxRoom{bytes.data(), count.x + 3, (count.x + 3) * count.y, false, exact};
+    };
+    CopySamples(type, array.data(), steps, count, to(expected));
+    const auto first = reinterpret_cast<std::uint64_t>(array.data());
+    ASSERT_TRUE(CopyProcessSamples(std::uint32_t(::getpid()), type, first, steps, count, to(copied)).ok());
+    ASSERT_EQ(copied, expected) << i;
+  }
 }
 
 TEST(OwnerMemory, ArraysThatAreGoneGiveAnError) {
