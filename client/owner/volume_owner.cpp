@@ -247,9 +247,9 @@ Result<VolumeOwner::Slot> VolumeOwner::Begin(Duration timeout) {
   if (!impl_->refused.ok()) return impl_->refused;
   if (!slot)
     return Status::Unavailable(fmt::format("\"{}\": the times of all {} slots are used", impl_->registration.dataset, impl_->layout.slots));
-  impl_->times.at(*slot) = 0;
   impl_->begun = slot;
-  return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, *slot};
+  const std::uint64_t freed = std::exchange(impl_->times.at(*slot), 0);
+  return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, freed};
 }
 
 Status VolumeOwner::Commit(std::uint64_t time, double simulated, std::span<const std::byte* const> arrays) {

@@ -50,7 +50,7 @@ class VolumeOwner {
   struct Slot {
     std::span<std::byte> bytes;  // where layout.boxes say; what they held may still be there
     Duration waited = {};
-    std::uint32_t number = 0;  // below layout.slots; nobody reads the arrays of its last Commit any more
+    std::uint64_t freed = 0;  // nobody reads the arrays of this time any more; 0: none
   };
   // Unavailable: the times of all slots are still used after `timeout`; or the coordinator refuses the key. What the coordinator said, if
   // it has refused the registration: at once, or after 10 s if other owners are in the way, who may leave.
