@@ -27,6 +27,7 @@ from dask.core import flatten
 from distributed.comm import get_address_host
 from distributed.diagnostics.plugin import SchedulerPlugin, WorkerPlugin
 
+from .address import is_loopback
 from .errors import InvalidArgument, SlabstreamError, Unavailable
 from .image import Image
 from .insitu import Owner
@@ -48,13 +49,18 @@ _MOST_BOXES, _MOST_BOXES_OF_ONE = 65536, 4096  # docs/wire.md, section 8
 Box = tuple[tuple[int, int], ...]  # (begin, end) along z, y and x
 
 
+def _write_private(file: pathlib.Path, content: bytes) -> None:
+    file.touch(0o600)
+    file.write_bytes(content)
+
+
 class _Program:
     """A program of ours that ends with this process or before, and a private folder for its files, which goes with it."""
 
     def __init__(self, name: str, files: Mapping[str, bytes], *arguments: str):
         self.folder = tempfile.mkdtemp(prefix="slabstream-")
         for file, content in files.items():
-            pathlib.Path(self.folder, file).write_bytes(content)
+            _write_private(pathlib.Path(self.folder, file), content)
         program = str(pathlib.Path(find_program()).with_name(name))
         self._kept = Kept([program, *(argument.replace("{folder}", self.folder) for argument in arguments)], f"rm -rf -- '{self.folder}'")
         self.first_line = self._kept.first_line
@@ -72,7 +78,8 @@ class _Coordinator(SchedulerPlugin):
 
     async def start(self, scheduler: Any) -> None:
         host = "127.0.0.1" if scheduler.address.startswith("inproc:") else get_address_host(scheduler.address)
-        keys = [] if host.startswith("127.") else ["--keys", "{folder}/keys"]
+        host = f"[{host}]" if ":" in host else host
+        keys = [] if is_loopback(host) else ["--keys", "{folder}/keys"]
         self._program = _Program("slabstream-coordinator", {}, "--listen", f"tcp://{host}:*", *keys)
         said = await asyncio.to_thread(self._program.first_line, _START_SECONDS)
         self.endpoints = dict(word.split("=", 1) for word in said.split() if "=" in word)
@@ -201,7 +208,7 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         else:
             with tempfile.TemporaryDirectory(prefix="slabstream-") as folder:
                 file = pathlib.Path(folder, "client.json")
-                file.write_bytes(ours)
+                _write_private(file, ours)
                 self.service = connect(file)
         wanted, deadline = len(client.scheduler_info(n_workers=-1)["workers"]), clock.monotonic() + _START_SECONDS
         while (there := len(self.service.status().workers)) < wanted:
