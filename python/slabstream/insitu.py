@@ -107,7 +107,8 @@ class Owner:
         arrays = []
         for pointer, shape, strides in zip(pointers, self._held, self._strides):
             size = sum((side - 1) * step for side, step in zip(shape, strides)) + self.dtype.itemsize
-            arrays.append(numpy.ndarray(shape, self.dtype, (ctypes.c_char * size).from_address(pointer), strides=strides))
+            samples = numpy.frombuffer((ctypes.c_char * size).from_address(pointer), self.dtype)
+            arrays.append(numpy.lib.stride_tricks.as_strided(samples, shape, strides))
         return arrays
 
     def _commit(self, time: int, simulated: float | None) -> None:
