@@ -107,7 +107,7 @@ class _Beside(WorkerPlugin):
     def setup(self, worker: Any) -> None:
         self.owners: dict[str, Owner] = {}
         memory = worker.memory_manager.memory_limit
-        limit = ["--memory", str(max(memory // _MEMORY_PART, _LEAST_MEMORY))] if memory else []
+        limit = ["--memory", f"{max(memory // _MEMORY_PART, _LEAST_MEMORY) >> 20}M"] if memory else []
         service = ["--service", "{folder}/worker.json"] if self._files else ["--coordinator", self._endpoint]
         self._program = _Program("slabstream-worker", self._files, "--threads", str(worker.state.nthreads), *limit, *service)
         self.service = f"{self._program.folder}/owner.json" if self._files else self._endpoint
@@ -200,6 +200,14 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         self._lock, self._numbers = threading.RLock(), itertools.count(1)
         self._held: collections.OrderedDict[str, tuple[_Field, Any]] = collections.OrderedDict()  # by names of arrays; with what keeps the chunks
         client.register_plugin(_Coordinator(self._plugin, client.id), name=self._plugin)
+        try:
+            self._start()
+        except BaseException:
+            self._end()
+            raise
+
+    def _start(self) -> None:
+        client = self._client
         endpoints, files = client.run_on_scheduler(_told, self._plugin)
         ours = files.pop("client.json", None)
         client.register_plugin(_Beside(self._plugin, endpoints["workers"], files), name=self._plugin)
@@ -308,14 +316,18 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         self.service.close()
         _services.pop(self._client.id, None)
         if self._client.status == "running":
-            self._client.unregister_worker_plugin(self._plugin)
-            self._client.run_on_scheduler(_end_coordinator, self._plugin)
+            self._end()
+
+    def _end(self) -> None:
+        self._client.run_on_scheduler(_end_programs, self._plugin)
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
 
-async def _end_coordinator(plugin: str, dask_scheduler: Any) -> None:
+async def _end_programs(plugin: str, dask_scheduler: Any) -> None:
+    if plugin in dask_scheduler.worker_plugins:
+        await dask_scheduler.unregister_worker_plugin(None, plugin)
     await dask_scheduler.plugins[plugin].close()
     dask_scheduler.remove_plugin(plugin)
 
