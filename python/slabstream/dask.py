@@ -264,13 +264,14 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         samples, spacing, origin = _upright(volume)
         if not all(length > 0 for along in samples.chunks for length in along):  # or NaN
             raise InvalidArgument("the array has chunks without voxels or of unknown sizes: rechunk() or compute_chunk_sizes() helps")
-        if len(distributed.futures_of(samples)) < samples.npartitions:
-            samples = self._client.persist(samples)
+        keys = list(flatten(samples.__dask_keys__()))
         futures = {future.key: future for future in distributed.futures_of(samples)}
+        if not all(key in futures for key in keys):
+            futures = {future.key: future for future in distributed.futures_of(self._client.persist(samples))}
         distributed.wait(list(futures.values()))
         who = self._client.who_has(list(futures.values()))
         chunks: dict[str, list[tuple[Any, Box]]] = {}
-        for key, box in zip(flatten(samples.__dask_keys__()), _boxes(samples.chunks)):
+        for key, box in zip(keys, _boxes(samples.chunks)):
             if futures[key].status == "error":
                 futures[key].result()  # raises what the computation has raised
             if not who.get(key):
