@@ -307,7 +307,7 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         with self._lock:
             field, _ = self._held.pop(name, (None, None))
             if field is not None and self._client.status == "running":
-                self._client.run(_leave, self._plugin, field.dataset, workers=list(field.chunks), on_error="ignore")
+                self._client.run(_leave, self._plugin, field.dataset, on_error="ignore")  # all that there are: those of the field may have gone
 
     def close(self) -> None:
         """Ends the service's programs; chunks stay where they are."""
