@@ -143,7 +143,7 @@ class OwnerProcessesTest : public testing::Test {
 
 TEST_F(OwnerProcessesTest, PicturesAreThoseOfOneArray) {
   for (const OwnerArrangement& arrangement : OwnerArrangements()) {
-    for (const auto [share_memory, arrays] : {std::pair(true, false), {true, true}, {false, false}, {false, true}}) {
+    for (const auto& [share_memory, arrays] : {std::pair(true, false), {true, true}, {false, false}, {false, true}}) {
       SCOPED_TRACE(testing::Message() << arrangement.name << (share_memory ? ", in place" : ", asked") << (arrays ? ", in arrays" : ""));
       owners_.clear();
       workers_.clear();
