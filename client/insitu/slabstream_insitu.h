@@ -77,9 +77,10 @@ SLABSTREAM_INSITU_API int slabstream_insitu_parameter(slabstream_insitu* handle,
 SLABSTREAM_INSITU_API int slabstream_insitu_start(slabstream_insitu* handle);
 
 /* Memory for the arrays of the next time, so that nothing is copied: sets pointers[i] to the first sample of the array of box i, at a
- * multiple of 64 bytes. What they hold is that of an older time, or 0. Write all samples and commit; until then, begin gives the same
- * memory again. A slot that a picture may use is not given away: begin waits up to `timeout_seconds` (0: not at all) and tells how long in
- * `waited_seconds`, if that is not NULL. UNAVAILABLE: it waited in vain. */
+ * multiple of 64 bytes. What they hold is that of an older time, or 0. It is never the memory of the last commit, from which the simulation
+ * may compute the next time. Write all samples and commit; until then, begin gives the same memory again. A slot that a picture may use is
+ * not given away: begin waits up to `timeout_seconds` (0: not at all) and tells how long in `waited_seconds`, if that is not NULL.
+ * UNAVAILABLE: it waited in vain. */
 SLABSTREAM_INSITU_API int slabstream_insitu_begin(slabstream_insitu* handle, double timeout_seconds, void** pointers,
                                                   double* waited_seconds);
 

@@ -48,7 +48,8 @@ class VolumeOwner {
   ~VolumeOwner();  // leaves
 
   struct Slot {
-    std::span<std::byte> bytes;  // where layout.boxes say; what they held may still be there
+    // Where layout.boxes say; what they held may still be there. Never those of the last commit, from which the next time is computed.
+    std::span<std::byte> bytes;
     Duration waited = {};
     std::uint64_t freed = 0;  // nobody reads the arrays of this time any more; 0: none
   };

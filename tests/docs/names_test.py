@@ -10,7 +10,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *sorted((ROOT / "docs").rglob("*.md"))]
-CODE = {".h", ".cpp", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
+CODE = {".h", ".cpp", ".f90", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
 TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab", "slabstream-laboratory"}
 
 # What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman, kubectl, CMake

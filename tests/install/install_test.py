@@ -118,9 +118,9 @@ class Installed(unittest.TestCase):
         self.assertEqual(pictures, ["c.png", "fortran.png"] if shutil.which("gfortran") else ["c.png"], said)
         if len(pictures) == 1:
             print("skipped: an owner in Fortran, because gfortran is missing")
-        self.assertGreater(read_png((folder / "c.png").read_bytes())[..., 3].max(), 100)
-        for picture in pictures:
-            self.assertEqual((folder / picture).read_bytes(), (folder / "c.png").read_bytes(), picture)
+        pixels = [read_png((folder / picture).read_bytes()) for picture in pictures]
+        self.assertGreater(pixels[0][..., 3].max(), 100)
+        self.assertTrue((pixels[0] == pixels[-1]).all())
 
     def test_examples_make_the_picture_of_the_command_line(self) -> None:
         folder = self.new_folder()
