@@ -101,13 +101,15 @@ class _Coordinator(SchedulerPlugin):
 class _Beside(WorkerPlugin):
     """The worker beside a Dask worker, and the owners in that: they end with it."""
 
-    def __init__(self, name: str, endpoint: str, files: Mapping[str, bytes]):
-        self.name, self._endpoint, self._files = name, endpoint, files
+    def __init__(self, name: str, endpoint: str, files: Mapping[str, bytes], memory: str | None):
+        self.name, self._endpoint, self._files, self._memory = name, endpoint, files, memory
 
     def setup(self, worker: Any) -> None:
         self.owners: dict[str, Owner] = {}
-        memory = worker.memory_manager.memory_limit
-        limit = ["--memory", f"{max(memory // _MEMORY_PART, _LEAST_MEMORY) >> 20}M"] if memory else []
+        memory, of_dask = self._memory, worker.memory_manager.memory_limit
+        if memory is None and of_dask:
+            memory = f"{max(of_dask // _MEMORY_PART, _LEAST_MEMORY) >> 20}M"
+        limit = ["--memory", memory] if memory else []
         service = ["--service", "{folder}/worker.json"] if self._files else ["--coordinator", self._endpoint]
         self._program = _Program("slabstream-worker", self._files, "--threads", str(worker.state.nthreads), *limit, *service)
         self.service = f"{self._program.folder}/owner.json" if self._files else self._endpoint
@@ -195,22 +197,22 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
     #: The connected service: its status(), and pictures of other datasets.
     service: Service
 
-    def __init__(self, client: Any):
+    def __init__(self, client: Any, memory: str | None = None):
         self._client, self._plugin = client, f"slabstream-{client.id}"
         self._lock, self._numbers = threading.RLock(), itertools.count(1)
         self._held: collections.OrderedDict[str, tuple[_Field, Any]] = collections.OrderedDict()  # by names of arrays; with what keeps the chunks
         client.register_plugin(_Coordinator(self._plugin, client.id), name=self._plugin)
         try:
-            self._start()
+            self._start(memory)
         except BaseException:
             self._end()
             raise
 
-    def _start(self) -> None:
+    def _start(self, memory: str | None) -> None:
         client = self._client
         endpoints, files = client.run_on_scheduler(_told, self._plugin)
         ours = files.pop("client.json", None)
-        client.register_plugin(_Beside(self._plugin, endpoints["workers"], files), name=self._plugin)
+        client.register_plugin(_Beside(self._plugin, endpoints["workers"], files, memory), name=self._plugin)
         if ours is None:
             self.service = connect(endpoint=endpoints["client"])
         else:
@@ -336,12 +338,15 @@ async def _end_programs(plugin: str, dask_scheduler: Any) -> None:
 _services: dict[str, DaskService] = {}  # by the id of the client
 
 
-def start(client: Any = None) -> DaskService:
+def start(client: Any = None, *, memory: str | None = None) -> DaskService:
     """The service of a Dask client (None: the present one): it is started if there is none. Slabstream is installed where the scheduler and
-    the workers run. Workers that come later get a worker beside them, too."""
+    the workers run. Workers that come later get a worker beside them, too.
+
+    `memory`: the limit of each worker beside a Dask worker, as "4G"; None: a quarter of the Dask worker's. Pictures that follow one another
+    are quick if the voxels that it draws fit."""
     client = distributed.get_client() if client is None else client
     if client.id not in _services:
-        _services[client.id] = DaskService(client)
+        _services[client.id] = DaskService(client, memory)
     return _services[client.id]
 
 
