@@ -42,8 +42,8 @@ _ASK_AGAIN_SECONDS = 0.02
 _MOST_TRIES = 8            # of a picture, if owners go
 _TRY_AGAIN_SECONDS = 0.25  # once longer for each try: until Dask knows that a worker of its has gone
 _MOST_ARRAYS = 4           # that are kept for further pictures
-_MEMORY_PART = 4           # of a Dask worker's memory: for the worker beside it
-_LEAST_MEMORY = 512 << 20
+_MEMORY_PART = 3           # of a Dask worker's memory: for the worker beside it
+_LEAST_MEMORY = 1 << 30
 _MOST_BOXES, _MOST_BOXES_OF_ONE = 65536, 4096  # docs/wire.md, section 8
 
 Box = tuple[tuple[int, int], ...]  # (begin, end) along z, y and x
@@ -342,7 +342,7 @@ def start(client: Any = None, *, memory: str | None = None) -> DaskService:
     """The service of a Dask client (None: the present one): it is started if there is none. Slabstream is installed where the scheduler and
     the workers run. Workers that come later get a worker beside them, too.
 
-    `memory`: the limit of each worker beside a Dask worker, as "4G"; None: a quarter of the Dask worker's. Pictures that follow one another
+    `memory`: the limit of each worker beside a Dask worker, as "4G"; None: a third of the Dask worker's. Pictures that follow one another
     are quick if the voxels that it draws fit."""
     client = distributed.get_client() if client is None else client
     if client.id not in _services:
