@@ -92,25 +92,34 @@ class OwnerProcessesTest : public testing::Test {
       owners_.push_back(VolumeOwner::Start(context_, OptionsOf(boxes_, owner, owners, share_memory)).value());
     }
   }
-  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time) {
+  // `arrays`: where samples lie, if not in slots. It is not used any more once the next time is begun.
+  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time,
+                    std::vector<std::byte>* arrays = nullptr) {
     const std::shared_ptr<const Volume> volume = AtTime(time);
     const Result<VolumeOwner::Slot> slot = owner.Begin(kPatience);
     ASSERT_TRUE(slot.ok()) << slot.status().message();
     std::size_t to = 0;
+    std::vector<const std::byte*> begins;
+    if (arrays != nullptr) arrays->resize(slot->bytes.size());
+    std::byte* const samples = arrays != nullptr ? arrays->data() : slot->bytes.data();
     for (const OwnedBox& each : boxes) {
       if (each.owner != number) continue;
+      if (arrays != nullptr) begins.push_back(samples + to);
       for (std::int32_t z = each.box.begin.z; z < each.box.end.z; ++z) {
         for (std::int32_t y = each.box.begin.y; y < each.box.end.y; ++y) {
           const auto row = std::size_t(each.box.size().x);
-          std::copy_n(volume->block.bytes.begin() + volume->block.Offset({each.box.begin.x, y, z}), row, slot->bytes.begin() + long(to));
+          std::copy_n(volume->block.bytes.begin() + volume->block.Offset({each.box.begin.x, y, z}), row, samples + to);
           to += row;
         }
       }
     }
-    EXPECT_TRUE(owner.Commit(time, double(time)).ok());
+    EXPECT_TRUE(owner.Commit(time, double(time), begins).ok());
   }
-  void WriteAll(std::uint64_t time) {
-    for (std::uint32_t owner = 0; owner < owners_.size(); ++owner) Write(*owners_[owner], boxes_, owner, time);
+  void WriteAll(std::uint64_t time, bool in_arrays = false) {
+    arrays_.resize(owners_.size());
+    for (std::uint32_t owner = 0; owner < owners_.size(); ++owner) {
+      Write(*owners_[owner], boxes_, owner, time, in_arrays ? &arrays_[owner] : nullptr);
+    }
   }
   // What a frame ends with, once it does not end with `status` any more: owners come when they come.
   Result<Picture> RenderUnless(const std::string& status, const FrameRequest& request = Request()) {
@@ -126,6 +135,7 @@ class OwnerProcessesTest : public testing::Test {
   Context context_;
   std::unique_ptr<CoordinatorService> coordinator_;
   std::vector<std::unique_ptr<WorkerService>> workers_;
+  std::vector<std::vector<std::byte>> arrays_;  // of owners
   std::vector<std::unique_ptr<VolumeOwner>> owners_;
   OwnedBoxes boxes_;
   std::optional<Client> client_;
@@ -136,17 +146,17 @@ TEST_F(OwnerProcessesTest, PicturesAreThoseOfOneArray) {
       {{4, 3}, {2, 5}, {7, 4}, {3, 1}, {5, 5}, {6, 2}, {2, 2}, {7, 3}, {3, 4}, {6, 5}}};  // owners and workers
   std::size_t number = 0;
   for (const OwnerArrangement& arrangement : OwnerArrangements()) {
-    for (const bool share_memory : {true, false}) {
-      const auto& [owners, workers] = kNumbers.at(number++);
+    for (const auto& [share_memory, arrays] : {std::pair(true, false), {true, true}, {false, false}, {false, true}}) {
+      const auto& [owners, workers] = kNumbers.at(number++ % kNumbers.size());
       SCOPED_TRACE(testing::Message() << arrangement.name << ", " << owners << " owners, " << workers << " workers"
-                                      << (share_memory ? ", in place" : ", asked"));
+                                      << (share_memory ? ", in place" : ", asked") << (arrays ? ", in arrays" : ""));
       owners_.clear();
       workers_.clear();
       client_.reset();
       coordinator_.reset();
       ASSERT_NO_FATAL_FAILURE(Start({}, workers));
       StartOwners(arrangement, owners, share_memory);
-      WriteAll(7);
+      WriteAll(7, arrays);
       ASSERT_TRUE(RenderUnless("\"ball\"").ok());
       std::uint64_t asked = 0;
       for (const FrameRequest& request : RequestsOfRenderers(kNear)) {
