@@ -106,9 +106,9 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
                           Largest(d, bottom) + reach < image.y_begin || Least(d, top) - reach > image.y_end);
   if (places.empty || !places.narrow) return;
   places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line, so its ends suffice
-  NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
+  NarrowSpline(places.x, [&](std::int32_t i, auto first, auto before, auto middle, auto after) HWY_ATTR {
     hn::Store(first, di, places.first_x + i);
-    hn::StoreInterleaved4(left, middle, right, hn::Zero(df), df, places.weight_x + 4 * i);
+    hn::StoreInterleaved4(before, middle, after, hn::Zero(df), df, places.weight_x + 4 * i);
   });
   NarrowSpline(places.y, [&](std::int32_t i, auto first, auto upper, auto middle, auto lower) HWY_ATTR {
     hn::Store(first, di, places.first_y + i);
