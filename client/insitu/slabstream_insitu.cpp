@@ -225,6 +225,23 @@ int slabstream_insitu_publish(slabstream_insitu* handle, uint64_t time, double s
   });
 }
 
+int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers, double timeout_seconds,
+                            uint64_t* freed) {
+  return Call("adopt", [&] {
+    if (Status status = After(handle, "adopt"); !status.ok()) return status;
+    std::vector<const std::byte*> arrays;
+    for (std::size_t i = 0; i < handle->arrays.size(); ++i) {
+      if (pointers == nullptr || pointers[i] == nullptr) return Status::InvalidArgument(fmt::format("adopt: pointer {} is NULL", i));
+      const std::uint64_t to_held = handle->options.layout.boxes[i].offset - handle->arrays[i].offset;
+      arrays.push_back(static_cast<const std::byte*>(pointers[i]) + to_held);
+    }
+    const Result<VolumeOwner::Slot> slot = Begin(*handle, timeout_seconds);
+    if (!slot.ok()) return slot.status();
+    if (freed != nullptr) *freed = slot->freed;
+    return handle->owner->Commit(time, simulated, arrays);
+  });
+}
+
 int slabstream_insitu_poll(slabstream_insitu* handle, int* looked_at, double* values) {
   return Call("poll", [&] {
     if (Status status = After(handle, "poll"); !status.ok()) return status;

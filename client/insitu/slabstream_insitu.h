@@ -93,6 +93,13 @@ SLABSTREAM_INSITU_API int slabstream_insitu_commit(slabstream_insitu* handle, ui
 SLABSTREAM_INSITU_API int slabstream_insitu_publish(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers,
                                                     const int64_t (*strides)[3], double timeout_seconds);
 
+/* begin and commit without a copy and without memory of the library: samples are read where they lie in this process, by workers on its
+ * host through the kernel (process_vm_readv). pointers[i]: the first sample of the array of box i, with the strides of add_box. The arrays
+ * must not change or go until adopt, begin or publish has given their slot to a later time, or close: `freed`, if it is not NULL, is set to
+ * the time whose arrays are not read any more, or to 0. If it fails, these arrays are not read. */
+SLABSTREAM_INSITU_API int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers,
+                                                  double timeout_seconds, uint64_t* freed);
+
 /* What the service has said last; it never waits. looked_at: 1 if somebody has asked for a picture within the last seconds, else 0. values:
  * those of all parameters, in the order of their declaration. Either may be NULL. Owner 0 alone hears of new values; others get what they
  * declared. Let it broadcast what it gets (MPI_Bcast), so that all use a value from the same step on. */

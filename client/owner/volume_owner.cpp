@@ -247,15 +247,18 @@ Result<VolumeOwner::Slot> VolumeOwner::Begin(Duration timeout) {
   if (!impl_->refused.ok()) return impl_->refused;
   if (!slot)
     return Status::Unavailable(fmt::format("\"{}\": the times of all {} slots are used", impl_->registration.dataset, impl_->layout.slots));
-  impl_->times.at(*slot) = 0;
   impl_->begun = slot;
-  return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since};
+  const std::uint64_t freed = std::exchange(impl_->times.at(*slot), 0);
+  return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, freed};
 }
 
-Status VolumeOwner::Commit(std::uint64_t time, double simulated) {
+Status VolumeOwner::Commit(std::uint64_t time, double simulated, std::span<const std::byte* const> arrays) {
   if (!impl_->begun) return Status::InvalidArgument("Commit without Begin");
   if (time <= impl_->latest) return Status::InvalidArgument(fmt::format("time {} is not above {}, the last one", time, impl_->latest));
-  impl_->memory->Commit(*impl_->begun, time, simulated);
+  if (const std::size_t boxes = impl_->layout.boxes.size(); !arrays.empty() && arrays.size() != boxes) {
+    return Status::InvalidArgument(fmt::format("arrays of {} boxes, must be of {}", arrays.size(), boxes));
+  }
+  impl_->memory->Commit(*impl_->begun, time, simulated, arrays);
   impl_->Tell([&] {
     impl_->times.at(*impl_->begun) = impl_->latest = time;
     impl_->simulated = simulated;

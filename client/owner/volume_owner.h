@@ -51,13 +51,16 @@ class VolumeOwner {
     // Where layout.boxes say; what they held may still be there. Never those of the last commit, from which the next time is computed.
     std::span<std::byte> bytes;
     Duration waited = {};
+    std::uint64_t freed = 0;  // nobody reads the arrays of this time any more; 0: none
   };
   // Unavailable: the times of all slots are still used after `timeout`; or the coordinator refuses the key. What the coordinator said, if
   // it has refused the registration: at once, or after 10 s if other owners are in the way, who may leave.
   Result<Slot> Begin(Duration timeout);
-  // InvalidArgument: nothing was begun, or `time` is not above that of the last call. `simulated`: the simulation's own time, in its own
-  // unit.
-  Status Commit(std::uint64_t time, double simulated);
+  // `simulated`: the simulation's own time, in its own unit. `arrays`: samples that already lie elsewhere in this process are read there,
+  // and the slot takes no memory for them. For each box, it has the address of the first sample of what is held, or null: the sample is in
+  // the slot. Arrays must not change until the slot is begun again or this ends. InvalidArgument: nothing was begun, `time` is not above
+  // that of the last call, or arrays are neither none nor as many as boxes.
+  Status Commit(std::uint64_t time, double simulated, std::span<const std::byte* const> arrays = {});
 
   // The present value of each of the options' parameters, in that order. Any thread.
   std::vector<double> parameters() const;

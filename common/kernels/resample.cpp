@@ -16,15 +16,6 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
-                  LocalImage& picture) {
-  ResampleRowsReference(frame, frame_from_picture, y_begin, y_end, picture);
-}
-
-#else
-
 using PixelTag = hn::FixedTag<float, 4>;  // one pixel
 // Up to four neighbouring pixels of a row.
 using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_t{16}, HWY_MAX_BYTES / sizeof(float))>;
@@ -260,8 +251,6 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   const bool affine = frame_from_picture[6] == 0 && frame_from_picture[7] == 0;  // of orthographic views
   (affine ? ResampleRowsAs<true> : ResampleRowsAs<false>)(frame, frame_from_picture, y_begin, y_end, picture);
 }
-
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -190,7 +190,8 @@ std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& fiel
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
   for (const OwnerPlace& place : field.owners) {
     const Result<std::shared_ptr<const MappedOwner>> owner = MappedOwner::Open(place);
-    const bool fits = owner.ok() && (!as || ((*owner)->layout().size == as->size && (*owner)->layout().samples == as->samples));
+    const bool fits = owner.ok() && (!as || ((*owner)->layout().size == as->size && (*owner)->layout().samples == as->samples)) &&
+                      (*owner)->Reaches(field.time);
     mapped.push_back(fits ? *owner : nullptr);
   }
   return mapped;

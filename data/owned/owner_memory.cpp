@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <map>
 #include <mutex>
 #include <utility>
 
+#include "data/owned/process_memory.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -23,21 +25,30 @@ struct OwnerHeader {
   std::array<std::int32_t, 3> size;
   std::uint32_t boxes, slots, unused;
   std::uint64_t slot_bytes;
+  std::uint64_t address;  // of this header in the owner: who finds the incarnation there reads the memory of that process
   std::array<OwnerSlot, kMostOwnerSlots> of_slots;
 };
 
 namespace {
 
 constexpr std::uint64_t kMagic = 0x534c41424f574e52ULL;  // "SLABOWNR"
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint64_t kPage = 4096;
 constexpr std::int64_t kMostStride = std::int64_t{1} << 40;  // so that no sum of steps within a volume overflows
 
-static_assert(std::atomic<double>::is_always_lock_free && sizeof(OwnerHeader) == 248 && sizeof(HeldBox) == 80);
+static_assert(std::atomic<double>::is_always_lock_free && sizeof(OwnerHeader) == 256 && sizeof(HeldBox) == 80);
 
 std::uint64_t InPages(std::uint64_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
-std::uint64_t BeginOfSlot(std::size_t boxes, std::uint64_t slot_bytes, std::uint64_t slot) {
-  return InPages(sizeof(OwnerHeader) + boxes * sizeof(HeldBox)) + slot * InPages(slot_bytes);
+using ArrayAddress = std::atomic<std::uint64_t>;
+std::uint64_t BytesOfHeader(std::uint64_t boxes, std::uint64_t slots) {
+  return sizeof(OwnerHeader) + boxes * (sizeof(HeldBox) + slots * sizeof(ArrayAddress));
+}
+std::uint64_t BeginOfSlot(const OwnerLayout& layout, std::uint64_t slot) {
+  return InPages(BytesOfHeader(layout.boxes.size(), layout.slots)) + slot * InPages(layout.slot_bytes);
+}
+ArrayAddress* ArraysOf(const SealedMemory& memory, const OwnerLayout& layout, std::uint64_t slot) {
+  const std::size_t boxes = layout.boxes.size();
+  return reinterpret_cast<ArrayAddress*>(memory.data() + BytesOfHeader(boxes, 0)) + slot * boxes;
 }
 
 }  // namespace
@@ -87,7 +98,7 @@ Status OwnerLayout::Check() const {
 
 Result<std::shared_ptr<OwnerMemory>> OwnerMemory::Create(std::uint64_t incarnation, const OwnerLayout& layout) {
   if (Status status = layout.Check(); !status.ok()) return status;
-  Result<SealedMemory> memory = SealedMemory::Create(BeginOfSlot(layout.boxes.size(), layout.slot_bytes, layout.slots));
+  Result<SealedMemory> memory = SealedMemory::Create(BeginOfSlot(layout, layout.slots));
   if (!memory.ok()) return memory.status();
   std::shared_ptr<OwnerMemory> owner(new OwnerMemory(*std::move(memory), layout));
   OwnerHeader& header = owner->header();
@@ -98,6 +109,7 @@ Result<std::shared_ptr<OwnerMemory>> OwnerMemory::Create(std::uint64_t incarnati
   header.boxes = std::uint32_t(layout.boxes.size());
   header.slots = layout.slots;
   header.slot_bytes = layout.slot_bytes;
+  header.address = reinterpret_cast<std::uint64_t>(&header);
   std::ranges::copy(layout.boxes, reinterpret_cast<HeldBox*>(&header + 1));
   header.magic = kMagic;
   return owner;
@@ -108,14 +120,24 @@ std::span<std::byte> OwnerMemory::Begin(std::uint32_t slot) {
   of.generation.store(of.generation | 1, std::memory_order_relaxed);
   // Readers see that before anything that is written to the slot from now on.
   std::atomic_thread_fence(std::memory_order_seq_cst);
-  return {memory_.data() + BeginOfSlot(header().boxes, slot_bytes_, slot), slot_bytes_};
+  return {memory_.data() + BeginOfSlot(layout_, slot), layout_.slot_bytes};
 }
 
-void OwnerMemory::Commit(std::uint32_t slot, std::uint64_t time, double simulated) {
+void OwnerMemory::Commit(std::uint32_t slot, std::uint64_t time, double simulated, std::span<const std::byte* const> arrays) {
+  CHECK(arrays.empty() || arrays.size() == layout_.boxes.size()) << "arrays for " << arrays.size() << " boxes";
+  // Where Yama guards processes, readers need its consent: they are no children of this one.
+  if (!arrays.empty() && !std::exchange(has_arrays_, true)) LetProcessesReadMemory();
+  for (std::size_t box = 0; has_arrays_ && box < layout_.boxes.size(); ++box) {
+    ArraysOf(memory_, layout_, slot)[box] = arrays.empty() ? 0 : reinterpret_cast<std::uint64_t>(arrays[box]);
+  }
   OwnerSlot& of = header().of_slots.at(slot);
   of.time = time;
   of.simulated = simulated;
   of.generation.store((of.generation | 1) + 1, std::memory_order_seq_cst);
+}
+
+OwnerMemory::~OwnerMemory() {
+  for (std::uint32_t slot = 0; has_arrays_ && slot < layout_.slots; ++slot) (void)Begin(slot);
 }
 
 // ---------------------------------------------------------------- a reader
@@ -131,7 +153,8 @@ Result<std::shared_ptr<const MappedOwner>> MappedOwner::Open(const OwnerPlace& p
     if (auto owner = known->second.lock()) return owner;
   }
   Result<SealedMemory> memory =
-      SealedMemory::Open(place.pid, place.file_descriptor, sizeof(OwnerHeader), BeginOfSlot(kMostOwnedBoxes, kMostOwnerBytes, 1) + kPage);
+      SealedMemory::Open(place.pid, place.file_descriptor, sizeof(OwnerHeader),
+                         BytesOfHeader(kMostOwnedBoxes, kMostOwnerSlots) + kMostOwnerBytes + (1 + kMostOwnerSlots) * kPage);
   if (!memory.ok()) return memory.status();
   const auto& header = *reinterpret_cast<const OwnerHeader*>(memory->data());
   const auto wrong = [&](const char* what) {
@@ -143,14 +166,33 @@ Result<std::shared_ptr<const MappedOwner>> MappedOwner::Open(const OwnerPlace& p
                      .slots = header.slots,
                      .slot_bytes = header.slot_bytes};
   const std::uint64_t boxes = header.boxes;
-  if (boxes > kMostOwnedBoxes || sizeof(OwnerHeader) + boxes * sizeof(HeldBox) > memory->size()) return wrong("has too many boxes");
+  if (boxes > kMostOwnedBoxes || BytesOfHeader(boxes, 0) > memory->size()) return wrong("has too many boxes");
   const auto* const first = reinterpret_cast<const HeldBox*>(&header + 1);
   layout.boxes.assign(first, first + boxes);
   if (Status status = layout.Check(); !status.ok()) return status;
-  if (BeginOfSlot(boxes, layout.slot_bytes, layout.slots) > memory->size()) return wrong("is too short for its slots");
-  std::shared_ptr<const MappedOwner> owner(new MappedOwner(*std::move(memory), std::move(layout)));
+  if (BeginOfSlot(layout, layout.slots) > memory->size()) return wrong("is too short for its slots");
+  std::shared_ptr<const MappedOwner> owner(new MappedOwner(place, *std::move(memory), std::move(layout)));
   mapped[place] = owner;
   return owner;
+}
+
+Status MappedOwner::CheckProcess() const {
+  const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
+  std::uint64_t found = 0;
+  Status read =
+      ReadProcessMemory(place_.pid, header.address + offsetof(OwnerHeader, incarnation), std::as_writable_bytes(std::span(&found, 1)));
+  if (!read.ok() || found == place_.incarnation) return read;
+  return Status::Unavailable(fmt::format("process {} is another one", place_.pid));
+}
+
+bool MappedOwner::Reaches(std::uint64_t time) const {
+  const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
+  for (std::uint32_t slot = 0; slot < layout_.slots; ++slot) {
+    if (header.of_slots.at(slot).time != time) continue;
+    const ArrayAddress* const arrays = ArraysOf(memory_, layout_, slot);
+    if (std::any_of(arrays, arrays + layout_.boxes.size(), [](const ArrayAddress& each) { return each != 0; })) return CheckProcess().ok();
+  }
+  return true;
 }
 
 Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const {
@@ -160,14 +202,22 @@ Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, c
   const Index3 at = part.begin - from.held.begin;
   const std::uint64_t sample = std::uint64_t(at.x) * std::uint64_t(from.strides[0]) + std::uint64_t(at.y) * std::uint64_t(from.strides[1]) +
                                std::uint64_t(at.z) * std::uint64_t(from.strides[2]);
+  const std::uint64_t skipped = sample * BytesPerSample(layout_.samples);
+  Status copied;
   for (std::uint32_t slot = 0; slot < layout_.slots; ++slot) {
     const OwnerSlot& of = header.of_slots.at(slot);
     const std::uint64_t generation = of.generation.load(std::memory_order_acquire);
     if (generation % 2 != 0 || of.time != time) continue;
-    const std::byte* const begin = memory_.data() + BeginOfSlot(layout_.boxes.size(), layout_.slot_bytes, slot);
-    CopySamples(layout_.samples, begin + from.offset + sample * BytesPerSample(layout_.samples), from.strides, part.size(), out);
+    if (const std::uint64_t array = ArraysOf(memory_, layout_, slot)[box]; array != 0) {
+      copied = CopyProcessSamples(place_.pid, layout_.samples, array + skipped, from.strides, part.size(), out);
+      // Afterwards: a process that is still there was there all the time, so that no other one had its id.
+      if (copied.ok()) copied = CheckProcess();
+    } else {
+      const std::byte* const begin = memory_.data() + BeginOfSlot(layout_, slot);
+      CopySamples(layout_.samples, begin + from.offset + skipped, from.strides, part.size(), out);
+    }
     std::atomic_thread_fence(std::memory_order_acquire);
-    if (of.generation.load(std::memory_order_relaxed) == generation) return Status::Ok();
+    if (of.generation.load(std::memory_order_relaxed) == generation) return copied;
   }
   return Status::Unavailable(fmt::format("time {} is not held any more: the owner has gone on", time));
 }

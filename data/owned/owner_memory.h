@@ -2,10 +2,12 @@
 //
 //   header    what is held (OwnerLayout), and for each slot its generation and time
 //   boxes     one HeldBox after the other
+//   arrays    for each slot and box: where its samples lie in the owner's own memory; 0: in the slot
 //   slots     each has room for all boxes at one time, and begins at a page
 //
 // The owner writes a time into a slot while readers read another one. A slot's generation is odd while it is written and rises with each
 // use. A reader copies samples and looks at the generation before and after: another one means that what it has copied may be anything.
+// Samples in the owner's own memory are copied by the kernel (process_memory.h).
 #pragma once
 
 #include <array>
@@ -58,16 +60,21 @@ class OwnerMemory {
   // Errors of OwnerLayout::Check and SealedMemory::Create. `incarnation`: random; readers name it.
   static Result<std::shared_ptr<OwnerMemory>> Create(std::uint64_t incarnation, const OwnerLayout& layout);
 
+  ~OwnerMemory();  // arrays are not read from then on; what is in slots stays with those who have mapped it
+
   std::uint32_t file_descriptor() const { return memory_.file_descriptor(); }
   // The slot's samples, to be written from now on: readers of what it held notice.
   std::span<std::byte> Begin(std::uint32_t slot);
-  void Commit(std::uint32_t slot, std::uint64_t time, double simulated);  // all of it is written; `time` is not 0
+  // All of it is written; `time` is not 0. `arrays`: for each box where the first sample of what is held of it lies, if not in the slot
+  // (null); or nothing. They do not change until the next Begin of the slot.
+  void Commit(std::uint32_t slot, std::uint64_t time, double simulated, std::span<const std::byte* const> arrays = {});
 
  private:
-  OwnerMemory(SealedMemory memory, const OwnerLayout& layout) : memory_(std::move(memory)), slot_bytes_(layout.slot_bytes) {}
+  OwnerMemory(SealedMemory memory, const OwnerLayout& layout) : memory_(std::move(memory)), layout_(layout) {}
   OwnerHeader& header() const { return *reinterpret_cast<OwnerHeader*>(memory_.data()); }
   const SealedMemory memory_;
-  const std::uint64_t slot_bytes_;
+  const OwnerLayout layout_;
+  bool has_arrays_ = false;  // has had, in any slot
 };
 
 // Where an owner's memory is.
@@ -86,11 +93,16 @@ class MappedOwner {
   static Result<std::shared_ptr<const MappedOwner>> Open(const OwnerPlace& place);
 
   const OwnerLayout& layout() const { return layout_; }
-  // The samples of `part` of what box number `box` holds. Unavailable: no slot has this time any more.
+  // False: this time is in arrays of the owner, and the system does not let this process read them.
+  bool Reaches(std::uint64_t time) const;
+  // The samples of `part` of what box number `box` holds. Unavailable: no slot has this time any more, or as of ReadProcessMemory.
   Status Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const;
 
  private:
-  MappedOwner(SealedMemory memory, OwnerLayout layout) : memory_(std::move(memory)), layout_(std::move(layout)) {}
+  MappedOwner(const OwnerPlace& place, SealedMemory memory, OwnerLayout layout)
+      : place_(place), memory_(std::move(memory)), layout_(std::move(layout)) {}
+  Status CheckProcess() const;
+  const OwnerPlace place_;
   const SealedMemory memory_;
   const OwnerLayout layout_;  // as it was checked; the owner may write anything later
 };

@@ -83,7 +83,7 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
         _transfer(draft, option, value, holder)
     elif field.message_type is None:
         setattr(holder, name, _scalar(field, option, value))
-    elif field.label == FieldDescriptor.LABEL_REPEATED:
+    elif hasattr(getattr(holder, name), "extend"):  # repeated; protobuf 7 has no FieldDescriptor.label
         getattr(holder, name).extend(_MESSAGES.get(field.message_type.name, values.directions)(option.name, value))
     elif field.message_type.name == "Vec3":
         getattr(holder, name).CopyFrom(values.vec3(values.point(option.name, value)))

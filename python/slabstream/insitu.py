@@ -59,17 +59,18 @@ class Owner:
                 advance(rho)
 
     `shape`, of the whole field, and boxes are along z, y, x. The boxes of all owners tile the field; none: this is the only owner, with one
-    box. `held`: for each box the voxels of its array, if that has ghosts, too: inside the field they have their owners' values. `parameters`: name, and (least, most,
-    value), of numbers that whoever looks may change. `service`: owner.json of a service with keys, or the endpoint of a service for workers;
+    box. `strides`: for each box those of its array, as numpy has them, all positive; None: C order. `held`: for each box the voxels of its
+    array, if that has ghosts, too: inside the field they have their owners' values. `parameters`: name, and (least, most, value), of numbers
+    that whoever looks may change. `service`: owner.json of a service with keys, or the endpoint of a service for workers;
     None: what $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host.
 
     The process goes on whether the service is there or not. For one thread at a time.
     """
 
     def __init__(self, dataset: str, shape: Sequence[int], dtype: numpy.typing.DTypeLike, boxes: Sequence[Box] | None = None, *,
-                 held: Sequence[Box] | None = None, owner: int = 0, owners: int = 1, spacing: Sequence[float] = (1, 1, 1),
-                 origin: Sequence[float] = (0, 0, 0), slots: int = 3, parameters: Mapping[str, tuple[float, float, float]] | None = None,
-                 service: str | None = None):
+                 held: Sequence[Box] | None = None, strides: Sequence[Sequence[int]] | None = None, owner: int = 0, owners: int = 1,
+                 spacing: Sequence[float] = (1, 1, 1), origin: Sequence[float] = (0, 0, 0), slots: int = 3,
+                 parameters: Mapping[str, tuple[float, float, float]] | None = None, service: str | None = None):
         self.dtype = numpy.dtype(dtype).newbyteorder("=")
         self.waited = 0.0  # seconds, in the last begin() or publish()
         self._handle, self._process = ctypes.c_void_p(), os.getpid()
@@ -78,15 +79,20 @@ class Owner:
         if len(held) != len(boxes):
             raise InvalidArgument(f"held has {len(held)} boxes, must be {len(boxes)}")
         self._held = [tuple(end - begin for begin, end in box) for box in held]
+        if strides is None:
+            item = self.dtype.itemsize
+            strides = [(y * x * item, x * item, item) for _, y, x in self._held]
+        self._strides = [tuple(steps) for steps in strides]
+        self._kept: dict[int, Sequence[Array]] = {}  # by time: arrays that may still be read
         self._parameters = tuple(parameters or ())
         field = _Field(dataset.encode(), self.dtype.name.encode(), _xyz(ctypes.c_int32, shape, "shape"),
                        _xyz(ctypes.c_double, spacing, "spacing"), _xyz(ctypes.c_double, origin, "origin"), owner, owners, slots,
                        service.encode() if service else None)
         _call("open", ctypes.byref(self._handle), ctypes.byref(field))
         try:
-            for owned, around in zip(boxes, held):
+            for owned, around, steps in zip(boxes, held, self._strides, strict=True):
                 ends = [_xyz(ctypes.c_int32, [pair[i] for pair in box], "box") for box in (owned, around) for i in (0, 1)]
-                _call("add_box", self._handle, *ends, None)
+                _call("add_box", self._handle, *ends, _xyz(ctypes.c_int64, [step // self.dtype.itemsize for step in steps], "strides"))
             for name, (least, most, value) in (parameters or {}).items():
                 _call("parameter", self._handle, name.encode(), *map(ctypes.c_double, (least, most, value)))
             _call("start", self._handle)
@@ -99,9 +105,10 @@ class Owner:
         _call("begin", self._handle, ctypes.c_double(timeout), pointers, ctypes.byref(waited))
         self.waited = waited.value
         arrays = []
-        for pointer, shape in zip(pointers, self._held):
-            size = int(numpy.prod(shape)) * self.dtype.itemsize
-            arrays.append(numpy.frombuffer((ctypes.c_char * size).from_address(pointer), self.dtype).reshape(shape))
+        for pointer, shape, strides in zip(pointers, self._held, self._strides):
+            size = sum((side - 1) * step for side, step in zip(shape, strides)) + self.dtype.itemsize
+            samples = numpy.frombuffer((ctypes.c_char * size).from_address(pointer), self.dtype)
+            arrays.append(numpy.lib.stride_tricks.as_strided(samples, shape, strides))
         return arrays
 
     def _commit(self, time: int, simulated: float | None) -> None:
@@ -120,15 +127,30 @@ class Owner:
         for array in arrays:
             array.flags.writeable = False
 
-    def publish(self, time: int, arrays: Array | Sequence[Array], simulated: float | None = None, timeout: float = 60) -> None:
-        """Copies the arrays of all boxes, or the one of the only box, and shows them as begin() does. They are converted as numpy does."""
+    def publish(self, time: int, arrays: Array | Sequence[Array], simulated: float | None = None, timeout: float = 60, *,
+                copy: bool = True) -> None:
+        """Copies the arrays of all boxes, or the one of the only box, and shows them as begin() does. They are converted as numpy does.
+        `copy=False` shows them where they lie, and keeps them as long as they may be read: they must not change meanwhile, nor differ in
+        type or strides from what the owner was made with."""
         arrays = [arrays] if isinstance(arrays, numpy.ndarray) else arrays
         shapes = [array.shape for array in arrays]
         if shapes != self._held:
             raise InvalidArgument(f"publish: arrays of shapes {shapes}, must be {self._held}")
+        if not copy:
+            return self._adopt(time, arrays, simulated, timeout)
         for to, array in zip(self._begin(timeout), arrays):
             to[...] = array
         self._commit(time, simulated)
+
+    def _adopt(self, time: int, arrays: Sequence[Array], simulated: float | None, timeout: float) -> None:
+        for array, strides in zip(arrays, self._strides):
+            if array.dtype != self.dtype or any(n > 1 and a != b for n, a, b in zip(array.shape, array.strides, strides)):
+                raise InvalidArgument(f"publish: an array of {array.dtype} with strides {array.strides}, must be {self.dtype} with {strides}")
+        pointers, freed = (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays)), ctypes.c_uint64()
+        _call("adopt", self._handle, ctypes.c_uint64(time), ctypes.c_double(time if simulated is None else simulated), pointers,
+              ctypes.c_double(timeout), ctypes.byref(freed))
+        self._kept.pop(freed.value, None)
+        self._kept[time] = arrays
 
     @property
     def looked_at(self) -> bool:
@@ -148,6 +170,7 @@ class Owner:
         """Leaves the service, and frees the memory: arrays of begin() must not be used any more."""
         handle, self._handle = self._handle, ctypes.c_void_p()
         _library().slabstream_insitu_close(handle)
+        self._kept.clear()
 
     def __enter__(self) -> Owner:
         return self

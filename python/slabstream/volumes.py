@@ -151,6 +151,18 @@ def _first_of_others(array: Any) -> Any:
     return array
 
 
+def at_time(array: Any, number: int) -> Any:
+    """Of an array of four axes, or a DataArray with times, what it holds at one of them."""
+    if _is_xarray(array):
+        name = next((name for name in array.dims if _role(array, name) == "t"), None)
+        if name is None:
+            raise InvalidArgument(f"time is {number}, but the DataArray has no times: its axes are {', '.join(map(str, array.dims))}")
+        return array.isel({name: number})
+    if array.ndim != 4:
+        raise InvalidArgument(f"time is {number}, but the array has {array.ndim} axes, must have 4: time, z, y, x")
+    return array[number]
+
+
 def _from_xarray(array: Any, places: bool) -> Volume:
     """Axes that are known come in the order z, y, x; others stay as they are. `places`: coordinates give spacing and place."""
     array = _first_of_others(array)

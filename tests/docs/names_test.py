@@ -13,11 +13,12 @@ DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md",
 CODE = {".h", ".cpp", ".f90", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
 TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab", "slabstream-laboratory"}
 
-# What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
+# What others name: Slurm, GDCM, FreeSurfer, Python, Catalyst, Ascent; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
 # and pkg-config.
 FOREIGN = {
     "ConnectionError", "LookupError", "TimeoutError", "TypeError", "ValueError", "CancelledError",
     "GraceTime", "KillWait", "JobId", "StartTime", "FreeSurferColorLUT",
+    "catalyst_initialize", "catalyst_execute", "catalyst_results", "catalyst_finalize", "ascent_ghosts",
 }  # fmt: skip
 FOREIGN_OPTIONS = {
     "--mount-proc", "--benchmark_filter", "--health-cmd", "--network", "--replicas", "--user", "--component", "--cflags", "--libs",

@@ -709,8 +709,8 @@ class SteeringTest(WithService):
         post = lambda **fields: self.gateway.json("/api/v1/parameters", method="POST", body=json.dumps({"dataset": "rho", **fields}))
         status, steered = post(set="level=200,unused=-0.5")
         self.assertEqual((status, [parameter["value"] for parameter in steered["parameters"]]), (200, [200, -0.5]))
-        listed = lambda: next(each["simulation"] for each in self.gateway.json("/api/v1/datasets")[1]["datasets"] if each["name"] == "rho")
-        wait_until(lambda: listed()["parameters"] == steered["parameters"] and listed()["time"] > first["time"], "the list tells")
+        listed = lambda: [each["simulation"] for each in self.gateway.json("/api/v1/datasets")[1]["datasets"] if each["name"] == "rho"]
+        wait_until(lambda: any(each["parameters"] == steered["parameters"] and each["time"] > first["time"] for each in listed()), "the list tells")
         for fields, status, why in [
             ({"set": "level=251"}, 400, '"rho": level is 251, must be in [0, 250]'),
             ({"set": "unused=1,lever=1"}, 400, "\"rho\" has no parameter 'lever', must be one of: level, unused"),

@@ -31,6 +31,7 @@ using testing::AnyOf;
 using testing::HasSubstr;
 
 constexpr Index3 kSize = {44, 36, 52};
+constexpr double kNear = 35;  // the whole volume must be in front of the eye
 constexpr Duration kPatience = seconds(60);
 
 // Another array at each time.
@@ -50,7 +51,7 @@ FrameRequest Request(double azimuth = 30) {
 
 class OwnerProcessesTest : public testing::Test {
  protected:
-  void Start(const std::string& keys_folder = {}) {
+  void Start(const std::string& keys_folder = {}, int workers = 3) {
     CoordinatorOptions options;
     const bool keys = !keys_folder.empty();
     options.client_endpoint = keys ? "tcp://127.0.0.1:*" : "inproc://clients";
@@ -59,7 +60,7 @@ class OwnerProcessesTest : public testing::Test {
     options.keys_folder = keys_folder;
     coordinator_ = CoordinatorService::Start(context_, std::move(options)).value();
     if (keys) return;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < workers; ++i) {
       WorkerOptions worker;
       worker.coordinator_endpoint = coordinator_->worker_endpoint();
       worker.machine.threads = 1;
@@ -91,25 +92,34 @@ class OwnerProcessesTest : public testing::Test {
       owners_.push_back(VolumeOwner::Start(context_, OptionsOf(boxes_, owner, owners, share_memory)).value());
     }
   }
-  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time) {
+  // `arrays`: where samples lie, if not in slots. It is not used any more once the next time is begun.
+  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time,
+                    std::vector<std::byte>* arrays = nullptr) {
     const std::shared_ptr<const Volume> volume = AtTime(time);
     const Result<VolumeOwner::Slot> slot = owner.Begin(kPatience);
     ASSERT_TRUE(slot.ok()) << slot.status().message();
     std::size_t to = 0;
+    std::vector<const std::byte*> begins;
+    if (arrays != nullptr) arrays->resize(slot->bytes.size());
+    std::byte* const samples = arrays != nullptr ? arrays->data() : slot->bytes.data();
     for (const OwnedBox& each : boxes) {
       if (each.owner != number) continue;
+      if (arrays != nullptr) begins.push_back(samples + to);
       for (std::int32_t z = each.box.begin.z; z < each.box.end.z; ++z) {
         for (std::int32_t y = each.box.begin.y; y < each.box.end.y; ++y) {
           const auto row = std::size_t(each.box.size().x);
-          std::copy_n(volume->block.bytes.begin() + volume->block.Offset({each.box.begin.x, y, z}), row, slot->bytes.begin() + long(to));
+          std::copy_n(volume->block.bytes.begin() + volume->block.Offset({each.box.begin.x, y, z}), row, samples + to);
           to += row;
         }
       }
     }
-    EXPECT_TRUE(owner.Commit(time, double(time)).ok());
+    EXPECT_TRUE(owner.Commit(time, double(time), begins).ok());
   }
-  void WriteAll(std::uint64_t time) {
-    for (std::uint32_t owner = 0; owner < owners_.size(); ++owner) Write(*owners_[owner], boxes_, owner, time);
+  void WriteAll(std::uint64_t time, bool in_arrays = false) {
+    arrays_.resize(owners_.size());
+    for (std::uint32_t owner = 0; owner < owners_.size(); ++owner) {
+      Write(*owners_[owner], boxes_, owner, time, in_arrays ? &arrays_[owner] : nullptr);
+    }
   }
   // What a frame ends with, once it does not end with `status` any more: owners come when they come.
   Result<Picture> RenderUnless(const std::string& status, const FrameRequest& request = Request()) {
@@ -118,36 +128,46 @@ class OwnerProcessesTest : public testing::Test {
       if (picture.ok() || picture.status().message().find(status) == std::string::npos || MonotonicNow() > end) return picture;
     }
   }
-  static float Difference(const Picture& picture, std::uint64_t time) {
-    FrameRequest request = Request();
+  static float Difference(const Picture& picture, std::uint64_t time, const FrameRequest& request = Request()) {
     return LargestDifference(picture.image, RenderDirectly(request, *AtTime(time)), request.size);
   }
 
   Context context_;
   std::unique_ptr<CoordinatorService> coordinator_;
   std::vector<std::unique_ptr<WorkerService>> workers_;
+  std::vector<std::vector<std::byte>> arrays_;  // of owners
   std::vector<std::unique_ptr<VolumeOwner>> owners_;
   OwnedBoxes boxes_;
   std::optional<Client> client_;
 };
 
 TEST_F(OwnerProcessesTest, PicturesAreThoseOfOneArray) {
+  constexpr std::array<std::pair<std::uint32_t, int>, 10> kNumbers = {
+      {{4, 3}, {2, 5}, {7, 4}, {3, 1}, {5, 5}, {6, 2}, {2, 2}, {7, 3}, {3, 4}, {6, 5}}};  // owners and workers
+  std::size_t number = 0;
   for (const OwnerArrangement& arrangement : OwnerArrangements()) {
-    for (const bool share_memory : {true, false}) {
-      SCOPED_TRACE(testing::Message() << arrangement.name << (share_memory ? ", in place" : ", asked"));
+    for (const auto& [share_memory, arrays] : {std::pair(true, false), {true, true}, {false, false}, {false, true}}) {
+      const auto& [owners, workers] = kNumbers.at(number++ % kNumbers.size());
+      SCOPED_TRACE(testing::Message() << arrangement.name << ", " << owners << " owners, " << workers << " workers"
+                                      << (share_memory ? ", in place" : ", asked") << (arrays ? ", in arrays" : ""));
       owners_.clear();
       workers_.clear();
       client_.reset();
       coordinator_.reset();
-      ASSERT_NO_FATAL_FAILURE(Start());
-      StartOwners(arrangement, 4, share_memory);
-      WriteAll(7);
-      const Result<Picture> picture = RenderUnless("\"ball\"");
-      ASSERT_TRUE(picture.ok()) << picture.status().message();
-      EXPECT_LE(Difference(*picture, 7), 1e-6F);
-      EXPECT_EQ(picture->statistics.assignment, "owner");
+      ASSERT_NO_FATAL_FAILURE(Start({}, workers));
+      StartOwners(arrangement, owners, share_memory);
+      WriteAll(7, arrays);
+      ASSERT_TRUE(RenderUnless("\"ball\"").ok());
       std::uint64_t asked = 0;
-      for (const RankReport& report : picture->statistics.reports) asked += report.stored_bytes;
+      for (const FrameRequest& request : RequestsOfRenderers(kNear)) {
+        SCOPED_TRACE(testing::Message() << request.renderer << ", projection " << int(request.view.projection) << ", distance "
+                                        << request.view.distance);
+        const Result<Picture> picture = client_->Render(request, kPatience);
+        ASSERT_TRUE(picture.ok()) << picture.status().message();
+        EXPECT_LE(Difference(*picture, 7, request), AllowedRounding(request));
+        EXPECT_EQ(picture->statistics.assignment, "owner");
+        for (const RankReport& report : picture->statistics.reports) asked += report.stored_bytes;
+      }
       EXPECT_EQ(asked > 0, !share_memory) << asked << " bytes";
     }
   }
@@ -163,7 +183,7 @@ TEST_F(OwnerProcessesTest, AnOwnerThatHasGoneIsNamedUntilItIsBack) {
   for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end;) {
     picture = client_->Render(Request(), kPatience);
     if (!picture.ok()) break;
-    EXPECT_LE(Difference(*picture, 1), 1e-6F);
+    EXPECT_LE(Difference(*picture, 1), 3e-7F);
   }
   EXPECT_THAT(picture.status().message(), AnyOf(HasSubstr("owner 1 of 3 has left"), HasSubstr("owner 1 has left")));
   EXPECT_EQ(picture.status().message().find('\n'), std::string::npos);
@@ -171,7 +191,7 @@ TEST_F(OwnerProcessesTest, AnOwnerThatHasGoneIsNamedUntilItIsBack) {
   Write(*owners_[1], boxes_, 1, 1);
   picture = RenderUnless("ball");
   ASSERT_TRUE(picture.ok()) << picture.status().message();
-  EXPECT_LE(Difference(*picture, 1), 1e-6F);
+  EXPECT_LE(Difference(*picture, 1), 3e-7F);
   owners_.clear();
   for (const Time end = MonotonicNow() + kPatience; picture.ok() && MonotonicNow() < end;) picture = client_->Render(Request(), kPatience);
   EXPECT_FALSE(picture.ok());
@@ -206,7 +226,7 @@ TEST_F(OwnerProcessesTest, EachPictureIsOfOneWholeTime) {
       ++pictures;
       float least = 1;
       for (const LocalImage& image : right) least = std::min(least, LargestDifference(picture->image, image, request.size));
-      EXPECT_LE(least, 1e-6F);
+      EXPECT_LE(least, 3e-7F);
     }
     EXPECT_EQ(pictures, 10) << why;
     EXPECT_TRUE(owners_[0]->looked_at());

@@ -1,8 +1,8 @@
-// What the coordinator does with owners as time goes by: silence, requests that wait, requests that nobody answers.
+// What the coordinator does with owners as time goes by: silence, requests that wait, requests that nobody answers, and lies.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <atomic>
 #include <memory>
 #include <string>
 #include <utility>
@@ -11,6 +11,7 @@
 #include "common/wire/payload.h"
 #include "coordinator/service/owners.h"
 #include "data/sources/volume_source.h"
+#include "tests/support/random.h"
 
 namespace slabstream {
 namespace {
@@ -223,6 +224,109 @@ TEST_F(OwnerRulesTest, OthersAreRefused) {
   EXPECT_THAT(refusal(3, wrong), HasSubstr("boxes[0] is empty, or not inside the volume"));
   EXPECT_EQ(Of<Retire>(Hear(3, OwnerPing{kEpoch, 1})).size(), 1U);
   EXPECT_EQ(Of<Retire>(Hear(1, OwnerPing{kEpoch + 1, 1})).size(), 1U) << "of another life of the coordinator";
+}
+
+TEST_F(OwnerRulesTest, LiesHurtNobodyElse) {
+  Register();
+  RegisterOwner grown = Registration(0, 100);
+  grown.boxes[0].end.z = 17;
+  EXPECT_THAT(Of<OwnerRefused>(Hear(1, grown)).at(0).second.status.message(), HasSubstr("overlap, or leave voxels out"));
+  grown = Registration(0, 100);
+  grown.description.geometry.size.x = 513;
+  EXPECT_THAT(Of<OwnerRefused>(Hear(1, grown)).at(0).second.status.message(), HasSubstr("differ from those of owner 0"));
+  opened_ = source_().value();
+  for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 3, 0});
+  EXPECT_EQ(Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 1})).at(0).second.used, (std::vector<std::uint64_t>{5})) << "times rise";
+
+  Read();
+  const auto asked = Of<ChunkRequest>(owners_->Tend(now_));
+  const auto answer = [&](PeerToken from, const ChunkRequest& request, std::size_t bytes, std::uint64_t wrong = 0) {
+    Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
+    const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(bytes)), Codec::kRaw, chunk);
+    chunk.digest += wrong;
+    return Hear(from, chunk, payload);
+  };
+  const auto whole = [](const ChunkRequest& request) { return std::size_t(request.box.voxel_count()); };
+  for (auto [peer, request] : asked) {
+    answer(3 - peer, request, whole(request));  // of another owner's voxels
+    answer(3, request, whole(request));
+    request.dataset = 4;  // of a time that nobody asked for
+    answer(peer, request, whole(request));
+    request.box.end.z -= 1;
+    answer(peer, request, whole(request));
+  }
+  EXPECT_FALSE(done_);
+  for (const auto& [peer, request] : asked) answer(peer, request, peer == 1 ? whole(request) : 7);
+  EXPECT_EQ(AwaitRead().message(), "\"rho\": an owner sent 7 bytes for a box");
+  done_ = false;
+  Read();
+  for (const auto& [peer, request] : Of<ChunkRequest>(owners_->Tend(now_))) answer(peer, request, whole(request), 1);
+  EXPECT_THAT(AwaitRead().message(), HasSubstr("digest"));
+
+  done_ = false;
+  Read();
+  const auto late = Of<ChunkRequest>(owners_->Tend(now_));
+  Hear(2, OwnerLeave{kEpoch});
+  for (const auto& [peer, request] : late) {
+    EXPECT_EQ(Of<Retire>(answer(peer, request, whole(request))).size(), peer == 1 ? 0U : 1U) << "after its loss";
+  }
+  EXPECT_EQ(AwaitRead().message(), "\"rho\": owner 1 of 2 has left");
+}
+
+TEST_F(OwnerRulesTest, AnyMessagesInAnyOrderEndWell) {
+  Random random(62);
+  SCOPED_TRACE(random.trace());
+  constexpr Box kRead = {{0, 0, 8}, {8, 8, 24}};  // of both owners
+  std::vector<std::pair<PeerToken, ChunkRequest>> asked;
+  std::atomic<int> reads = 0, ended = 0;
+  int datasets = 0, welcomes = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto from = PeerToken(random.Integer(1, 4));
+    const Epoch epoch = kEpoch + (random.Chance(0.05) ? 1 : 0);
+    now_ += std::chrono::milliseconds(random.Integer(0, 400));
+    Owners::News news;
+    const int kind = random.Integer(0, 6);
+    if (kind <= 1) {
+      RegisterOwner m = Registration(random.Integer(0U, 1U), random.Integer<std::uint64_t>(100, 101));
+      if (random.Chance(0.2)) m.boxes[0].end.z += random.Integer(-1, 17);
+      news = Hear(from, m);
+    } else if (kind == 2) {
+      news = Hear(from, OwnerTime{epoch, random.Integer<std::uint64_t>(1, 20), 0});
+    } else if (kind == 3) {
+      news = random.Chance(0.05) ? Hear(from, OwnerLeave{epoch}) : Hear(from, OwnerPing{epoch, 1});
+    } else if (kind == 4 && !asked.empty()) {
+      const auto& [peer, request] = asked[random.Integer<std::size_t>(0, asked.size() - 1)];
+      Chunk chunk{.epoch = epoch, .dataset = request.dataset, .box = request.box};
+      const auto bytes = random.Chance(0.8) ? std::size_t(request.box.voxel_count()) : random.Integer<std::size_t>(1, 9);
+      const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(bytes)), Codec::kRaw, chunk);
+      news = Hear(random.Chance(0.8) ? peer : from, chunk, payload);
+    } else if (kind == 5 && source_) {
+      if (const auto opened = source_(); opened.ok()) {
+        ++reads;
+        const auto samples = std::make_shared<std::vector<std::byte>>(std::size_t(kRead.voxel_count()));
+        (*opened)->Read(0, kRead, BoxRoom::Dense(kRead, samples->data(), false), {}, [&ended, samples](const Status& status) {
+          EXPECT_EQ(status.message().find('\n'), std::string::npos);
+          ++ended;
+          ended.notify_all();
+        });
+      }
+    } else {
+      news = owners_->Tend(now_);
+    }
+    for (const auto& each : Of<ChunkRequest>(news)) asked.push_back(each);
+    if (asked.size() > 8) asked.erase(asked.begin(), asked.end() - 8);
+    for (const auto& [to, refused] : Of<OwnerRefused>(news)) EXPECT_EQ(refused.status.message().find('\n'), std::string::npos);
+    welcomes += int(Of<OwnerWelcome>(news).size());
+    for (const OwnedData& data : news.datasets) {
+      datasets += data.left ? -1 : data.came ? 1 : 0;
+      if (data.came) source_ = data.came->open;
+    }
+    ASSERT_TRUE(datasets == 0 || datasets == 1) << "step " << i;
+  }
+  EXPECT_GT(welcomes, 100);
+  EXPECT_GT(reads, 100);
+  owners_.reset();
+  for (int now = ended; now < reads; now = ended) ended.wait(now);
 }
 
 }  // namespace

@@ -1,0 +1,356 @@
+"""Pictures of Dask's arrays, whose chunks stay in the processes that hold them (docs/dask.md).
+
+    import slabstream.dask as sd
+
+    service = sd.start(client)                     # a worker beside each Dask worker, the coordinator beside the scheduler
+    image = sd.render(array, transfer="viridis")   # a dask.array.Array or an xarray.DataArray, as slabstream.render takes it
+"""
+from __future__ import annotations
+
+import asyncio
+import collections
+import contextlib
+import dataclasses
+import itertools
+import os
+import pathlib
+import tempfile
+import threading
+import time as clock
+import weakref
+from typing import Any, Mapping, Sequence
+
+import dask.array
+import distributed
+import numpy
+from dask.core import flatten
+from distributed.comm import get_address_host
+from distributed.diagnostics.plugin import SchedulerPlugin, WorkerPlugin
+
+from .address import is_loopback
+from .errors import InvalidArgument, SlabstreamError, Unavailable
+from .image import Image
+from .insitu import Owner
+from .options import takes_options_of
+from .programs import Kept, find_program
+from .service import DEADLINE_SECONDS, Service, connect
+from .volumes import at_time, volume_of
+
+_START_SECONDS, _END_SECONDS = 60.0, 20.0
+_COME_SECONDS = 20.0       # that the owners of an array have to come
+_ASK_AGAIN_SECONDS = 0.02
+_MOST_TRIES = 8            # of a picture, if owners go
+_TRY_AGAIN_SECONDS = 0.25  # once longer for each try: until Dask knows that a worker of its has gone
+_MOST_ARRAYS = 4           # that are kept for further pictures
+_MEMORY_PART = 3           # of a Dask worker's memory: for the worker beside it
+_LEAST_MEMORY = 1 << 30
+_MOST_BOXES, _MOST_BOXES_OF_ONE = 65536, 4096  # docs/wire.md, section 8
+
+Box = tuple[tuple[int, int], ...]  # (begin, end) along z, y and x
+
+
+def _write_private(file: pathlib.Path, content: bytes) -> None:
+    file.touch(0o600)
+    file.write_bytes(content)
+
+
+class _Program:
+    """A program of ours that ends with this process or before, and a private folder for its files, which goes with it."""
+
+    def __init__(self, name: str, files: Mapping[str, bytes], *arguments: str):
+        self.folder = tempfile.mkdtemp(prefix="slabstream-")
+        for file, content in files.items():
+            _write_private(pathlib.Path(self.folder, file), content)
+        program = str(pathlib.Path(find_program()).with_name(name))
+        self._kept = Kept([program, *(argument.replace("{folder}", self.folder) for argument in arguments)], f"rm -rf -- '{self.folder}'")
+        self.first_line = self._kept.first_line
+
+    def end(self) -> None:
+        """Does not wait for it."""
+        threading.Thread(target=self._kept.end, args=(_END_SECONDS,), daemon=True).start()
+
+
+class _Coordinator(SchedulerPlugin):
+    """The coordinator, on the scheduler's host. It ends with the client that started it, or with the scheduler."""
+
+    def __init__(self, name: str, client: str):
+        self.name, self._client = name, client
+
+    async def start(self, scheduler: Any) -> None:
+        host = "127.0.0.1" if scheduler.address.startswith("inproc:") else get_address_host(scheduler.address)
+        host = f"[{host}]" if ":" in host else host
+        keys = [] if is_loopback(host) else ["--keys", "{folder}/keys"]
+        self._program = _Program("slabstream-coordinator", {}, "--listen", f"tcp://{host}:*", *keys)
+        said = await asyncio.to_thread(self._program.first_line, _START_SECONDS)
+        self.endpoints = dict(word.split("=", 1) for word in said.split() if "=" in word)
+        if not self.endpoints:
+            self._program.end()
+            raise Unavailable(f"slabstream-coordinator beside the scheduler said '{said}' instead of its endpoints; its log is the scheduler's")
+        folder = pathlib.Path(self._program.folder, "keys")
+        self.files = {file: (folder / file).read_bytes() for file in ("client.json", "worker.json", "owner.json") if keys}
+
+    def remove_client(self, scheduler: Any, client: str) -> None:
+        if client == self._client:
+            self._program.end()
+            scheduler.loop.add_callback(scheduler.unregister_worker_plugin, None, self.name)
+
+    async def close(self) -> None:
+        self._program.end()
+
+
+class _Beside(WorkerPlugin):
+    """The worker beside a Dask worker, and the owners in that: they end with it."""
+
+    def __init__(self, name: str, endpoint: str, files: Mapping[str, bytes], memory: str | None):
+        self.name, self._endpoint, self._files, self._memory = name, endpoint, files, memory
+
+    def setup(self, worker: Any) -> None:
+        self.owners: dict[str, Owner] = {}
+        memory, of_dask = self._memory, worker.memory_manager.memory_limit
+        if memory is None and of_dask:
+            memory = f"{max(of_dask // _MEMORY_PART, _LEAST_MEMORY) >> 20}M"
+        limit = ["--memory", memory] if memory else []
+        service = ["--service", "{folder}/worker.json"] if self._files else ["--coordinator", self._endpoint]
+        self._program = _Program("slabstream-worker", self._files, "--threads", str(worker.state.nthreads), *limit, *service)
+        self.service = f"{self._program.folder}/owner.json" if self._files else self._endpoint
+
+    def teardown(self, worker: Any) -> None:
+        for owner in self.owners.values():
+            owner.close()
+        self.owners.clear()
+        self._program.end()
+
+
+@dataclasses.dataclass(frozen=True)
+class _Field:
+    """What all owners of an array share, and what each of them holds."""
+
+    plugin: str
+    dataset: str
+    shape: tuple[int, ...]
+    dtype: str
+    spacing: tuple[float, ...]
+    origin: tuple[float, ...]
+    chunks: Mapping[str, Sequence[tuple[Any, Box]]]  # by the address of a Dask worker: keys and boxes of its chunks
+
+
+def _in_place(chunk: Any, dtype: str) -> Any:
+    """The chunk, or a copy if its samples cannot be read where they lie."""
+    array = numpy.asarray(chunk)
+    if array.dtype == bool:
+        array = array.view(numpy.uint8)
+    steps = [step for length, step in zip(array.shape, array.strides) if length > 1]
+    fits = array.dtype == dtype and all(step > 0 and step % array.dtype.itemsize == 0 for step in steps)
+    return array if fits else numpy.array(array, dtype, order="C")
+
+
+def _own(field: _Field, dask_worker: Any) -> None:
+    """On a Dask worker: becomes the owner of its chunks."""
+    plugin, chunks = dask_worker.plugins[field.plugin], field.chunks[dask_worker.address]
+    missing = [key for key, _ in chunks if key not in dask_worker.data]
+    if missing:
+        raise Unavailable(f"chunk {missing[0]} is not at {dask_worker.address} any more")
+    arrays = [_in_place(dask_worker.data[key], field.dtype) for key, _ in chunks]
+    item = numpy.dtype(field.dtype).itemsize
+    strides = [[step if length > 1 else item for length, step in zip(array.shape, array.strides)] for array in arrays]
+    owner = Owner(field.dataset, field.shape, field.dtype, [box for _, box in chunks], strides=strides,
+                  owner=list(field.chunks).index(dask_worker.address), owners=len(field.chunks), spacing=field.spacing,
+                  origin=field.origin, service=plugin.service)
+    plugin.owners[field.dataset] = owner
+    owner.publish(1, arrays, copy=False)
+
+
+def _leave(plugin: str, dataset: str, dask_worker: Any) -> None:
+    owner = dask_worker.plugins[plugin].owners.pop(dataset, None)
+    if owner is not None:
+        owner.close()
+
+
+def _told(plugin: str, dask_scheduler: Any) -> Any:
+    coordinator = dask_scheduler.plugins[plugin]
+    return coordinator.endpoints, coordinator.files
+
+
+def _boxes(chunks: Sequence[Sequence[int]]) -> Any:
+    """Those of chunks, in the order of their keys."""
+    ends = [list(itertools.accumulate(along)) for along in chunks]
+    return itertools.product(*([(end - length, end) for end, length in zip(*along)] for along in zip(ends, chunks)))
+
+
+def _upright(volume: Any) -> tuple[Any, tuple[float, ...], tuple[float, ...]]:
+    """Samples with axes that run as those of the world, their distances, and the place of the first one: along z, y, x."""
+    samples, steps, origin = volume.samples, [], []
+    if volume.masked:
+        samples = dask.array.ma.filled(samples.astype(numpy.float32), numpy.nan)
+    for axis, length in enumerate(samples.shape):
+        step, begin = volume.grid.steps[2 - axis][2 - axis], volume.grid.origin[2 - axis]
+        if step < 0:
+            samples, begin, step = numpy.flip(samples, axis), begin + (length - 1) * step, -step
+        steps.append(step)
+        origin.append(begin)
+    return samples, tuple(steps), tuple(origin)
+
+
+class DaskService(contextlib.AbstractContextManager["DaskService"]):
+    """Made by start(). A context manager: leaving it ends the service. It also ends with its Dask client."""
+
+    #: The connected service: its status(), and pictures of other datasets.
+    service: Service
+
+    def __init__(self, client: Any, memory: str | None = None):
+        self._client, self._plugin = client, f"slabstream-{client.id}"
+        self._lock, self._numbers = threading.RLock(), itertools.count(1)
+        self._held: collections.OrderedDict[str, tuple[_Field, Any]] = collections.OrderedDict()  # by names of arrays; with what keeps the chunks
+        client.register_plugin(_Coordinator(self._plugin, client.id), name=self._plugin)
+        try:
+            self._start(memory)
+        except BaseException:
+            self._end()
+            raise
+
+    def _start(self, memory: str | None) -> None:
+        client = self._client
+        endpoints, files = client.run_on_scheduler(_told, self._plugin)
+        ours = files.pop("client.json", None)
+        client.register_plugin(_Beside(self._plugin, endpoints["workers"], files, memory), name=self._plugin)
+        if ours is None:
+            self.service = connect(endpoint=endpoints["client"])
+        else:
+            with tempfile.TemporaryDirectory(prefix="slabstream-") as folder:
+                file = pathlib.Path(folder, "client.json")
+                _write_private(file, ours)
+                self.service = connect(file)
+        wanted, deadline = len(client.scheduler_info(n_workers=-1)["workers"]), clock.monotonic() + _START_SECONDS
+        while (there := len(self.service.status().workers)) < wanted:
+            if clock.monotonic() > deadline:
+                raise Unavailable(f"{there} of {wanted} workers have come to the coordinator within {_START_SECONDS:g} s")
+            clock.sleep(_ASK_AGAIN_SECONDS)
+
+    @takes_options_of("render")
+    def render(self, array: Any, *, spacing: Any = None, origin: Any = None, time: int | None = None, deadline: float = DEADLINE_SECONDS,
+               **options: Any) -> Image:
+        """A picture of a dask.array.Array, or of an xarray.DataArray of one. Axes, `spacing`, `origin` and coordinates are as of
+        slabstream.load(). `time`: a number, of an array with four axes.
+
+        Chunks of a persisted array stay where they are. Any other array is computed by Dask first, and stays for further pictures until
+        nobody has it any more, or until three others have been shown. If chunks go meanwhile, the picture comes once Dask has computed them
+        again; it fails if Dask cannot."""
+        volume = volume_of(array if time is None else at_time(array, time), spacing, origin)
+        if not isinstance(volume.samples, dask.array.Array):
+            raise InvalidArgument(f"a {type(array).__name__} is not an array of Dask: slabstream.render() takes it")
+        for number in range(1, _MOST_TRIES + 1):
+            try:
+                return self.service.render(self._dataset_of(volume, array), deadline=deadline, **options)
+            except Unavailable:
+                if number == _MOST_TRIES or self._client.status != "running":
+                    raise
+                self._forget(volume.samples.name)
+                clock.sleep(number * _TRY_AGAIN_SECONDS)
+        raise AssertionError("unreachable")
+
+    def _dataset_of(self, volume: Any, kept_with: Any) -> str:
+        """The name of the array's dataset, which is there."""
+        with self._lock:
+            name = volume.samples.name
+            if name not in self._held:
+                self._hold(name, volume)
+                # In a thread: nothing may wait where Python collects what is gone.
+                weakref.finalize(kept_with, lambda: threading.Thread(target=self._forget, args=(name,), daemon=True).start()).atexit = False
+            self._held.move_to_end(name)
+            while len(self._held) > _MOST_ARRAYS:
+                self._forget(next(iter(self._held)))
+            return self._held[name][0].dataset
+
+    def _hold(self, name: str, volume: Any) -> None:
+        """Makes Dask workers owners of the chunks that they hold."""
+        samples, spacing, origin = _upright(volume)
+        if not all(length > 0 for along in samples.chunks for length in along):  # or NaN
+            raise InvalidArgument("the array has chunks without voxels or of unknown sizes: rechunk() or compute_chunk_sizes() helps")
+        keys = list(flatten(samples.__dask_keys__()))
+        futures = {future.key: future for future in distributed.futures_of(samples)}
+        if not all(key in futures for key in keys):
+            futures = {future.key: future for future in distributed.futures_of(self._client.persist(samples))}
+        distributed.wait(list(futures.values()))
+        who = self._client.who_has(list(futures.values()))
+        chunks: dict[str, list[tuple[Any, Box]]] = {}
+        for key, box in zip(keys, _boxes(samples.chunks)):
+            if futures[key].status == "error":
+                futures[key].result()  # raises what the computation has raised
+            if not who.get(key):
+                raise Unavailable(f"chunk {key} is on no Dask worker")
+            worker = min(who[key], key=lambda address: len(chunks.get(address, ())))
+            chunks.setdefault(worker, []).append((key, box))
+        most = max(map(len, chunks.values()))
+        if most > _MOST_BOXES_OF_ONE or samples.npartitions > _MOST_BOXES:
+            raise InvalidArgument(f"the array has {samples.npartitions} chunks, {most} of them at one Dask worker: "
+                                  f"at most {_MOST_BOXES}, and {_MOST_BOXES_OF_ONE} at one, can be shown; rechunk() makes larger ones")
+        dtype = "uint8" if samples.dtype == bool else samples.dtype.newbyteorder("=").name
+        field = _Field(self._plugin, f"dask-{os.getpid()}-{next(self._numbers)}", samples.shape, dtype, spacing, origin, chunks)
+        self._held[name] = field, list(futures.values())  # not the array: it may be the caller's, which would never go
+        try:
+            for answer in self._client.run(_own, field, workers=list(chunks), on_error="return").values():
+                if isinstance(answer, SlabstreamError):
+                    raise answer
+                if isinstance(answer, Exception):
+                    raise Unavailable(f"a Dask worker does not answer: {answer}")
+            self._wait_for(field)
+        except BaseException:
+            self._forget(name)
+            raise
+
+    def _wait_for(self, field: _Field) -> None:
+        deadline = clock.monotonic() + _COME_SECONDS
+        while all(dataset.name != field.dataset for dataset in self.service.datasets()):
+            if clock.monotonic() > deadline:
+                raise Unavailable(f"the {len(field.chunks)} owners of the array have not come to the coordinator within {_COME_SECONDS:g} s")
+            clock.sleep(_ASK_AGAIN_SECONDS)
+
+    def _forget(self, name: str) -> None:
+        with self._lock:
+            field, _ = self._held.pop(name, (None, None))
+            if field is not None and self._client.status == "running":
+                self._client.run(_leave, self._plugin, field.dataset, on_error="ignore")  # all that there are: those of the field may have gone
+
+    def close(self) -> None:
+        """Ends the service's programs; chunks stay where they are."""
+        with self._lock:
+            for name in list(self._held):
+                self._forget(name)
+        self.service.close()
+        _services.pop(self._client.id, None)
+        if self._client.status == "running":
+            self._end()
+
+    def _end(self) -> None:
+        self._client.run_on_scheduler(_end_programs, self._plugin)
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+async def _end_programs(plugin: str, dask_scheduler: Any) -> None:
+    if plugin in dask_scheduler.worker_plugins:
+        await dask_scheduler.unregister_worker_plugin(None, plugin)
+    await dask_scheduler.plugins[plugin].close()
+    dask_scheduler.remove_plugin(plugin)
+
+
+_services: dict[str, DaskService] = {}  # by the id of the client
+
+
+def start(client: Any = None, *, memory: str | None = None) -> DaskService:
+    """The service of a Dask client (None: the present one): it is started if there is none. Slabstream is installed where the scheduler and
+    the workers run. Workers that come later get a worker beside them, too.
+
+    `memory`: the limit of each worker beside a Dask worker, as "4G"; None: a third of the Dask worker's. Pictures that follow one another
+    are quick if the voxels that it draws fit."""
+    client = distributed.get_client() if client is None else client
+    if client.id not in _services:
+        _services[client.id] = DaskService(client, memory)
+    return _services[client.id]
+
+
+@takes_options_of("render")
+def render(array: Any, **options: Any) -> Image:
+    """As DaskService.render, of the service of the present Dask client."""
+    return start().render(array, **options)

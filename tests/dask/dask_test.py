@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""Pictures of Dask's arrays are those of the same arrays in numpy, wherever chunks lie, and while workers come and go (deploy/check dask)."""
+from __future__ import annotations
+
+import gc
+import ipaddress
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import dask.array as da
+import distributed
+import numpy as np
+import xarray
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+for name, value in (("PYTHONPATH", ROOT / "python"), ("SLABSTREAM_PROGRAMS", ROOT / "build" / "bin")):
+    os.environ.setdefault(name, str(value))  # for Dask's workers, too
+sys.path.insert(0, str(ROOT / "python"))
+
+import slabstream as ss  # noqa: E402
+import slabstream.dask as sd  # noqa: E402
+
+PATIENCE = 60
+VIEW = {"azimuth": 25, "elevation": 15, "size": 160, "transfer": "viridis"}
+
+
+def blobs(shape=(60, 50, 70), dtype=np.float32):
+    """No symmetry; z, y, x."""
+    z, y, x = (np.linspace(-1, 1, side, dtype=np.float32) for side in shape)
+    z, y, x = z[:, None, None], y[None, :, None], x[None, None, :]
+    values = np.exp(-4 * (x**2 + (1.3 * y) ** 2 + z**2)) + 0.8 * np.exp(-20 * ((x - 0.5) ** 2 + (y + 0.3) ** 2 + (z - 0.4) ** 2))
+    return (values * 100).astype(dtype)
+
+
+def wait_until(holds, what):
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end, what
+        time.sleep(0.02)
+
+
+def owners(dask_worker):
+    return {dataset for plugin in dask_worker.plugins.values() for dataset in getattr(plugin, "owners", {})}
+
+
+def in_place(dask_worker):
+    """Whether owners show the very memory of Dask's chunks."""
+    chunks = [chunk for chunk in dask_worker.data.values() if isinstance(chunk, np.ndarray)]
+    shown = [array for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values()
+             for arrays in owner._kept.values() for array in arrays]
+    return all(any(np.shares_memory(array, chunk) for chunk in chunks) for array in shown)
+
+
+class DaskTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.cluster = distributed.LocalCluster(n_workers=3, threads_per_worker=1, dashboard_address=None, memory_limit="2GiB")
+        cls.client = distributed.Client(cls.cluster)
+        cls.service = sd.start(cls.client)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.service.close()
+        cls.client.close()
+        cls.cluster.close()
+        ss.shutdown()
+
+    def assert_like(self, image, array, places=1, **options):
+        expected = np.asarray(ss.render(array, **VIEW | options)).astype(int)
+        self.assertGreater(expected[..., 3].max(), 50)
+        self.assertLessEqual(np.abs(np.asarray(image).astype(int) - expected).max(), places)
+
+    def test_chunks_of_any_sizes(self):
+        array = blobs()
+        for chunks in (60, (17, 25, 30), ((20, 3, 37), (50,), (1, 30, 22, 17))):
+            persisted = da.from_array(array, chunks).persist()
+            self.assert_like(sd.render(persisted, **VIEW), array)
+            self.assertTrue(all(self.client.run(in_place).values()), "chunks were copied")
+
+    def test_types_and_strides(self):
+        for dtype in ("uint8", "int16", "uint32", "float64", ">f4", "float16"):
+            array = blobs(dtype=dtype)
+            with self.subTest(dtype):
+                drawn = np.float32 if dtype == "uint32" else array.dtype.newbyteorder("=")  # what wide whole numbers are drawn as
+                self.assert_like(sd.render(da.from_array(array, 30).persist(), **VIEW), array.astype(drawn))
+        array = blobs()
+        mask = da.from_array(array > 40, 30)
+        self.assert_like(sd.render(mask.persist(), **VIEW), array > 40)
+        chunks = da.from_array(array, 30)
+        for what, turned in (("transposed", chunks.T), ("every second", chunks[::2, :, 1::2]), ("backwards", chunks[::-1, :, ::-1])):
+            with self.subTest(what):
+                self.assert_like(sd.render(turned, **VIEW), np.ascontiguousarray(turned.compute()))
+
+    def test_a_lazy_array_is_computed_once_for_several_pictures(self):
+        lazy = da.from_array(blobs(), 30).map_blocks(lambda block: block * 2)
+        held = len(self.client.who_has())
+        self.assert_like(sd.render(lazy, **VIEW), 2 * blobs())
+        tasks = len(self.client.who_has())
+        self.assert_like(sd.render(lazy, **VIEW | {"azimuth": 60}), 2 * blobs(), azimuth=60)
+        self.assertEqual(len(self.client.who_has()), tasks)
+        del lazy
+        gc.collect()
+        wait_until(lambda: len(self.client.who_has()) <= held, "chunks of a lazy array are given up with it")
+
+    def test_an_array_that_nobody_has_is_given_up(self):
+        array = da.from_array(blobs(), 30).persist()
+        sd.render(array, **VIEW)
+        name = self.service._held[array.name][0].dataset
+        self.assertIn(name, {dataset.name for dataset in self.service.service.datasets()})
+        del array
+        gc.collect()
+        wait_until(lambda: all(name not in each for each in self.client.run(owners).values()), "owners leave")
+        wait_until(lambda: all(dataset.name != name for dataset in self.service.service.datasets()), "the dataset goes")
+
+    def test_coordinates_of_xarray(self):
+        shape = (30, 40, 50)
+        where = {"z": np.arange(30) * 2.0 + 5, "y": np.arange(40)[::-1] * 1.0, "x": np.arange(50) * 0.5}
+        array = xarray.DataArray(blobs(shape), dims=["z", "y", "x"], coords=where)
+        self.assert_like(sd.render(array.chunk(16).persist(), **VIEW), array)
+        turned = array.transpose("x", "z", "y")
+        self.assert_like(sd.render(turned.chunk(16), **VIEW), array)
+        times = xarray.concat([array, 1 - array, array**2], "time")
+        self.assert_like(sd.render(times.chunk(time=1, z=16), time=2, **VIEW), array**2)
+        where["z"] = np.arange(30) ** 2.0
+        with self.assertRaisesRegex(ss.InvalidArgument, "the coordinates of 'z' do not lie evenly"):
+            sd.render(array.assign_coords(where).chunk(16), **VIEW)
+
+    def test_what_cannot_be_shown_is_refused_in_one_line(self):
+        array = da.from_array(blobs(), 30)
+        for wrong, why in ((blobs(), "is not an array of Dask"), (array[array > 5][:, None, None], "nan"),
+                           (array.astype(complex), "complex128"), (da.ones((9000, 2, 2), chunks=1), "at most 4096")):
+            with self.assertRaisesRegex(ss.InvalidArgument, why) as raised:
+                sd.render(wrong, **VIEW)
+            self.assertNotIn("\n", str(raised.exception))
+        with self.assertRaisesRegex(ss.InvalidArgument, "time is 1, but the array has 3 axes"):
+            sd.render(array, time=1, **VIEW)
+
+    def test_workers_come_and_go(self):
+        array = blobs()
+        chunks = da.from_array(array, 20).persist()
+        before = len(self.service.service.status().workers)
+        self.cluster.scale(before + 1)
+        wait_until(lambda: len(self.service.service.status().workers) == before + 1, "a worker comes with one of Dask's")
+        self.assert_like(sd.render(chunks, **VIEW), array)
+        self.cluster.scale(before)
+        wait_until(lambda: len(self.service.service.status().workers) == before, "a worker goes with one of Dask's")
+        self.assert_like(sd.render(chunks, **VIEW), array)
+
+    def test_a_killed_worker_costs_no_picture(self):
+        array = blobs()
+        chunks = da.from_array(array, 20).persist()
+        for azimuth in range(0, 60, 20):
+            self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth}), array, azimuth=azimuth)
+            pids = self.client.run(os.getpid)
+            os.kill(next(iter(pids.values())), signal.SIGKILL)
+            self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth + 10}), array, azimuth=azimuth + 10)
+            self.client.wait_for_workers(len(pids))
+
+
+class ServiceTest(unittest.TestCase):
+    def test_a_cluster_beyond_this_host_has_keys(self):
+        address = distributed.utils.get_ip()
+        if ipaddress.ip_address(address).is_loopback:
+            self.skipTest("this host has no address but loopback")
+        with distributed.LocalCluster(n_workers=2, host=address, dashboard_address=None) as cluster, distributed.Client(cluster) as client:
+            with sd.start(client) as service:
+                self.assertTrue(service.service.address.keys)
+                self.assertGreater(np.asarray(service.render(da.from_array(blobs(), 30), **VIEW)).max(), 50)
+
+    def test_programs_end_with_the_client(self):
+        with distributed.LocalCluster(n_workers=2, dashboard_address=None) as cluster:
+            client = distributed.Client(cluster)
+            service = sd.start(client)
+            self.assertIs(sd.start(client), service)
+            pids = {worker.pid for worker in service.service.status().workers}
+            client.close()
+            with self.assertRaises(ss.SlabstreamError):
+                service.service.status(timeout=PATIENCE)
+            wait_until(lambda: not any(pathlib.Path(f"/proc/{pid}").exists() for pid in pids), "workers end")
+
+    def test_the_example(self):
+        example = ROOT / "examples" / "python" / "dask_array.py"
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, "-B", example, f"{folder}/a.png"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertTrue(pathlib.Path(folder, "a.png").exists())
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
