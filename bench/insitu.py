@@ -105,7 +105,7 @@ WAYS = {  # whether a service is there, slots, how, what somebody looks at
 }
 
 
-def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, told) -> None:
+def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, steps, told) -> None:
     """Steps until `stop`. Tells (rank, seconds that each step waited, when each began, processor time until then, that of its computation)."""
     os.sched_setaffinity(0, {0})
     begin, end = slab(rank, ranks, side)
@@ -130,6 +130,7 @@ def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: st
         together.wait()
         if rank == 0:
             last.value = stop.is_set()
+            steps.value = step
         together.wait()
     if owner:
         owner.close()
@@ -164,15 +165,20 @@ def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running
     """Mean processor seconds of a step, the share of it beside the computation, its median seconds, the greatest share of the time that a
     rank waited, pictures a second."""
     there, slots, how, looked = WAYS[way]
-    together, stop, last, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Value("b", 0), FORK.Queue(), FORK.Queue()
+    together, stop, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Queue(), FORK.Queue()
+    last, steps = FORK.Value("b", 0), FORK.Value("i", 0)
     service = running.for_owners if there else "ipc:///nowhere/s"
-    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, told))
+    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, steps, told))
                   for rank in range(ranks)]
     viewer = FORK.Process(target=look, args=(running.endpoint, looked, side, stop, arrivals))
     for process in simulation + [viewer] * bool(looked):
         process.start()
     since = next_picture(arrivals) if looked else time.monotonic() + 0.5
-    time.sleep(max(since - time.monotonic(), 0) + seconds)
+    time.sleep(max(since - time.monotonic(), 0))
+    least_steps = steps.value + 10
+    time.sleep(seconds)
+    while steps.value < least_steps and time.monotonic() < since + PATIENCE:
+        time.sleep(0.1)
     stop.set()
     of_ranks = [told.get(timeout=PATIENCE) for _ in simulation]
     pictures = 0
