@@ -106,10 +106,9 @@ class Owner:
         pointers, waited = (ctypes.c_void_p * len(self._held))(), ctypes.c_double()
         _call("begin", self._handle, ctypes.c_double(timeout), pointers, ctypes.byref(waited))
         self.waited = waited.value
-        arrays = []
+        arrays: list[Array] = []
         for pointer, memory, shape, strides in zip(pointers, self._memory, self._held, self._strides):
-            samples = numpy.frombuffer(memory.from_address(pointer), self.dtype)
-            arrays.append(numpy.lib.stride_tricks.as_strided(samples, shape, strides))
+            arrays.append(numpy.ndarray(shape, self.dtype, memoryview(memory.from_address(pointer)), strides=strides))
         return arrays
 
     def _commit(self, time: int, simulated: float | None) -> None:
