@@ -4,10 +4,10 @@
 Ranks are processes that compute a slab of a cube each (heat flow by numpy) and meet after every step. All of them run on the first core, and
 the service and who looks on the last one, so that a worker has a core of its own.
 
-  steps    time of a step, by rank count and by what watches: processor time of all ranks, with the library's threads, and the share of the
-           time that the rank waits in `begin` or `publish` that waits longest. Both bear other programs on this machine. The ways alternate
-           in one run; a ratio is the median of rounds, each against the same round without an owner. `begin`: computed in the library's
-           memory. `publish`: copied there. Two slots or three
+  steps    time of a step, by rank count and by what watches: processor time of all ranks with the library's threads; the share of it that
+           is not the computation (without an owner: what the bench itself takes); the share of the time that the rank waits in the library
+           that waits longest. The ways alternate in one run; a ratio is the median of rounds, each against the same round without an owner.
+           `begin`: computed in the library's memory. `publish`: copied there. Two slots or three
   latency  from the moment when the last rank commits a time until a picture of it has arrived, while one looks all the time
   faults   pictures while a rank is killed and comes again, while a worker is killed, and while workers are added
 
@@ -81,13 +81,15 @@ def owner_of(rank: int, ranks: int, side: int, service: str, slots: int = 2) -> 
                     service=service)
 
 
-def advance(now: numpy.ndarray, after: numpy.ndarray) -> None:
-    """Heat flows along x and y: 4 sweeps, the last one into `after`."""
+def advance(now: numpy.ndarray, after: numpy.ndarray) -> float:
+    """Heat flows along x and y: 4 sweeps, the last one into `after`. Returns the processor seconds that it took."""
+    begin = time.thread_time()
     for sweep in range(4):
         to = after if sweep == 3 else numpy.empty_like(now)
         to[...] = now
         to[:, 1:-1, 1:-1] += 0.1 * (now[:, 1:-1, :-2] + now[:, 1:-1, 2:] + now[:, :-2, 1:-1] + now[:, 2:, 1:-1] - 4 * now[:, 1:-1, 1:-1])
         now = to
+    return time.thread_time() - begin
 
 
 WAYS = {  # whether a service is there, slots, how, what somebody looks at
@@ -103,24 +105,24 @@ WAYS = {  # whether a service is there, slots, how, what somebody looks at
 }
 
 
-def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, told) -> None:
-    """Steps until `stop`. Tells (rank, seconds that each step waited, when each began, and the processor time until then)."""
+def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, steps, told) -> None:
+    """Steps until `stop`. Tells (rank, seconds that each step waited, when each began, processor time until then, that of its computation)."""
     os.sched_setaffinity(0, {0})
     begin, end = slab(rank, ranks, side)
     now = numpy.random.default_rng(rank).uniform(0, 255, (end - begin, side, side)).astype(numpy.float32)
     own = [numpy.empty_like(now), numpy.empty_like(now)]
     owner = owner_of(rank, ranks, side, service, slots) if how else None
-    begins, used, waited, step = [], [], [], 0
+    begins, used, computed, waited, step = [], [], [], [], 0
     while not last.value:
         step += 1
         begins.append(time.monotonic())
         used.append(time.process_time())
         if how == "begin":
             with owner.begin(step, timeout=PATIENCE) as (after,):
-                advance(now, after)
+                computed.append(advance(now, after))
         else:
             after = own[step % 2]
-            advance(now, after)
+            computed.append(advance(now, after))
             if how == "publish":
                 owner.publish(step, after, timeout=PATIENCE)
         waited.append(owner.waited if owner else 0)
@@ -128,10 +130,11 @@ def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: st
         together.wait()
         if rank == 0:
             last.value = stop.is_set()
+            steps.value = step
         together.wait()
     if owner:
         owner.close()
-    told.put((rank, waited, begins, used))
+    told.put((rank, waited, begins, used, computed))
 
 
 def look(endpoint: str, dataset: str, side: int, stop, arrivals) -> None:
@@ -158,18 +161,24 @@ def next_picture(arrivals) -> float:
     return arrived[0]
 
 
-def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float, float]:
-    """Mean processor seconds of a step, its median seconds, the greatest share of the time that a rank waited, pictures a second."""
+def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float, float, float]:
+    """Mean processor seconds of a step, the share of it beside the computation, its median seconds, the greatest share of the time that a
+    rank waited, pictures a second."""
     there, slots, how, looked = WAYS[way]
-    together, stop, last, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Value("b", 0), FORK.Queue(), FORK.Queue()
+    together, stop, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Queue(), FORK.Queue()
+    last, steps = FORK.Value("b", 0), FORK.Value("i", 0)
     service = running.for_owners if there else "ipc:///nowhere/s"
-    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, told))
+    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, steps, told))
                   for rank in range(ranks)]
     viewer = FORK.Process(target=look, args=(running.endpoint, looked, side, stop, arrivals))
     for process in simulation + [viewer] * bool(looked):
         process.start()
     since = next_picture(arrivals) if looked else time.monotonic() + 0.5
-    time.sleep(max(since - time.monotonic(), 0) + seconds)
+    time.sleep(max(since - time.monotonic(), 0))
+    least_steps = steps.value + 10
+    time.sleep(seconds)
+    while steps.value < least_steps and time.monotonic() < since + PATIENCE:
+        time.sleep(0.1)
     stop.set()
     of_ranks = [told.get(timeout=PATIENCE) for _ in simulation]
     pictures = 0
@@ -181,23 +190,25 @@ def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running
     begins = of_ranks[0][2]
     first = next(i for i, begin in enumerate(begins) if begin >= since)
     spans = [after - before for before, after in zip(begins[first:], begins[first + 1 :])]
-    cpu = sum(used[-1] - used[first] for _, _, _, used in of_ranks) / len(spans)
-    return cpu, statistics.median(spans), max(sum(waited[first:-1]) for _, waited, _, _ in of_ranks) / sum(spans), pictures / sum(spans)
+    cpu = sum(used[-1] - used[first] for _, _, _, used, _ in of_ranks)
+    beside = 1 - sum(sum(computed[first:-1]) for *_, computed in of_ranks) / cpu
+    waits = max(sum(waited[first:-1]) for _, waited, *_ in of_ranks) / sum(spans)
+    return cpu / len(spans), beside, statistics.median(spans), waits, pictures / sum(spans)
 
 
 def measure_steps(side: int, seconds: float, rounds: int, rank_counts: list[int]) -> None:
-    print("ranks | way | processor time of a step, ms | ratio to no owner | least and greatest | median step, ms | waits | pictures a second")
+    print("ranks | way | processor time of a step, ms | ratio to no owner | beside the computation | median step, ms | waits | pictures a second")
     print("---|---|---|---|---|---|---|---")
     for ranks in rank_counts:
-        found: dict[str, list[tuple[float, float, float, float]]] = {way: [] for way in WAYS}
+        found: dict[str, list[tuple[float, ...]]] = {way: [] for way in WAYS}
         for _ in range(rounds):
             for way in WAYS:
                 with running_service(1) as running:
                     found[way].append(time_steps(way, ranks, side, seconds, running))
         for way, rows in found.items():
-            ratios = sorted(row[0] / alone[0] for row, alone in zip(rows, found["no owner"]))
-            cpu, step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(4))
-            print(f"{ranks} | {way} | {1e3 * cpu:.2f} | {statistics.median(ratios):.3f} | {ratios[0]:.3f} ... {ratios[-1]:.3f} | {1e3 * step:.1f} | "
+            ratio = statistics.median(row[0] / alone[0] for row, alone in zip(rows, found["no owner"]))
+            cpu, beside, step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(5))
+            print(f"{ranks} | {way} | {1e3 * cpu:.2f} | {ratio:.3f} | {100 * beside:.2f} % | {1e3 * step:.1f} | "
                   f"{100 * waited:.1f} % | {pictures:.1f}", flush=True)
 
 

@@ -94,9 +94,10 @@ def identifiers(span: str) -> set[str]:
 
 def exists(name: str) -> bool:
     """All its parts stand together in one unit."""
-    wanted = {re.sub(f"^({PREFIXES})", "", word) for word in identifiers(name)}
+    whole = identifiers(name)
+    wanted = {re.sub(f"^({PREFIXES})", "", word) for word in whole}
     wanted = {word for word in wanted if not word.islower() or "_" in word}
-    return any(words.issuperset(wanted) for words in units().values())
+    return any(words.issuperset(wanted) or words.issuperset(whole) for words in units().values())
 
 
 @functools.cache
