@@ -178,6 +178,16 @@ DatasetTable::Entry DatasetTable::Forgotten(Entry& entry, Time now) {
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
   fresh.whole = std::move(entry.whole);
   fresh.checks.End();
+  if (fresh.source.open) {
+    fresh.before = std::move(entry.before);
+    if (entry.state == DatasetState::kReady) {
+      Entry before = entry;
+      before.opened = nullptr;  // its owners may overwrite that time
+      before.stamp = nullptr;
+      before.bytes = 0;
+      fresh.before = std::make_shared<const Entry>(std::move(before));
+    }
+  }
   return fresh;
 }
 
@@ -241,8 +251,10 @@ std::vector<DatasetId> DatasetTable::TakeRetired(const std::function<bool(Datase
 
 std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
   std::vector<DatasetStatus> report;
-  for (const auto& [name, entry] : entries_) {
-    if (entry.awaited != 0) continue;
+  for (const auto& [name, present] : entries_) {
+    if (present.awaited != 0) continue;
+    const bool waits = present.state == DatasetState::kUnloaded || present.state == DatasetState::kLoading;
+    const Entry& entry = waits && present.before != nullptr ? *present.before : present;
     DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
     const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now - entry.since);
     status.since_ms = std::uint64_t(std::max(since, std::chrono::milliseconds(0)).count());

@@ -80,6 +80,8 @@ class DatasetTable {
     CheckCounter checks;                                             // at its files, while it is ready
     // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
     CheckId awaited = 0;
+    // Of a dataset that processes hold: as it was when it was ready, which is told until it is ready at another time.
+    std::shared_ptr<const Entry> before = {};
 
     // What is known of its voxels before a level is chosen. kReady only.
     const std::shared_ptr<const VolumeSummary>& overview() const { return levels != nullptr ? levels->overview : summary; }

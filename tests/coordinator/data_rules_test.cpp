@@ -76,7 +76,8 @@ TEST_F(OwnedDataRules, ComeAreGivenUpWhileNobodyWaitsAndGo) {
   EXPECT_THAT(HandedOut(Loaded(1)), SizeIs(1));
   EXPECT_EQ(StateOf("block"), DatasetState::kReady);
   script.Step(OwnedData{"block"});
-  EXPECT_EQ(StateOf("block"), DatasetState::kUnloaded) << "the frame ends with what it has begun with";
+  EXPECT_EQ(StateOf("block"), DatasetState::kReady) << "people are told what it was at the time before";
+  EXPECT_THAT(Of<LoadDataset>(script.Client(kClient, Frame(2, 1))), SizeIs(1)) << "the first frame ends with what it has begun with";
   script.Step(OwnedData{.name = "block", .left = true});
   script.Step(OwnedData{.name = "other", .left = true});
   EXPECT_THAT(NamesOf(script.QueryStatus().datasets), ElementsAre("other"));

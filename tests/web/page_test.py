@@ -1345,7 +1345,7 @@ class PageTest(unittest.TestCase):
         self.addCleanup(self.programs.end, simulation)
         told = lambda: self.gateway.json("/api/v1/parameters?dataset=rho")
         wait_until(lambda: told()[0] == 200, "the simulation")
-        viewer = self.viewer(dataset="rho", preset="gray-ramp", range="0:250", layout="quad")
+        viewer = self.viewer(dataset="rho", layout="quad", window=250, level=125)
         viewer.settled()
         level = "document.querySelector('#parameter-level')"
         viewer.until(f"{level}?.value === '100' && {level}.checkVisibility()")
@@ -1354,10 +1354,10 @@ class PageTest(unittest.TestCase):
         for pane in ("3d", "z"):
             viewer.until("window.drawn.filter(d => d.pane === arguments[0]).length > 3", pane)
         middle = lambda: (lambda width, height, rgba: rgba[4 * (height // 2 * width + width // 2)])(*viewer.pixels("z"))
-        before = middle()
+        wait_until(lambda: 80 < middle() < 120, "the grey of 100")
         viewer.find("#parameter-level").send_keys(Keys.END)
         wait_until(lambda: told()[1]["parameters"][0]["value"] == 250, "the slider steers")
-        wait_until(lambda: middle() > before, "and pictures show it")
+        wait_until(lambda: middle() > 240, "and pictures show it")
         number = viewer.find("[aria-label^='unused, ']")
         number.send_keys(Keys.CONTROL, "a")
         number.send_keys("-0.5", Keys.ENTER)
