@@ -225,8 +225,8 @@ int slabstream_insitu_publish(slabstream_insitu* handle, uint64_t time, double s
   });
 }
 
-int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers,
-                            double timeout_seconds, uint64_t* freed) {
+int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers, double timeout_seconds,
+                            uint64_t* freed) {
   return Call("adopt", [&] {
     if (Status status = After(handle, "adopt"); !status.ok()) return status;
     std::vector<const std::byte*> arrays;
