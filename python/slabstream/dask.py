@@ -28,7 +28,7 @@ from distributed.comm import get_address_host
 from distributed.diagnostics.plugin import SchedulerPlugin, WorkerPlugin
 
 from .address import is_loopback
-from .errors import InvalidArgument, SlabstreamError, Unavailable
+from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
 from .image import Image
 from .insitu import Owner
 from .options import takes_options_of
@@ -241,8 +241,9 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         for number in range(1, _MOST_TRIES + 1):
             try:
                 return self.service.render(self._dataset_of(volume, array), deadline=deadline, **options)
-            except Unavailable:
-                if number == _MOST_TRIES or self._client.status != "running":
+            except (NotFound, Unavailable) as error:
+                refused = isinstance(error, NotFound) and self._is_there(volume.samples.name)  # of an option, not of the array
+                if refused or number == _MOST_TRIES or self._client.status != "running":
                     raise
                 self._forget(volume.samples.name)
                 clock.sleep(number * _TRY_AGAIN_SECONDS)
@@ -293,16 +294,21 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
                     raise answer
                 if isinstance(answer, Exception):
                     raise Unavailable(f"a Dask worker does not answer: {answer}")
-            self._wait_for(field)
+            self._wait_for(name)
         except BaseException:
             self._forget(name)
             raise
 
-    def _wait_for(self, field: _Field) -> None:
+    def _is_there(self, name: str) -> bool:
+        """The coordinator has the dataset of a held array."""
+        field, _ = self._held.get(name, (None, None))
+        return field is not None and any(dataset.name == field.dataset for dataset in self.service.datasets())
+
+    def _wait_for(self, name: str) -> None:
         deadline = clock.monotonic() + _COME_SECONDS
-        while all(dataset.name != field.dataset for dataset in self.service.datasets()):
+        while not self._is_there(name):
             if clock.monotonic() > deadline:
-                raise Unavailable(f"the {len(field.chunks)} owners of the array have not come to the coordinator within {_COME_SECONDS:g} s")
+                raise Unavailable(f"the owners of the array have not come to the coordinator within {_COME_SECONDS:g} s")
             clock.sleep(_ASK_AGAIN_SECONDS)
 
     def _forget(self, name: str) -> None:

@@ -154,7 +154,7 @@ class DaskTest(unittest.TestCase):
 
     def test_a_killed_worker_costs_no_picture(self):
         array = blobs()
-        chunks = da.from_array(array, 20).persist()
+        chunks = da.from_array(array, 20).persist(workers=next(iter(self.client.nthreads())), allow_other_workers=True)
         for azimuth in range(0, 60, 20):
             self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth}), array, azimuth=azimuth)
             pids = self.client.run(os.getpid)

@@ -89,6 +89,20 @@ class Pictures:
         while "field" in [dataset.name for dataset in self.service.datasets()]:
             self.assertLess(time.monotonic(), deadline)
 
+    def test_arrays_are_drawn_where_they_lie(self) -> None:
+        wide = np.zeros((20, 24, 40), np.float32)
+        boxes = [[(0, 20), (0, 24), (0, 9)], [(0, 20), (0, 24), (9, 28)]]
+        arrays = [wide[..., :9], wide[..., 12:31]]
+        with ss.Owner("field", SHAPE, "float32", boxes, strides=[array.strides for array in arrays], service=self.owner_service) as owner:
+            for array, box in zip(arrays, boxes):
+                array[...] = field(2)[tuple(slice(*ends) for ends in box)]
+            owner.publish(2, arrays, copy=False)
+            self.check_picture(field(2))
+            for step in (3, 4):
+                owner.publish(step, [np.array(array) for array in arrays])  # other memory
+            with self.assertRaisesRegex(ss.InvalidArgument, "publish: an array of float32 with strides"):
+                owner.publish(5, [np.array(array) for array in arrays], copy=False)
+
     def test_two_processes_hold_a_field_with_ghosts(self) -> None:
         array = field(3)
         np.save(self.folder / "part.npy", array[:11].astype(">f4"))

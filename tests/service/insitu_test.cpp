@@ -10,6 +10,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -116,17 +117,22 @@ TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
               0)
         << slabstream_insitu_error();
     ASSERT_EQ(slabstream_insitu_start(owner), 0) << slabstream_insitu_error();
-    for (const bool copied : {false, true}) {
-      SCOPED_TRACE(copied ? "publish" : "begin");
+    const Strides in_library = by_default ? Strides{1, 11, 264} : Strides{each.strides[0], each.strides[1], each.strides[2]};
+    for (const std::string_view by : {"begin", "publish", "adopt"}) {
+      SCOPED_TRACE(by);
       ++time;
       const auto volume = std::make_shared<const Volume>(MakeTestVolume(kSize, ScalarType::kUint8, [&](const Index3& v) {
         return std::max(0.0, 250 - 16 * Length(ToVec3(v) - Vec3{6.0 + double(time), 10, 14}));
       }));
-      const Array first(left, {1, 9, 216}, *volume), second(each.array, each.published, *volume);
-      if (copied) {
-        const std::array<const void*, 2> pointers = {&first.bytes[first.first], &second.bytes[second.first]};
+      const Array first(left, {1, 9, 216}, *volume), second(each.array, by == "adopt" ? in_library : each.published, *volume);
+      const std::array<const void*, 2> arrays = {&first.bytes[first.first], &second.bytes[second.first]};
+      if (by == "adopt") {
+        std::uint64_t freed = 0;
+        ASSERT_EQ(slabstream_insitu_adopt(owner, time, 0, arrays.data(), kPatience, &freed), 0) << slabstream_insitu_error();
+        EXPECT_EQ(freed, time - 2) << "of two slots";
+      } else if (by == "publish") {
         const std::int64_t strides[2][3] = {{1, 9, 216}, {each.published[0], each.published[1], each.published[2]}};
-        ASSERT_EQ(slabstream_insitu_publish(owner, time, 0, pointers.data(), strides, kPatience), 0) << slabstream_insitu_error();
+        ASSERT_EQ(slabstream_insitu_publish(owner, time, 0, arrays.data(), strides, kPatience), 0) << slabstream_insitu_error();
       } else {
         std::array<void*, 2> pointers = {};
         double waited = -1;
@@ -134,8 +140,7 @@ TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
         EXPECT_GE(waited, 0);
         EXPECT_EQ(reinterpret_cast<std::uintptr_t>(pointers[1]) % 64, 0U);
         first.Write(*volume, static_cast<std::uint8_t*>(pointers[0]), {1, 9, 216});
-        second.Write(*volume, static_cast<std::uint8_t*>(pointers[1]),
-                     by_default ? Strides{1, 11, 264} : Strides{each.strides[0], each.strides[1], each.strides[2]});
+        second.Write(*volume, static_cast<std::uint8_t*>(pointers[1]), in_library);
         ASSERT_EQ(slabstream_insitu_commit(owner, time, 0), 0) << slabstream_insitu_error();
       }
       // The coordinator hears of the time later: until then it draws the one before, or has no dataset.
@@ -232,6 +237,7 @@ TEST(Insitu, WhateverIsWrongIsACodeAndALine) {
   EXPECT_EQ(slabstream_insitu_commit(owner, 5, 0.1), 0);
   EXPECT_THAT(error(slabstream_insitu_commit(owner, 6, 0.2), 1), HasSubstr("Commit without Begin"));
   EXPECT_THAT(error(slabstream_insitu_publish(owner, 6, 0, nullptr, nullptr, 0), 1), HasSubstr("publish: pointer 0 is NULL"));
+  EXPECT_THAT(error(slabstream_insitu_adopt(owner, 6, 0, nullptr, 0, nullptr), 1), HasSubstr("adopt: pointer 0 is NULL"));
   EXPECT_THAT(error(slabstream_insitu_begin(owner, -1, &pointer, nullptr), 1), HasSubstr("timeout of -1 s, must be at least 0"));
   EXPECT_EQ(slabstream_insitu_begin(owner, 1e300, &pointer, nullptr), 0);
   EXPECT_THAT(error(slabstream_insitu_commit(owner, 5, 0), 1), HasSubstr("time 5 is not above 5"));
