@@ -70,7 +70,7 @@ Json LevelsJson(const FrameStatistics& statistics) {
 }
 
 Json BytesJson(const FrameSummary& summary) {
-  return {{"voxels", summary.voxel_bytes},  {"stored", summary.stored_bytes}, {"sent", summary.sent_bytes}, {"images", summary.image_bytes}};
+  return {{"voxels", summary.voxel_bytes}, {"stored", summary.stored_bytes}, {"sent", summary.sent_bytes}, {"images", summary.image_bytes}};
 }
 
 Json StagesJson(const FrameSummary& summary) {

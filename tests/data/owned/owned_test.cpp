@@ -1,6 +1,6 @@
 // Volumes of owners: whoever reads them gets the voxels of one array, bit for bit, from memory of this host or by asking. A layout that
-// does not fit is refused. Memory of an owner that has gone gives an error and nothing else. (tests/fuzz/decode_owners.cpp: headers that are
-// anything.)
+// does not fit is refused. Memory of an owner that has gone gives an error and nothing else. (tests/fuzz/decode_owners.cpp: headers that
+// are anything.)
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <linux/audit.h>
