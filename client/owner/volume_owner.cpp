@@ -186,7 +186,8 @@ std::optional<std::uint32_t> VolumeOwner::Impl::FreeSlot() const {
   for (std::uint32_t slot = 0; slot < layout.slots; ++slot) {
     const std::uint64_t time = times.at(slot);
     const bool in_use = std::ranges::binary_search(used, time) || (hold != 0 && !used.empty() && time > used.back());
-    if (time != 0 && in_use) continue;
+    // Not the latest one: the simulation may compute the next time from it.
+    if (time != 0 && (time == latest || in_use)) continue;
     if (!oldest || time < times.at(*oldest)) oldest = slot;
   }
   return oldest;
