@@ -260,7 +260,8 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   };
   const auto failed = EndOf<DatasetFailed>(action.name, action.load);
   const DataSource& source = action.source;
-  const FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
+  const FairTasks::Owner server = source.open ? std::hash<std::string>()(action.name)  // who may wait for owners of voxels
+                                              : ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
   if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
   return Post(loads_, barrier.c_str(), load, failed);
 }

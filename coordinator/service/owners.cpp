@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <condition_variable>
 #include <deque>
 #include <map>
 #include <mutex>
@@ -34,9 +35,10 @@ struct Asked {
 struct Owner {
   PeerToken peer = 0;
   RegisterOwner registered;
-  std::uint64_t latest = 0;  // time; 0: none yet
-  Time heard, answered;      // answered: when `out` was empty or last became shorter
-  std::vector<Asked> out;    // at most kMostAskedOfOwner
+  std::uint64_t latest = 0;          // time; 0: none yet
+  std::uint64_t hold = 0, gone = 0;  // as of its last OwnerPing
+  Time heard, answered;              // answered: when `out` was empty or last became shorter
+  std::vector<Asked> out;            // at most kMostAskedOfOwner
   std::deque<Asked> waiting = {};
 };
 
@@ -49,6 +51,10 @@ struct Field {
   std::vector<Place> places;
   std::uint64_t set = 0;    // another number when an owner comes or goes
   std::uint64_t whole = 0;  // time; 0: not all owners are there, or one has no time yet
+  std::uint64_t shown = 0;  // the last whole time that all were known to hold, and hold; 0: none
+  std::uint64_t hold = 0;   // OwnerPong::hold
+  bool let_go = false;      // some waited for others for kOwnerWaits: until the next whole time nobody waits
+  Time since;               // hold: nobody waits for others for long since then
   bool is_dataset = false;
   std::optional<Time> looked = {};
   OwnerPong told = {};  // last, without nonce
@@ -84,7 +90,8 @@ struct Owners::State {
   std::map<std::string, Field> fields;                     // with at least one owner
   std::map<PeerToken, std::pair<std::string, std::uint32_t>> peers;
   std::map<std::string, std::map<std::uint64_t, std::size_t>> used;  // sources that live, by field and time
-  std::uint64_t sets = 0;
+  std::uint64_t sets = 0, holds = 0;
+  std::condition_variable changed;
   Time now;
   News news;
   std::vector<std::pair<AskDone, Result<Bytes>>> answers;  // given without the mutex
@@ -97,6 +104,7 @@ struct Owners::State {
     const auto given = std::exchange(answers, {});
     News result = std::exchange(news, {});
     lock.unlock();
+    changed.notify_all();
     for (const auto& [done, answer] : given) done(answer);
     return result;
   }
@@ -176,7 +184,7 @@ struct Owners::State {
     const std::string name = m.dataset;
     const std::uint32_t number = m.owner;
     std::optional<Owner>& owner = field.places[number].owner;
-    const bool changed = !owner || owner->registered != m;
+    const bool is_new = !owner || owner->registered != m;
     if (!owner) owner.emplace().peer = from;
     if (owner->peer != from) {  // another connection: what is out may be lost
       peers.erase(owner->peer);
@@ -185,13 +193,16 @@ struct Owners::State {
     }
     owner->registered = std::move(m);
     owner->heard = now;
+    owner->hold = field.hold = field.shown = 0;  // it may have overwritten what it held
     peers[from] = {name, number};
+    if (is_new) {
+      field.set = ++sets;
+      FindWhole(name, field);
+    }
+    FindShown(field);
     const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
     news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
-    if (!changed) return;
-    field.set = ++sets;
-    FindWhole(name, field);
   }
 
   void Hear(PeerToken from, const OwnerTime& m) {
@@ -203,7 +214,11 @@ struct Owners::State {
   }
 
   void Hear(PeerToken from, const OwnerPing& m) {
-    const std::string& name = Find(from)->registered.dataset;
+    Owner& owner = *Find(from);
+    owner.hold = m.hold;
+    owner.gone = m.gone;
+    const std::string& name = owner.registered.dataset;
+    FindShown(fields.at(name));
     OwnerPong pong = Pong(name, fields.at(name));
     pong.nonce = m.nonce;
     news.messages.emplace_back(from, std::move(pong));
@@ -218,6 +233,7 @@ struct Owners::State {
     field.places[number] = {{}, why};
     field.set = ++sets;
     field.whole = 0;
+    FindShown(field);
     if (std::ranges::any_of(field.places, [](const Place& place) { return place.owner.has_value(); })) return;
     if (field.is_dataset) news.datasets.push_back({.name = name, .left = true});
     fields.erase(name);
@@ -227,7 +243,8 @@ struct Owners::State {
   void FindWhole(const std::string& name, Field& field) {
     std::uint64_t whole = ~std::uint64_t{0};
     for (const Place& place : field.places) whole = std::min(whole, place.owner ? place.owner->latest : 0);
-    field.whole = whole;
+    if (std::exchange(field.whole, whole) != whole) LetGo(field, false);
+    FindShown(field);
     if (whole == 0 || std::exchange(field.is_dataset, true)) return;
     OwnedData& news_of = news.datasets.emplace_back(OwnedData{.name = name});
     news_of.came.emplace().path = fmt::format("{} owners", field.places.size());  // for the log
@@ -235,13 +252,38 @@ struct Owners::State {
 
   bool IsLookedAt(const Field& field) const { return field.looked && now < *field.looked + kOwnerLooked; }
 
+  void LetGo(Field& field, bool let_go) {
+    if (std::exchange(field.let_go, let_go) != let_go) field.set = ++sets;  // it is opened anew, and says so
+  }
+
+  // While somebody looks, owners are told to hold what they have. Once all have said that they do, and what was gone before, a whole time
+  // can be shown until there is another one.
+  void FindShown(Field& field) {
+    if (!IsLookedAt(field) || field.whole == 0) {
+      field.hold = field.shown = 0;
+      return LetGo(field, false);
+    }
+    if (field.let_go) return;
+    const bool all_alike = std::ranges::all_of(field.places, [&](const Place& place) { return place.owner->latest == field.whole; });
+    if (all_alike || field.hold == 0) field.since = now;
+    if (field.hold == 0) field.hold = ++holds;
+    const bool held = std::ranges::all_of(
+        field.places, [&](const Place& place) { return place.owner->hold == field.hold && place.owner->gone < field.whole; });
+    if (held && std::exchange(field.shown, field.whole) != field.whole) field.since = now;
+    if (now < field.since + kOwnerWaits) return;
+    field.hold = 0;
+    LetGo(field, true);
+  }
+
   OwnerPong Pong(const std::string& name, const Field& field) const {
     std::set<std::uint64_t> times;
     if (const auto of = used.find(name); of != used.end()) {
       for (const auto& [time, sources] : of->second) times.insert(time);
     }
-    OwnerPong pong{.epoch = epoch, .looked_at = IsLookedAt(field)};
-    if (pong.looked_at && field.whole != 0) times.insert(field.whole);
+    OwnerPong pong{.epoch = epoch, .looked_at = IsLookedAt(field), .hold = field.hold};
+    for (const std::uint64_t time : {field.shown, field.whole}) {
+      if (pong.looked_at && time != 0) times.insert(time);
+    }
     constexpr std::size_t kMost = 64;
     while (times.size() > kMost) times.erase(times.begin());  // no owner has so many slots
     pong.used.assign(times.begin(), times.end());
@@ -297,6 +339,7 @@ struct Owners::State {
           owner.out.push_back(std::move(owner.waiting.front()));
         }
       }
+      FindShown(field);
       const OwnerPong pong = Pong(name, field);
       if (pong != field.told) {
         for (const Place& place : field.places) {
@@ -305,15 +348,34 @@ struct Owners::State {
         field.told = pong;
       }
       // The machine gives another time up as soon as nobody waits for it.
-      if (field.is_dataset && !pong.used.empty() && pong.used.front() != field.whole) news.datasets.push_back({.name = name});
+      if (field.is_dataset && !pong.used.empty() && pong.used.front() != (field.shown != 0 ? field.shown : field.whole))
+        news.datasets.push_back({.name = name});
     }
     for (const PeerToken peer : silent) Lose(peer, "is silent");
   }
 
   // ---- from any thread
+  // Ok: all owners are there, and each has a time.
+  static Status WhoLacks(const std::string& name, const Field& field) {
+    for (std::size_t i = 0; i < field.places.size(); ++i) {
+      const Place& place = field.places[i];
+      if (!place.owner) return Status::Unavailable(Named(name, field, i) + " " + place.why);
+      if (place.owner->latest == 0) return Status::Unavailable(Named(name, field, i) + " has no time yet");
+    }
+    return Status::Ok();
+  }
+
+  static Status NoCommonTime(const std::string& name, const Field& field) {
+    const auto latest = [](const Place& place) { return place.owner->latest; };
+    const auto first = std::ranges::max_element(field.places, {}, latest), last = std::ranges::min_element(field.places, {}, latest);
+    return Status::Unavailable(fmt::format("{} is at time {}, but owner {} at {}: there was no time that all hold for {} s",
+                                           Named(name, field, std::size_t(last - field.places.begin())), latest(*last),
+                                           first - field.places.begin(), latest(*first), kOwnerWaits / std::chrono::seconds(1)));
+  }
+
   void Look(Field& field, Time at) {
     const bool begins = !IsLookedAt(field);
-    field.looked = at;
+    field.looked = std::max(field.looked.value_or(at), at);
     if (begins && wake) wake();
   }
 
@@ -348,16 +410,22 @@ std::shared_ptr<const void> Owners::State::Use(const std::shared_ptr<State>& sta
 
 Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::shared_ptr<State>& state, const std::string& name) {
   std::unique_lock lock(state->mutex);
-  const auto found = state->fields.find(name);
-  if (found == state->fields.end()) return Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
-  Field& field = found->second;
-  state->Look(field, MonotonicNow());
-  OwnedVolume volume{.field = {name, field.whole, {}}};
+  Status lacks;
+  state->changed.wait_until(lock, MonotonicNow() + kOwnerWaits, [&] {
+    const auto found = state->fields.find(name);
+    lacks = found == state->fields.end() ? Status::Unavailable(fmt::format("\"{}\": its owners have left", name))
+                                         : WhoLacks(name, found->second);
+    if (!lacks.ok() || state->wake == nullptr) return true;
+    state->Look(found->second, MonotonicNow());
+    return found->second.shown != 0;
+  });
+  if (!lacks.ok()) return lacks;
+  if (state->wake == nullptr) return Status::Unavailable("the coordinator ends");
+  const Field& field = state->fields.at(name);
+  if (field.shown == 0) return NoCommonTime(name, field);
+  OwnedVolume volume{.field = {name, field.shown, {}}};
   std::vector<Incarnation> incarnations;
-  for (std::size_t i = 0; i < field.places.size(); ++i) {
-    const Place& place = field.places[i];
-    if (!place.owner) return Status::Unavailable(Named(name, field, i) + " " + place.why);
-    if (place.owner->latest == 0) return Status::Unavailable(Named(name, field, i) + " has no time yet");
+  for (const Place& place : field.places) {
     const RegisterOwner& owner = place.owner->registered;
     volume.field.owners.push_back({owner.memory_scope, owner.pid, owner.file_descriptor, owner.incarnation});
     volume.boxes.push_back(owner.boxes);
@@ -367,17 +435,17 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::shared_ptr<
   volume.description = any.description;
   volume.exact = {*SampleTypeNamed(any.samples), any.description.mapping};
   volume.description.mapping.offset = any.description.mapping.FromStored(KeptTypeOf(volume.exact.type).shift);
-  volume.ask = [state, name, time = field.whole, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
+  volume.ask = [state, name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
     state->Ask(name, owner, incarnations[owner], {time, box, std::move(done)});
   };
-  volume.growth = std::make_shared<const FileStamp>(FileStamp{.ask = [state, name, time = field.whole, set = field.set](Time now) {
+  volume.growth = std::make_shared<const FileStamp>(FileStamp{.ask = [state, name, time = field.shown, set = field.set](Time now) {
     const std::lock_guard of_state(state->mutex);
     const auto known = state->fields.find(name);
     if (known == state->fields.end()) return true;
     state->Look(known->second, now);
-    return known->second.whole != time || known->second.set != set;
+    return known->second.shown != time || known->second.set != set;
   }});
-  volume.use = Use(state, name, field.whole);
+  volume.use = Use(state, name, field.shown);
   lock.unlock();
   return MakeOwnedSource(std::move(volume), ProcessReadContext());
 }

@@ -2,7 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <atomic>
+#include <future>
 #include <memory>
 #include <string>
 #include <utility>
@@ -16,6 +17,7 @@ namespace slabstream {
 namespace {
 
 using std::chrono::seconds;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::MatchesRegex;
 
@@ -52,9 +54,22 @@ class OwnerRulesTest : public testing::Test {
       if (owner == 1) source_ = news.datasets[0].came->open;
     }
   }
+  // Opens the volume. Once both owners have heard that somebody looks, they say what they have overwritten.
+  Result<std::shared_ptr<VolumeSource>> Open(std::uint64_t gone_0 = 0, std::uint64_t gone_1 = 0) {
+    woken_ = false;
+    std::future<Result<std::shared_ptr<VolumeSource>>> opened = std::async(std::launch::async, source_);
+    woken_.wait(false);
+    Hold(gone_0, gone_1);
+    return opened.get();
+  }
+  void Hold(std::uint64_t gone_0, std::uint64_t gone_1) {
+    for (const auto& [peer, pong] : Of<OwnerPong>(owners_->Tend(now_))) {
+      Hear(peer, OwnerPing{kEpoch, 0, pong.hold, peer == 1 ? gone_0 : gone_1});
+    }
+  }
   // The volume, of this thread; what it is asked for is out after the next Tend.
   void Read() {
-    opened_ = source_().value();
+    opened_ = opened_ == nullptr ? Open().value() : source_().value();
     samples_.assign(std::size_t(CountIn(kSides)), std::byte{0});
     opened_->Read(0, {{0, 0, 0}, kSides}, BoxRoom::Dense({{0, 0, 0}, kSides}, samples_.data(), false), {}, [this](const Status& status) {
       read_ = status;
@@ -68,8 +83,13 @@ class OwnerRulesTest : public testing::Test {
   }
 
   Time now_ = MonotonicNow();
+  std::atomic<bool> woken_ = false;
   std::unique_ptr<Owners> owners_ = std::make_unique<Owners>(
-      kEpoch, [](const std::string&) { return Status::Ok(); }, [] {});
+      kEpoch, [](const std::string&) { return Status::Ok(); },
+      [this] {
+        woken_ = true;
+        woken_.notify_all();
+      });
   std::function<Result<std::shared_ptr<VolumeSource>>()> source_;
   std::shared_ptr<VolumeSource> opened_;
   std::vector<std::byte> samples_;
@@ -94,8 +114,7 @@ TEST_F(OwnerRulesTest, SilenceLosesAnOwnerAndThenTheDataset) {
 
 TEST_F(OwnerRulesTest, TimesOfSourcesAreToldAndGivenUp) {
   Register();
-  opened_ = source_().value();
-  EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_)).size(), 2U) << "somebody begins to look";
+  opened_ = Open().value();
   for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 6, 0});
   const Owners::News news = owners_->Tend(now_);
   const auto pongs = Of<OwnerPong>(news);
@@ -106,6 +125,57 @@ TEST_F(OwnerRulesTest, TimesOfSourcesAreToldAndGivenUp) {
   EXPECT_TRUE(opened_->info().growth->ask(now_));
   opened_.reset();
   EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_))[0].second.used, (std::vector<std::uint64_t>{6}));
+}
+
+// The owners are at time 5, and the first one has overwritten times up to 6.
+TEST_F(OwnerRulesTest, ATimeIsShownOnceAllHoldIt) {
+  Register();
+  woken_ = false;
+  std::future<Result<std::shared_ptr<VolumeSource>>> opened = std::async(std::launch::async, source_);
+  woken_.wait(false);
+  Hold(6, 0);
+  Hear(1, OwnerTime{kEpoch, 8, 0});
+  for (const std::uint64_t time : {6, 7}) {
+    const auto pongs = Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 0, 1, 6}));
+    EXPECT_THAT(pongs.at(0).second.used, ElementsAre(time - 1));
+    EXPECT_EQ(pongs[0].second.hold, 1U);
+    Hear(2, OwnerTime{kEpoch, time, 0});
+  }
+  EXPECT_THAT(opened.get().value()->info().owned, HasSubstr(":7:")) << "in hexadecimal";
+  Hear(2, OwnerPing{kEpoch, 1, 99, 0});
+  EXPECT_THAT(source_().value()->info().owned, HasSubstr(":7:")) << "nobody has told it to overwrite anything";
+}
+
+TEST_F(OwnerRulesTest, NobodyWaitsForAnotherForLong) {
+  Register();
+  opened_ = Open().value();
+  Hear(1, OwnerTime{kEpoch, 6, 0});
+  const auto pong = [&](Duration later) {
+    now_ += later;
+    for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{kEpoch, 0, 1, 0});
+    owners_->Tend(now_);
+    (void)opened_->info().growth->ask(now_);  // somebody looks
+    return Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 0, 1, 0})).at(0).second;
+  };
+  EXPECT_NE(pong(seconds(4)).hold, 0U);
+  EXPECT_NE(pong(seconds(4)).hold, 0U);
+  EXPECT_FALSE(opened_->info().growth->ask(now_));
+  const OwnerPong let_go = pong(seconds(3));
+  EXPECT_EQ(let_go.hold, 0U);
+  EXPECT_TRUE(let_go.looked_at);
+  EXPECT_THAT(let_go.used, ElementsAre(5));
+  EXPECT_TRUE(opened_->info().growth->ask(now_)) << "it is opened anew, to say so";
+  opened_ = source_().value();
+  EXPECT_FALSE(opened_->info().growth->ask(now_));
+
+  Hear(2, OwnerTime{kEpoch, 6, 0});
+  const auto held = Of<OwnerPong>(owners_->Tend(now_));
+  ASSERT_EQ(held.size(), 2U);
+  EXPECT_GT(held[0].second.hold, 1U);
+  EXPECT_THAT(held[0].second.used, ElementsAre(5, 6));
+  EXPECT_THAT(source_().value()->info().owned, HasSubstr(":5:")) << "time 6 may be gone";
+  for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{kEpoch, 0, held[0].second.hold, 0});
+  EXPECT_THAT(source_().value()->info().owned, HasSubstr(":6:"));
 }
 
 TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
@@ -142,7 +212,10 @@ TEST_F(OwnerRulesTest, ReadsFailInOneLine) {
     owners_->Tend(now_);
   }
   EXPECT_THAT(AwaitRead().message(), MatchesRegex("\"rho\": owner [01] of 2 answers no request for voxels"));
-  done_ = false;
+}
+
+TEST_F(OwnerRulesTest, ReadsEndWithTheCoordinator) {
+  Register();
   Read();
   owners_.reset();
   EXPECT_EQ(AwaitRead().message(), "the coordinator ends");

@@ -321,12 +321,12 @@ std::vector<OwnerTime> SamplesOf() {
 
 template <>
 std::vector<OwnerPing> SamplesOf() {
-  return {{}, {kMax64, kMax64}};
+  return {{}, {kMax64, kMax64, kMax64, kMax64}};
 }
 
 template <>
 std::vector<OwnerPong> SamplesOf() {
-  return {{}, {kMax64, kMax64, true, std::vector<std::uint64_t>(64, kMax64)}};
+  return {{}, {kMax64, kMax64, true, std::vector<std::uint64_t>(64, kMax64), kMax64}};
 }
 
 template <>
