@@ -139,6 +139,7 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   entry->bytes = bytes;
   entry->fields = std::move(fields);
   entry->statistics.clear();
+  if (entry->source.open) entry->whole = entry->summary;
   retired_.erase(id);  // the same voxels again
   return true;
 }
@@ -164,8 +165,10 @@ bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
 }
 
 void DatasetTable::Fail(const std::string& name, const Status& status, Time now) {
-  Reset(name, now);
   Entry& entry = *Find(name);
+  if (!entry.source.open) RemoveParts(name);  // of an owned one they are for this case
+  Retire(entry);
+  entry = Forgotten(entry, now);
   entry.state = DatasetState::kFailed;
   entry.error = status.message();
 }
@@ -173,6 +176,7 @@ void DatasetTable::Fail(const std::string& name, const Status& status, Time now)
 // The entry as if it had never been loaded.
 DatasetTable::Entry DatasetTable::Forgotten(Entry& entry, Time now) {
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
+  fresh.whole = std::move(entry.whole);
   fresh.checks.End();
   return fresh;
 }

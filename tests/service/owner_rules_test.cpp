@@ -51,7 +51,7 @@ class OwnerRulesTest : public testing::Test {
       EXPECT_EQ(Of<OwnerWelcome>(Hear(owner + 1, Registration(owner, owner + 100))).size(), 1U);
       const Owners::News news = Hear(owner + 1, OwnerTime{kEpoch, 5, 0});
       ASSERT_EQ(news.datasets.size(), owner);
-      if (owner == 1) source_ = news.datasets[0].came->open;
+      if (owner == 1) open_ = news.datasets[0].came->open;
     }
   }
   // Opens the volume. Once both owners have heard that somebody looks, they say what they have overwritten.
@@ -90,7 +90,8 @@ class OwnerRulesTest : public testing::Test {
         woken_ = true;
         woken_.notify_all();
       });
-  std::function<Result<std::shared_ptr<VolumeSource>>()> source_;
+  std::function<Result<std::shared_ptr<VolumeSource>>(Missing)> open_;
+  const std::function<Result<std::shared_ptr<VolumeSource>>()> source_ = [this] { return open_(Missing::kFail); };
   std::shared_ptr<VolumeSource> opened_;
   std::vector<std::byte> samples_;
   std::atomic<bool> done_ = false;
@@ -176,6 +177,36 @@ TEST_F(OwnerRulesTest, NobodyWaitsForAnotherForLong) {
   EXPECT_THAT(source_().value()->info().owned, HasSubstr(":5:")) << "time 6 may be gone";
   for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{kEpoch, 0, held[0].second.hold, 0});
   EXPECT_THAT(source_().value()->info().owned, HasSubstr(":6:"));
+}
+
+TEST_F(OwnerRulesTest, WithoutAnOwnerThereIsThePictureOfTheOthersOrTheLastOne) {
+  Register();
+  opened_ = Open().value();
+  for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 6, 0});
+  EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_)).size(), 2U);
+  Hear(2, OwnerLeave{kEpoch});
+  EXPECT_EQ(open_(Missing::kFail).status().message(), "\"rho\": owner 1 of 2 has left");
+  const auto last = open_(Missing::kLast).value();
+  EXPECT_THAT(last->info().owned, HasSubstr(":6:"));
+  EXPECT_THAT(last->info().notes, ElementsAre("\"rho\": owner 1 of 2 has left: this is the last time before"));
+
+  Hold(0, 0);
+  Hear(1, OwnerTime{kEpoch, 7, 0});
+  const auto skipped = open_(Missing::kSkip).value();
+  EXPECT_THAT(skipped->info().owned, HasSubstr(":7:"));
+  EXPECT_THAT(skipped->info().notes, ElementsAre("\"rho\": owner 1 of 2 has left: its voxels show nothing"));
+  const OwnedBoxes& boxes = *skipped->info().levels[0].owned;
+  ASSERT_EQ(boxes.size(), 2U);
+  EXPECT_EQ(boxes[1], (OwnedBox{{{0, 0, 16}, {512, 512, 32}}, kNoOwner}));
+  EXPECT_FALSE(skipped->info().growth->ask(now_));
+  EXPECT_THAT(Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 1, 2, 0})).at(0).second.used, ElementsAre(5, 6, 7)) << "the last time is kept";
+
+  EXPECT_EQ(Of<OwnerWelcome>(Hear(4, Registration(1, 8))).size(), 1U);
+  EXPECT_EQ(open_(Missing::kFail).status().message(), "\"rho\": owner 1 of 2 has no time yet");
+  Hear(4, OwnerTime{kEpoch, 7, 0});
+  EXPECT_TRUE(skipped->info().growth->ask(now_));
+  for (const auto& [peer, pong] : Of<OwnerPong>(owners_->Tend(now_))) Hear(peer, OwnerPing{kEpoch, 0, pong.hold, 0});
+  EXPECT_TRUE(open_(Missing::kLast).value()->info().notes.empty()) << "all are there";
 }
 
 TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {

@@ -90,7 +90,7 @@ class Page {
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
     this.shell.panel.append(channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
-      drawn: ({ frame: { header, view } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
+      drawn: ({ frame: { header, view } }) => { notices.onFrame(header.statistics.missing); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); },
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });

@@ -282,6 +282,7 @@ TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {
       {"Chunk.raw_bytes", kChunkBytes},
       {"DataOrder.items", kMaxDataItemBytes},
       {"FrameStatistics.lowered", kMaxTextBytes},
+      {"FrameStatistics.missing", kMaxTextBytes},
       {"GroupKey.group", kMaxGroups - 1},
       {"Index3.x", kMaxVolumeSide},
       {"Label.name", kMaxLabelNameBytes},

@@ -30,7 +30,7 @@ RankReport FullReport() {
   for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
   for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
   report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = report.stored_bytes =
-      kMax64;
+      report.sent_bytes = kMax64;
   report.image_bounds = {0, 1, 16384, 16384};
   return report;
 }
@@ -466,6 +466,7 @@ std::vector<FrameReply> SamplesOf() {
   FrameStatistics whole = statistics;
   whole.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
   whole.lowered = kUmlaut;
+  whole.missing = kUmlaut;
   whole.view = Request().view;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
