@@ -4,8 +4,10 @@
 Ranks are processes that compute a slab of a cube each (heat flow by numpy) and meet after every step. All of them run on the first core, and
 the service and who looks on the last one, so that a worker has a core of its own.
 
-  steps    time of a step, by rank count and by what watches. The ways alternate in one run; a ratio is the median of rounds, each against
-           the same round without an owner. `begin`: computed in the library's memory. `publish`: copied there. Two slots or three
+  steps    time of a step, by rank count and by what watches: processor time of all ranks with the library's threads; the share of it that
+           is not the computation (without an owner: what the bench itself takes); the share of the time that the rank waits in the library
+           that waits longest. The ways alternate in one run; a ratio is the median of rounds, each against the same round without an owner.
+           `begin`: computed in the library's memory. `publish`: copied there. Two slots or three
   latency  from the moment when the last rank commits a time until a picture of it has arrived, while one looks all the time
   faults   pictures while a rank is killed and comes again, while a worker is killed, and while workers are added
 
@@ -79,44 +81,48 @@ def owner_of(rank: int, ranks: int, side: int, service: str, slots: int = 2) -> 
                     service=service)
 
 
-def advance(now: numpy.ndarray, after: numpy.ndarray) -> None:
-    """Heat flows along x and y: 4 sweeps, the last one into `after`."""
+def advance(now: numpy.ndarray, after: numpy.ndarray) -> float:
+    """Heat flows along x and y: 4 sweeps, the last one into `after`. Returns the processor seconds that it took."""
+    begin = time.thread_time()
     for sweep in range(4):
         to = after if sweep == 3 else numpy.empty_like(now)
         to[...] = now
         to[:, 1:-1, 1:-1] += 0.1 * (now[:, 1:-1, :-2] + now[:, 1:-1, 2:] + now[:, :-2, 1:-1] + now[:, 2:, 1:-1] - 4 * now[:, 1:-1, 1:-1])
         now = to
+    return time.thread_time() - begin
 
 
-WAYS = {  # whether a service is there, slots, how, whether somebody looks
-    "no owner": (False, 0, "", False),
-    "no service, begin": (False, 2, "begin", False),
-    "nobody looks, begin": (True, 2, "begin", False),
-    "nobody looks, publish": (True, 2, "publish", False),
-    "looked at, begin, 2 slots": (True, 2, "begin", True),
-    "looked at, publish, 2 slots": (True, 2, "publish", True),
-    "looked at, begin, 3 slots": (True, 3, "begin", True),
-    "looked at, publish, 3 slots": (True, 3, "publish", True),
+WAYS = {  # whether a service is there, slots, how, what somebody looks at
+    "no owner": (False, 0, "", ""),
+    "no owner, other data looked at": (True, 0, "", "other"),
+    "no service, begin": (False, 2, "begin", ""),
+    "nobody looks, begin": (True, 2, "begin", ""),
+    "nobody looks, publish": (True, 2, "publish", ""),
+    "looked at, begin, 2 slots": (True, 2, "begin", "heat"),
+    "looked at, publish, 2 slots": (True, 2, "publish", "heat"),
+    "looked at, begin, 3 slots": (True, 3, "begin", "heat"),
+    "looked at, publish, 3 slots": (True, 3, "publish", "heat"),
 }
 
 
-def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, told) -> None:
-    """Steps until `stop`. Rank 0 tells when each began and each rank, how long it waited in all: (rank, waited, begins)."""
+def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: str, together, stop, last, steps, told) -> None:
+    """Steps until `stop`. Tells (rank, seconds that each step waited, when each began, processor time until then, that of its computation)."""
     os.sched_setaffinity(0, {0})
     begin, end = slab(rank, ranks, side)
     now = numpy.random.default_rng(rank).uniform(0, 255, (end - begin, side, side)).astype(numpy.float32)
     own = [numpy.empty_like(now), numpy.empty_like(now)]
     owner = owner_of(rank, ranks, side, service, slots) if how else None
-    begins, waited, step = [], [], 0
+    begins, used, computed, waited, step = [], [], [], [], 0
     while not last.value:
         step += 1
         begins.append(time.monotonic())
+        used.append(time.process_time())
         if how == "begin":
             with owner.begin(step, timeout=PATIENCE) as (after,):
-                advance(now, after)
+                computed.append(advance(now, after))
         else:
             after = own[step % 2]
-            advance(now, after)
+            computed.append(advance(now, after))
             if how == "publish":
                 owner.publish(step, after, timeout=PATIENCE)
         waited.append(owner.waited if owner else 0)
@@ -124,21 +130,24 @@ def run_rank(rank: int, ranks: int, side: int, service: str, slots: int, how: st
         together.wait()
         if rank == 0:
             last.value = stop.is_set()
+            steps.value = step
         together.wait()
     if owner:
         owner.close()
-    told.put((rank, waited, begins))
+    told.put((rank, waited, begins, used, computed))
 
 
-def look(endpoint: str, stop, arrivals) -> None:
+def look(endpoint: str, dataset: str, side: int, stop, arrivals) -> None:
     """Asks for one picture after the other, and tells when each came, or why not."""
     os.sched_setaffinity(0, {LAST_CORE})
     with ss.connect(endpoint=endpoint) as service:
+        if dataset == "other":  # what a busy worker alone costs a simulation beside it
+            service.add(dataset, numpy.random.default_rng(0).uniform(0, 255, (side, side, side)).astype(numpy.float32))
         azimuth = 0.0
         while not stop.is_set():
             azimuth += 7
             try:
-                service.render("heat", azimuth=azimuth % 360, **PICTURE)
+                service.render(dataset, azimuth=azimuth % 360, **PICTURE)
                 arrivals.put((time.monotonic(), ""))
             except ss.SlabstreamError as error:
                 arrivals.put((time.monotonic(), str(error)))
@@ -152,18 +161,24 @@ def next_picture(arrivals) -> float:
     return arrived[0]
 
 
-def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float]:
-    """Median seconds of a step, the share of the time that the rank waited that waited longest, pictures a second."""
+def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running) -> tuple[float, float, float, float, float]:
+    """Mean processor seconds of a step, the share of it beside the computation, its median seconds, the greatest share of the time that a
+    rank waited, pictures a second."""
     there, slots, how, looked = WAYS[way]
-    together, stop, last, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Value("b", 0), FORK.Queue(), FORK.Queue()
+    together, stop, told, arrivals = FORK.Barrier(ranks), FORK.Event(), FORK.Queue(), FORK.Queue()
+    last, steps = FORK.Value("b", 0), FORK.Value("i", 0)
     service = running.for_owners if there else "ipc:///nowhere/s"
-    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, told))
+    simulation = [FORK.Process(target=run_rank, args=(rank, ranks, side, service, slots, how, together, stop, last, steps, told))
                   for rank in range(ranks)]
-    viewer = FORK.Process(target=look, args=(running.endpoint, stop, arrivals))
-    for process in simulation + [viewer] * looked:
+    viewer = FORK.Process(target=look, args=(running.endpoint, looked, side, stop, arrivals))
+    for process in simulation + [viewer] * bool(looked):
         process.start()
     since = next_picture(arrivals) if looked else time.monotonic() + 0.5
-    time.sleep(max(since - time.monotonic(), 0) + seconds)
+    time.sleep(max(since - time.monotonic(), 0))
+    least_steps = steps.value + 10
+    time.sleep(seconds)
+    while steps.value < least_steps and time.monotonic() < since + PATIENCE:
+        time.sleep(0.1)
     stop.set()
     of_ranks = [told.get(timeout=PATIENCE) for _ in simulation]
     pictures = 0
@@ -172,24 +187,29 @@ def time_steps(way: str, ranks: int, side: int, seconds: float, running: Running
             pictures += not arrivals.get(timeout=0.1)[1]
     for process in simulation:
         process.join()
-    begins = [begin for rank, _, begin in of_ranks if rank == 0][0]
+    begins = of_ranks[0][2]
     first = next(i for i, begin in enumerate(begins) if begin >= since)
     spans = [after - before for before, after in zip(begins[first:], begins[first + 1 :])]
-    return statistics.median(spans), max(sum(waited[first:]) for _, waited, _ in of_ranks) / sum(spans), pictures / sum(spans)
+    cpu = sum(used[-1] - used[first] for _, _, _, used, _ in of_ranks)
+    beside = 1 - sum(sum(computed[first:-1]) for *_, computed in of_ranks) / cpu
+    waits = max(sum(waited[first:-1]) for _, waited, *_ in of_ranks) / sum(spans)
+    return cpu / len(spans), beside, statistics.median(spans), waits, pictures / sum(spans)
 
 
-def measure_steps(side: int, seconds: float, rounds: int) -> None:
-    print("ranks | way | median step, ms | ratio to no owner | share of time that it waited | pictures a second\n---|---|---|---|---|---")
-    for ranks in (1, 3, 7, 8):
-        found: dict[str, list[tuple[float, float, float]]] = {way: [] for way in WAYS}
+def measure_steps(side: int, seconds: float, rounds: int, rank_counts: list[int]) -> None:
+    print("ranks | way | processor time of a step, ms | ratio to no owner | beside the computation | median step, ms | waits | pictures a second")
+    print("---|---|---|---|---|---|---|---")
+    for ranks in rank_counts:
+        found: dict[str, list[tuple[float, ...]]] = {way: [] for way in WAYS}
         for _ in range(rounds):
             for way in WAYS:
                 with running_service(1) as running:
                     found[way].append(time_steps(way, ranks, side, seconds, running))
         for way, rows in found.items():
             ratio = statistics.median(row[0] / alone[0] for row, alone in zip(rows, found["no owner"]))
-            step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(3))
-            print(f"{ranks} | {way} | {1e3 * step:.2f} | {ratio:.3f} | {waited:.3f} | {pictures:.1f}", flush=True)
+            cpu, beside, step, waited, pictures = (statistics.median(row[i] for row in rows) for i in range(5))
+            print(f"{ranks} | {way} | {1e3 * cpu:.2f} | {ratio:.3f} | {100 * beside:.2f} % | {1e3 * step:.1f} | "
+                  f"{100 * waited:.1f} % | {pictures:.1f}", flush=True)
 
 
 def show_numbers(rank: int, ranks: int, side: int, service: str, commits, stop) -> None:
@@ -255,7 +275,7 @@ def measure_faults(side: int) -> None:
     with running_service(2) as running:
         simulation = [FORK.Process(target=keep_showing, args=(rank, ranks, side, running.for_owners)) for rank in range(ranks)]
         stop, arrivals = FORK.Event(), FORK.Queue()
-        viewer = FORK.Process(target=look, args=(running.endpoint, stop, arrivals))
+        viewer = FORK.Process(target=look, args=(running.endpoint, "heat", side, stop, arrivals))
         for process in [*simulation, viewer]:
             process.start()
         next_picture(arrivals)
@@ -315,9 +335,10 @@ def main() -> None:
     parser.add_argument("--side", type=int, default=128, help="voxels a side (default 128)")
     parser.add_argument("--seconds", type=float, default=3, help="of each measurement (default 3)")
     parser.add_argument("--rounds", type=int, default=3, help="of `steps` (default 3)")
+    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 3, 7, 8], help="of `steps` (default 1 3 7 8)")
     options = parser.parse_args()
     print(f"bench/insitu.py {' '.join(sys.argv[1:])}: {checkout()}, {machine()}")
-    measures = {"steps": lambda: measure_steps(options.side, options.seconds, options.rounds),
+    measures = {"steps": lambda: measure_steps(options.side, options.seconds, options.rounds, options.ranks),
                 "latency": lambda: measure_latency(options.side, 4 * options.seconds), "faults": lambda: measure_faults(options.side)}
     for what in options.what:
         if what not in measures:

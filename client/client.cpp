@@ -15,7 +15,7 @@ constexpr std::int64_t kMaxDeadlineMs = 86'400'000;
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(auto event) {
   const auto what = [](auto& known) -> decltype(ClientEvent::what) {
-    if constexpr (AnyOf<std::decay_t<decltype(known)>, FrameProgress, Picture, StatusReply, Status>) return std::move(known);
+    if constexpr (AnyOf<std::decay_t<decltype(known)>, FrameProgress, Picture, StatusReply, SteerReply, Status>) return std::move(known);
     if constexpr (requires { QuestionReply(std::move(known)); }) return QuestionReply(std::move(known));
     return Status::Internal("nobody waits for the answer to an order");
   };
@@ -92,6 +92,8 @@ RequestId Client::Submit(Question question, Duration deadline) {
 
 RequestId Client::Submit(StatusQuery question, Duration timeout) { return impl_->Ask(question, timeout); }
 
+RequestId Client::Submit(SteerDataset order, Duration timeout) { return impl_->Ask(std::move(order), timeout); }
+
 void Client::Cancel(RequestId request) {
   impl_->questions.erase(request);
   const auto found = impl_->open.find(request);
@@ -164,6 +166,12 @@ Result<std::vector<DatasetStatus>> Client::OrderData(DataOrder order, Duration t
   Result<DataReply> reply = impl_->Await<DataReply>(impl_->Ask(std::move(order), timeout));
   if (!reply.ok()) return reply.status();
   return std::move(reply->datasets);
+}
+
+Result<SimulationStatus> Client::Steer(SteerDataset order, Duration timeout) {
+  Result<SteerReply> reply = impl_->Await<SteerReply>(impl_->Ask(std::move(order), timeout));
+  if (!reply.ok()) return reply.status();
+  return std::move(reply->simulation);
 }
 
 Wakeup& Client::wakeup() { return impl_->wakeup; }

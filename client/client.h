@@ -35,7 +35,7 @@ struct Picture {
 
 struct ClientEvent {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, QuestionReply, StatusReply, Status> what;  // Status: the request failed
+  std::variant<FrameProgress, Picture, QuestionReply, StatusReply, SteerReply, Status> what;  // Status: the request failed
 };
 
 // Where a service is.
@@ -76,6 +76,7 @@ class Client {
   // it is loaded first.
   RequestId Submit(Question question, Duration deadline = kAnswerTime);
   RequestId Submit(StatusQuery question, Duration timeout);  // about the service; ends with a StatusReply or a Status
+  RequestId Submit(SteerDataset order, Duration timeout);    // ends with a SteerReply or a Status
   void Cancel(RequestId request);                            // cancels a question, too: nothing more is heard of it
 
   // The next event of any open request; nullopt after the timeout, or earlier if wakeup() was notified or a signal was handled. If the
@@ -103,6 +104,9 @@ class Client {
   // About the datasets of the catalogue; `order.nonce` is filled in. The datasets after it. Errors: as OrderKeys; ResourceExhausted: the
   // catalogue is full.
   Result<std::vector<DatasetStatus>> OrderData(DataOrder order, Duration timeout = std::chrono::seconds(30));
+
+  // About the simulation that holds a dataset; `order.nonce` is filled in. NotFound, InvalidArgument: the service refuses, with its reason.
+  Result<SimulationStatus> Steer(SteerDataset order, Duration timeout = std::chrono::seconds(5));
 
   Wakeup& wakeup();  // Notify ends a Next early, from any thread or a signal handler
 

@@ -39,8 +39,8 @@ struct Client::Impl {
     std::size_t answer = 0;  // what answers it, as Event::What counts
   };
 
-  using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder>;
-  using OrderReply = std::variant<StatusReply, ShutDownReply, KeysReply, DataReply>;
+  using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder, SteerDataset>;
+  using OrderReply = std::variant<StatusReply, ShutDownReply, KeysReply, DataReply, SteerReply>;
 
   struct Event {
     using OfFrames = std::variant<FrameProgress, Picture, Status>;

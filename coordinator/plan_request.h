@@ -25,6 +25,7 @@ struct PlanRequest {
   std::shared_ptr<const ResolvedRequest> resolved;  // never null; every plan of a request has the same one
   std::shared_ptr<const OccupancyGrid> occupied;    // of its volume; null: the policy does not need it (NeedsOccupancy)
   Roster roster;                                    // the frame's team; it has a worker
+  std::vector<std::uint64_t> hosts = {};            // by slot: the worker's Register::memory_scope; empty: nobody owns the volume's voxels
   Turn turn;
   std::uint64_t share_pixels = 0;        // ClientTakes::share_pixels
   std::uint64_t worker_memory = 0;       // bytes: the least limit of the workers that stay; 0: none has stated one

@@ -51,6 +51,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                  {"combine", statistics.combine},
                  {"balance_by", statistics.balance_by}}}};
   if (!statistics.lowered.empty()) json["lowered"] = statistics.lowered;
+  if (!statistics.missing.empty()) json["missing"] = statistics.missing;
   if (timeline) json["timeline"] = TimelineJson(statistics);
   return json;
 }

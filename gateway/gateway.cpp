@@ -244,6 +244,13 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/statistics"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.takes_post = true, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
+    routes["/api/v1/parameters"] = {
+        .takes_post = true,
+        .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
+          Result<PictureFields> fields = FieldsOf(target, request);
+          if (!fields.ok()) return reply(Failure(fields.status()));
+          questions_->Parameters(*std::move(fields), request.method == "POST", std::move(reply), request.gone);
+        }};
     routes["/api/v1/upload"] = {
         .takes_post = true,
         .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {

@@ -190,6 +190,8 @@ Json OpenApi() {
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
        With(of_field, {Named(render, {"transfer"})[0], Named(render, {"scalar-range"})[0]})},
+      {"/api/v1/parameters", "How far a simulation is that holds a dataset, and its parameters; by POST they change", "application/json",
+       false, With(dataset, {optional("set", "By POST: new values of parameters", "NAME=VALUE,...")}), true},
       {"/api/v1/upload", "Sends a file that becomes a dataset, in parts (docs/http.md)", "application/json", false,
        Json::array({optional("file", "To begin: the name of the file, whose ending says its format", "NAME"),
                     optional("bytes", "To begin: the size of the file", "N"), optional("upload", "Then: what the first answer says", "ID"),

@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "client/report/dataset_text.h"
 #include "client/report/volume_text.h"
 #include "client/request/values.h"
 #include "common/base/printable.h"
@@ -51,15 +52,15 @@ Query AboutAlone(FieldReader& read, Query query) {
 QuestionRequests::QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link)
     : metrics_(metrics), link_(link), under_way_(io, metrics, link, "questions", kMaxQuestions) {}
 
-void QuestionRequests::Ask(std::string_view name, const FieldReader& read, Question question, const MakeFunction& make, ReplyFunction reply,
-                           const Gone& gone) {
+void QuestionRequests::Ask(std::string_view name, const FieldReader& read, ServiceLink::Inquiry question, const MakeFunction& make,
+                           ReplyFunction reply, const Gone& gone) {
   if (!read.status().ok()) return reply(Failure(read.status()));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, name, make, finish, begin = MonotonicNow()](Result<ServiceLink::Answer> answer) {
       finish([this, name, make, begin, held = std::make_shared<const Result<ServiceLink::Answer>>(std::move(answer))] {
         if (!held->ok()) return Failure(held->status());
         metrics_.CountAnswer(name, MonotonicNow() - begin);
-        HttpReply made = make(std::get<QuestionReply>(**held));
+        HttpReply made = make(**held);
         made.headers.emplace_back("Cache-Control", "no-store");
         return made;
       });
@@ -73,7 +74,7 @@ void QuestionRequests::AskOfDataset(std::string_view name, Json (*json)(const st
                                     ReplyFunction reply, const Gone& gone) {
   FieldReader read(std::move(fields));
   Query query = AboutAlone(read, Query());
-  const auto make = [json, dataset = query.dataset](const QuestionReply& answer) {
+  const auto make = [json, dataset = query.dataset](const ServiceLink::Answer& answer) {
     return JsonReply(json(dataset, std::get<Reply>(answer)));
   };
   Ask(name, read, std::move(query), make, std::move(reply), gone);
@@ -94,7 +95,7 @@ void QuestionRequests::Labels(PictureFields fields, ReplyFunction reply, const G
 void QuestionRequests::Value(PictureFields fields, ReplyFunction reply, const Gone& gone) {
   FieldReader read(std::move(fields));
   const Vec3 point = read.Value(ParsePoint("at", read.Need("at", kPointHelp)));
-  const auto make = [](const QuestionReply& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
+  const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
   Ask("value", read, AboutAlone(read, SampleQuery{.points = {point}}), make, std::move(reply), gone);
 }
 
@@ -104,7 +105,7 @@ void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const 
   const Vec3 from = read.Value(ParsePoint("from", from_text)), to = read.Value(ParsePoint("to", to_text));
   const std::string samples_text = read.Get("samples", std::to_string(kProfileSamples));
   const int samples = std::max(read.Value(ParseInteger("samples", samples_text, 2, int(kMaxSamplePoints))), 2);
-  const auto make = [](const QuestionReply& answer) { return JsonReply(ProfileJson(std::get<SampleReply>(answer).samples)); };
+  const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(ProfileJson(std::get<SampleReply>(answer).samples)); };
   Ask("profile", read, AboutAlone(read, SampleQuery{.points = PointsAlong(from, to, samples)}), make, std::move(reply), gone);
 }
 
@@ -118,7 +119,7 @@ void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, con
   }
   if (!csv && format != "json") read.Refuse(fmt::format("format '{}' is not one of json, csv", Printable(format.substr(0, 64))));
   if (csv && !by_label) read.Refuse("format 'csv' is the table of labels: it needs labels=true");
-  const auto make = [by_label, csv](const QuestionReply& answer) {
+  const auto make = [by_label, csv](const ServiceLink::Answer& answer) {
     const auto& found = std::get<StatisticsReply>(answer);
     if (csv) return HttpReply{.type = "text/csv; charset=utf-8", .body = LabelStatisticsCsv(found), .headers = {}};
     return JsonReply(by_label ? LabelStatisticsJson(found) : BoxStatisticsJson(found.statistics));
@@ -132,7 +133,7 @@ void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gon
   const RenderRequest render = read.Value(ParseRenderFields(read.rest()));
   const double x = read.Value(ParseNumber("x", x_text, {0, double(render.frame.size.width)}));
   const double y = read.Value(ParseNumber("y", y_text, {0, double(render.frame.size.height)}));
-  const auto make = [](const QuestionReply& answer) { return JsonReply(PickJson(std::get<PickReply>(answer))); };
+  const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(PickJson(std::get<PickReply>(answer))); };
   Ask("pick", read, PickQuery{.frame = render.frame, .x = x, .y = y}, make, std::move(reply), gone);
 }
 
@@ -149,10 +150,22 @@ void QuestionRequests::Transfer(const PictureFields& fields, ReplyFunction reply
   query.dataset = frame.dataset;
   query.transfer = frame.transfer;
   const auto* preset = std::get_if<std::string>(&frame.transfer.choice);
-  const auto make = [name = preset != nullptr ? *preset : "function"](const QuestionReply& answer) {
+  const auto make = [name = preset != nullptr ? *preset : "function"](const ServiceLink::Answer& answer) {
     return HttpReply{.body = FormatParaViewColorMap(std::get<SummaryReply>(answer).transfer, name)};
   };
   Ask("transfer", read, std::move(query), make, std::move(reply), gone);
+}
+
+void QuestionRequests::Parameters(PictureFields fields, bool post, ReplyFunction reply, const Gone& gone) {
+  FieldReader read(std::move(fields));
+  SteerDataset order;
+  if (read.Has("set")) {
+    if (!post) return reply(Failure(405, "parameters are set by POST"));
+    order.values = read.Value(ParseSteeredValues("set", read.Need("set", "")));
+  }
+  order.dataset = read.Dataset();
+  const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(SimulationJson(std::get<SteerReply>(answer).simulation)); };
+  Ask("parameters", read, std::move(order), make, std::move(reply), gone);
 }
 
 }  // namespace slabstream

@@ -24,11 +24,12 @@ class QuestionRequests {
   void Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Pick(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
+  void Parameters(PictureFields fields, bool post, ReplyFunction reply, const Gone& gone);  // only a POST changes any
 
  private:
-  using MakeFunction = std::function<HttpReply(const QuestionReply&)>;
+  using MakeFunction = std::function<HttpReply(const ServiceLink::Answer&)>;
   // Replies with the mistake of `read` if there is one.
-  void Ask(std::string_view name, const FieldReader& read, Question question, const MakeFunction& make, ReplyFunction reply,
+  void Ask(std::string_view name, const FieldReader& read, ServiceLink::Inquiry question, const MakeFunction& make, ReplyFunction reply,
            const Gone& gone);
   // A question about a dataset alone, whose answer becomes JSON.
   template <class Query, class Reply>

@@ -162,8 +162,10 @@ void ServiceLink::Handle(ClientEvent event) {
     task.rendered.pictures[std::size_t(place)] = std::move(*picture);
   } else if (auto* status = std::get_if<StatusReply>(&event.what)) {
     task.rendered.answer = std::move(*status);
+  } else if (auto* steered = std::get_if<SteerReply>(&event.what)) {
+    task.rendered.answer = std::move(*steered);
   } else {
-    task.rendered.answer = std::get<QuestionReply>(std::move(event.what));
+    task.rendered.answer = Widen<Answer>(std::get<QuestionReply>(std::move(event.what)));
   }
   requests_.erase(request);
   if (--task.left > 0) return;

@@ -22,8 +22,8 @@ namespace slabstream {
 class ServiceLink {
  public:
   using Ticket = std::uint64_t;
-  using Inquiry = std::variant<Question, StatusQuery>;
-  using Answer = std::variant<QuestionReply, StatusReply>;
+  using Inquiry = Merged<Question, std::variant<StatusQuery, SteerDataset>>;
+  using Answer = Merged<QuestionReply, std::variant<StatusReply, SteerReply>>;
   using AnswerHandler = std::function<void(Result<Answer>)>;
   struct Rendered {
     std::vector<Picture> pictures;  // one for each frame

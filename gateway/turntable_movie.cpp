@@ -115,7 +115,7 @@ Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
   if (abandoned_) return Status::Cancelled("nobody reads it");
   const Result<ServiceLink::Answer> reply = *std::exchange(answer_, std::nullopt);
   if (!reply.ok()) return reply.status();
-  return std::get<ViewReply>(std::get<QuestionReply>(*reply));
+  return std::get<ViewReply>(*reply);
 }
 
 Result<ServiceLink::Rendered> TurntableMovie::Take(int index) {

@@ -205,6 +205,13 @@ Image Service::Render(const std::string& dataset, const Options& options, const 
   throw Error(ErrorCode::kCancelled, "the picture of dataset '" + dataset + "' was cancelled");
 }
 
+void Service::Steer(const std::string& dataset, const std::vector<std::pair<std::string, double>>& values) {
+  SteerDataset order{.dataset = dataset};
+  for (const auto& [name, value] : values) order.values.push_back({name, value});
+  const std::lock_guard lock(impl_->mutex);
+  ThrowUnlessOk(impl_->client->Steer(std::move(order)).status());
+}
+
 std::vector<std::string> Service::Datasets() {
   const std::lock_guard lock(impl_->mutex);
   std::vector<std::string> names;

@@ -417,6 +417,16 @@ void DeclareData(const CommandLine& line) {
   reload.AddTexts("NAME", reload_options.order.items, "Names of datasets").Required();
 }
 
+void DeclareSteer(const CommandLine& line) {
+  const Command sub =
+      line.app.AddCommand("steer", "Change parameters of a simulation whose voxels a running service shows, and print them");
+  SteerOptions& options = OptionsOf(line, sub, RunSteer);
+  sub.AddText("DATASET", options.order.dataset, "The dataset that the simulation holds").Required();
+  sub.AddTexts("VALUES", options.values, "NAME=VALUE of parameters; none: print what they are");
+  AddService(sub, options.service);
+  sub.AddFlag("--json", options.json, "Print JSON");
+}
+
 void DeclareLogs(const CommandLine& line) {
   const Command sub = line.app.AddCommand("logs", "Print the logs of a service that `up` started on this machine, in order of time");
   LogsOptions& options = OptionsOf(line, sub, RunLogs);
@@ -461,11 +471,10 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,     DeclareTurntable,  DeclareSlice,    DeclareInfo,  DeclareValue,
-                                                 DeclareMeasure,    DeclareTransfer,   DeclareConvert,  DeclareIndex, DeclareSphere,
-                                                 DeclareClusters,   DeclareUp,         DeclareView,     DeclareDown,  DeclareStatus,
-                                                 DeclareAnnotate,   DeclareKeys,       DeclareData,     DeclareLogs,  DeclareSlurm,
-                                                 DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
+  static constexpr DeclareCommand kCommands[] = {
+      DeclareRender, DeclareTurntable, DeclareSlice,    DeclareInfo, DeclareValue, DeclareMeasure,    DeclareTransfer,   DeclareConvert,
+      DeclareIndex,  DeclareSphere,    DeclareClusters, DeclareUp,   DeclareView,  DeclareDown,       DeclareStatus,     DeclareAnnotate,
+      DeclareKeys,   DeclareData,      DeclareSteer,    DeclareLogs, DeclareSlurm, DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
   return kCommands;
 }
 

@@ -34,6 +34,7 @@ Status RunDown(const DownOptions& options);
 Status RunStatus(const StatusOptions& options);
 Status RunKeys(const KeysOptions& options);
 Status RunData(const DataOptions& options);
+Status RunSteer(const SteerOptions& options);
 Status RunLogs(const LogsOptions& options);
 Status RunSlurm(const SlurmOptions& options);
 

@@ -1,5 +1,6 @@
-// `data`: the datasets of a running service.
+// `data` and `steer`: the datasets of a running service, and the simulations that hold them.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <iostream>
@@ -7,6 +8,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
 #include "client/report/dataset_text.h"
+#include "client/request/values.h"
 #include "common/json/json.h"
 #include "data/catalogue/catalogue.h"
 
@@ -46,6 +48,21 @@ Status RunData(const DataOptions& options) {
   const Result<std::vector<DatasetStatus>> datasets = connection->client().OrderData(order);
   if (!datasets.ok()) return datasets.status();
   std::cout << (options.json ? DatasetsJson(*datasets).dump(2) + "\n" : DatasetTableText(*datasets));
+  return Status::Ok();
+}
+
+Status RunSteer(const SteerOptions& options) {
+  SteerDataset order = options.order;
+  if (!options.values.empty()) {
+    Result<std::vector<SteeredValue>> values = ParseSteeredValues("steer", fmt::format("{}", fmt::join(options.values, ",")));
+    if (!values.ok()) return values.status();
+    order.values = *std::move(values);
+  }
+  Result<ServiceConnection> connection = ServiceConnection::OpenService(options.service);
+  if (!connection.ok()) return connection.status();
+  const Result<SimulationStatus> simulation = connection->client().Steer(std::move(order));
+  if (!simulation.ok()) return simulation.status();
+  std::cout << (options.json ? SimulationJson(*simulation).dump(2) + "\n" : SimulationText(*simulation));
   return Status::Ok();
 }
 

@@ -93,6 +93,8 @@ class FrameLoop {
     failed_in_a_row_ = 0;
     const std::string& lowered = picture.statistics.lowered;
     if (!lowered.empty() && !std::exchange(told_lowered_, true)) PrintWarning(lowered);
+    const std::string& missing = picture.statistics.missing;
+    if (missing != std::exchange(told_missing_, missing) && !missing.empty()) PrintWarning(missing);
     std::vector<RankReport> reports = std::exchange(picture.statistics.reports, {});  // many, which the sink does not need
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, received, picture.statistics, picture.image.IsEmpty(), picture.direct};
@@ -173,6 +175,7 @@ class FrameLoop {
   std::map<std::size_t, FrameRecord> records_;             // of pictures, by the job's index
   int failed_in_a_row_ = 0;                                // frames since the last picture
   bool told_lowered_ = false;                              // once; it is much the same of all frames
+  std::string told_missing_;                               // last
   std::size_t next_ = 0;                                   // of jobs_: the first that has not been requested yet
   std::map<RequestId, std::size_t> open_;                  // to the job's index
   std::map<std::size_t, std::optional<Picture>> waiting_;  // to be put, by the job's index; nullopt: it has failed

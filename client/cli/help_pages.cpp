@@ -71,6 +71,9 @@ std::vector<CommandPage> CommandPages() {
       {"data",
        {.examples = {{"slabstream data list", "The datasets of the service"},
                      {"slabstream data add foot=/scans/foot.nrrd", "One more dataset, until the service ends"}}}},
+      {"steer",
+       {.examples = {{"slabstream steer rho", "How far the simulation is, and its parameters"},
+                     {"slabstream steer rho feed=0.03 kill=0.06", "Other values, from its next step on"}}}},
   };
 }
 

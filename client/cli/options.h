@@ -209,6 +209,13 @@ struct DataOptions {
   bool json = false;
 };
 
+struct SteerOptions {
+  ServiceChoice service;
+  SteerDataset order;
+  std::vector<std::string> values;  // NAME=VALUE
+  bool json = false;
+};
+
 struct LogsOptions {
   ServiceChoice service;
   bool follow = false;

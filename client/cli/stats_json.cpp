@@ -20,6 +20,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share}};
   if (!frame.statistics.lowered.empty()) json["lowered"] = frame.statistics.lowered;
+  if (!frame.statistics.missing.empty()) json["missing"] = frame.statistics.missing;
   return json;
 }
 
@@ -35,6 +36,7 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
     const FrameSummary summary = Summarize(frame.statistics);
     all.voxel_bytes += summary.voxel_bytes;
     all.stored_bytes += summary.stored_bytes;
+    all.sent_bytes += summary.sent_bytes;
     all.image_bytes += summary.image_bytes;
     list.push_back(FrameJson(frame, summary));
   }

@@ -142,7 +142,7 @@ int slabstream_insitu_open(slabstream_insitu** handle, const slabstream_insitu_f
     geometry.orientation.origin = VectorOf(field->origin);
     options.layout.samples = *type;
     options.layout.size = geometry.size;
-    if (field->slots != 0) options.layout.slots = field->slots;
+    options.layout.slots = field->slots == 0 ? 3 : field->slots;
     if (Status status = options.layout.Check(); !status.ok()) return status;
     opened->service = field->service == nullptr ? "" : field->service;
     *handle = opened.release();

@@ -50,7 +50,7 @@ typedef struct {
   double origin[3];    /* centre of voxel 0, 0, 0 */
   uint32_t owner;      /* [0, owners) */
   uint32_t owners;     /* [1, 4096]; default 1 */
-  uint32_t slots;      /* times that the owner has memory for, [2, 8]; default 2. More of them: fewer waits while somebody looks */
+  uint32_t slots;      /* times that the owner has memory for, [2, 8]; default 3. More of them: fewer waits while somebody looks */
   /* owner.json of a service with keys, or the endpoint of a service for its workers, "tcp://HOST:PORT". Default: what
    * $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host, else tcp://127.0.0.1:7421. */
   const char* service;
@@ -68,8 +68,8 @@ SLABSTREAM_INSITU_API int slabstream_insitu_open(slabstream_insitu** handle, con
 SLABSTREAM_INSITU_API int slabstream_insitu_add_box(slabstream_insitu* handle, const int32_t begin[3], const int32_t end[3],
                                                     const int32_t array_begin[3], const int32_t array_end[3], const int64_t strides[3]);
 
-/* Before start: a number that who looks may change, in [least, most]; `value` at first. The name has up to 64 letters, digits and '_'. At
- * most 64 of them. Those of owner 0 are used; others may declare them, too. */
+/* Before start: declares a number that clients may change within [least, most]; its first value is `value`. The name has up to 64 letters,
+ * digits and '_'. At most 64 of them. Those of owner 0 are used; others may declare them, too. */
 SLABSTREAM_INSITU_API int slabstream_insitu_parameter(slabstream_insitu* handle, const char* name, double least, double most, double value);
 
 /* Takes the memory of all slots, and begins to look for the service. INVALID_ARGUMENT names what is wrong with field, boxes or parameters.
@@ -84,19 +84,19 @@ SLABSTREAM_INSITU_API int slabstream_insitu_start(slabstream_insitu* handle);
 SLABSTREAM_INSITU_API int slabstream_insitu_begin(slabstream_insitu* handle, double timeout_seconds, void** pointers,
                                                   double* waited_seconds);
 
-/* The arrays are whole. `time`: above that of the last commit, and the same numbers in all owners. A time that only some owners commit
- * shows as an error, not as a picture. `simulated`: the simulation's own time, in its own unit. */
+/* The arrays are whole. `time`: at least 1, above that of the last commit, and the same numbers in all owners. A time that only some owners
+ * commit shows as an error, not as a picture. `simulated`: the simulation's own time, in its own unit. */
 SLABSTREAM_INSITU_API int slabstream_insitu_commit(slabstream_insitu* handle, uint64_t time, double simulated);
 
 /* begin, a copy from the simulation's own arrays, and commit. pointers[i]: the first sample of the array of box i. strides[i]: samples from
- * a voxel to the next one there, any numbers; NULL: as add_box says. If it fails, nothing was committed. */
+ * a voxel to the next one there, negative ones, too; NULL: as add_box says. If it fails, nothing was committed. */
 SLABSTREAM_INSITU_API int slabstream_insitu_publish(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers,
                                                     const int64_t (*strides)[3], double timeout_seconds);
 
 /* begin and commit without a copy and without memory of the library: samples are read where they lie in this process, by workers on its
  * host through the kernel (process_vm_readv). pointers[i]: the first sample of the array of box i, with the strides of add_box. The arrays
- * must not change or go until adopt, begin or publish has given their slot to a later time, or close: `freed`, if it is not NULL, is set to
- * the time whose arrays are not read any more, or to 0. If it fails, these arrays are not read. */
+ * of a time must not change or go until `freed` names that time, or close returns. Each call sets `freed`, if it is not NULL, to the time
+ * whose arrays nobody reads any more, or to 0. If it fails, the arrays of this call are not read. */
 SLABSTREAM_INSITU_API int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double simulated, const void* const* pointers,
                                                   double timeout_seconds, uint64_t* freed);
 

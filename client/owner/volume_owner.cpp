@@ -61,9 +61,10 @@ struct VolumeOwner::Impl {
   mutable std::mutex mutex;  // guards what follows
   std::condition_variable changed;
   std::array<std::uint64_t, kMostOwnerSlots> times = {};  // 0: none
-  std::uint64_t latest = 0;
+  std::uint64_t latest = 0, gone = 0;                     // gone: the latest time that was overwritten
   double simulated = 0;
   std::vector<std::uint64_t> used;  // ascending
+  std::uint64_t hold = 0;           // of the last OwnerPong
   bool looked_at = false;
   Status refused;
 
@@ -84,6 +85,7 @@ void VolumeOwner::Impl::Forget() {
   next_send = {};
   Tell([this] {
     used.clear();
+    hold = 0;
     looked_at = false;
   });
 }
@@ -101,8 +103,10 @@ void VolumeOwner::Impl::Hear(CoordinatorToOwner message, Time now) {
                         [&](OwnerPong& m) {
                           if (m.epoch != epoch) return;
                           std::ranges::sort(m.used);
+                          if (m.hold != hold) next_send = now;
                           Tell([&] {
                             used = std::move(m.used);
+                            hold = m.hold;
                             looked_at = m.looked_at;
                           });
                         },
@@ -157,17 +161,20 @@ void VolumeOwner::Impl::Run(const std::stop_token& stop) {
       const Time now = MonotonicNow();
       if (epoch != 0 && now >= heard + timeout) Forget();
       OwnerTime time{.epoch = epoch};
+      OwnerPing ping{.epoch = epoch};
       {
         const std::lock_guard lock(mutex);
         ended = !refused.ok();
         if (ended) return;
         time.time = latest;
         time.simulated = simulated;
+        ping.hold = hold;
+        ping.gone = gone;
       }
       if (epoch != 0 && time.time > std::exchange(told, time.time)) Send(time);
       if (now < next_send) return;
       next_send = now + heartbeat;
-      epoch != 0 ? Send(OwnerPing{.epoch = epoch}) : Send(registration);
+      epoch != 0 ? Send(ping) : Send(registration);
     });
     if (!done.ok()) Tell([&] { refused = done; });
   }
@@ -178,7 +185,8 @@ std::optional<std::uint32_t> VolumeOwner::Impl::FreeSlot() const {
   std::optional<std::uint32_t> oldest;
   for (std::uint32_t slot = 0; slot < layout.slots; ++slot) {
     const std::uint64_t time = times.at(slot);
-    const bool in_use = std::ranges::binary_search(used, time) || (looked_at && !used.empty() && time > used.back());
+    const bool in_use = std::ranges::binary_search(used, time) || (hold != 0 && !used.empty() && time > used.back());
+    // Not the latest one: the simulation may compute the next time from it.
     if (time != 0 && (time == latest || in_use)) continue;
     if (!oldest || time < times.at(*oldest)) oldest = slot;
   }
@@ -249,6 +257,7 @@ Result<VolumeOwner::Slot> VolumeOwner::Begin(Duration timeout) {
     return Status::Unavailable(fmt::format("\"{}\": the times of all {} slots are used", impl_->registration.dataset, impl_->layout.slots));
   impl_->begun = slot;
   const std::uint64_t freed = std::exchange(impl_->times.at(*slot), 0);
+  impl_->gone = std::max(impl_->gone, freed);
   return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, freed};
 }
 

@@ -92,6 +92,7 @@ Json DatasetJson(const DatasetStatus& dataset) {
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
   }
   if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
+  if (dataset.simulation) entry["simulation"] = SimulationJson(*dataset.simulation);
   entry["since_ms"] = dataset.since_ms;
   return entry;
 }
@@ -119,6 +120,24 @@ Json DatasetsJson(const std::vector<DatasetStatus>& datasets) {
   Json json = Json::array();
   for (const DatasetStatus& dataset : datasets) json.push_back(DatasetJson(dataset));
   return json;
+}
+
+Json SimulationJson(const SimulationStatus& simulation) {
+  Json parameters = Json::array();
+  for (const auto& [name, least, most, value] : simulation.steered) {
+    parameters.push_back({{"name", name}, {"value", value}, {"least", least}, {"most", most}});
+  }
+  return {{"time", simulation.time}, {"simulated", simulation.simulated}, {"parameters", std::move(parameters)}};
+}
+
+std::string SimulationText(const SimulationStatus& simulation) {
+  std::string text = fmt::format("time {}, simulated {:g}\n", simulation.time, simulation.simulated);
+  if (simulation.steered.empty()) return text;
+  text += fmt::format("{:<16} {:>13} {:>13} {:>13}\n", "NAME", "VALUE", "LEAST", "MOST");
+  for (const auto& [name, least, most, value] : simulation.steered) {
+    text += fmt::format("{:<16} {:>13g} {:>13g} {:>13g}\n", name, value, least, most);
+  }
+  return text;
 }
 
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
@@ -150,6 +169,10 @@ std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
     if (r == 0) continue;
     const std::string fields = datasets[r - 1].fields ? FieldsText(*datasets[r - 1].fields) : "";
     if (!fields.empty()) text += "    " + fields + '\n';
+    if (const auto& simulation = datasets[r - 1].simulation) {
+      text += fmt::format("    simulation at time {}, simulated {:g}, {} parameters\n", simulation->time, simulation->simulated,
+                          simulation->steered.size());
+    }
     if (datasets[r - 1].state == DatasetState::kFailed) text += "    " + Printable(datasets[r - 1].error) + '\n';
   }
   return text;

@@ -17,6 +17,10 @@ std::string AgeText(std::uint64_t milliseconds);
 
 Json DatasetsJson(const std::vector<DatasetStatus>& datasets);
 
+Json SimulationJson(const SimulationStatus& simulation);
+// Its time, and a table of its parameters.
+std::string SimulationText(const SimulationStatus& simulation);
+
 // A table: a line for each dataset, and one for the heads of the columns.
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets);
 

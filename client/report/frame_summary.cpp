@@ -36,6 +36,7 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
     summary.voxel_bytes += report.voxel_bytes;
     summary.image_bytes += report.image_bytes;
     summary.stored_bytes += report.stored_bytes;
+    summary.sent_bytes += report.sent_bytes;
     summary.finish_ns += PictureNs(report);
     render_ns[report.worker] += report.stage_ns[std::size_t(Stage::kRender)];
     for (const Span& span : report.spans) {
@@ -69,7 +70,7 @@ Json LevelsJson(const FrameStatistics& statistics) {
 }
 
 Json BytesJson(const FrameSummary& summary) {
-  return {{"voxels", summary.voxel_bytes}, {"stored", summary.stored_bytes}, {"images", summary.image_bytes}};
+  return {{"voxels", summary.voxel_bytes}, {"stored", summary.stored_bytes}, {"sent", summary.sent_bytes}, {"images", summary.image_bytes}};
 }
 
 Json StagesJson(const FrameSummary& summary) {

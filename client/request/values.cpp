@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <limits>
 #include <optional>
 
 #include "client/request/named_colors.h"
@@ -340,6 +341,19 @@ Result<std::vector<NamedText>> ParseNamedTexts(std::string_view option, std::str
     if (rest.empty()) return found;
     if (rest[0] != ',') return Status::InvalidArgument(fmt::format("{} '{}' has '{}' behind a value", option, text, rest.substr(0, 16)));
   }
+}
+
+Result<std::vector<SteeredValue>> ParseSteeredValues(std::string_view option, std::string_view text) {
+  constexpr double kMost = std::numeric_limits<double>::max();
+  const Result<std::vector<NamedText>> named = ParseNamedTexts(option, text);
+  if (!named.ok()) return named.status();
+  std::vector<SteeredValue> values;
+  for (const NamedText& each : *named) {
+    const Result<double> value = ParseNumber(fmt::format("{} {}", option, each.name), each.text, {-kMost, kMost});
+    if (!value.ok()) return value.status();
+    values.push_back({each.name, *value});
+  }
+  return values;
 }
 
 namespace {

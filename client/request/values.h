@@ -11,6 +11,7 @@
 #include "common/math/vec.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
+#include "common/wire/client_structs.h"
 
 namespace slabstream {
 
@@ -59,6 +60,9 @@ struct NamedText {
   std::string name, text;
 };
 Result<std::vector<NamedText>> ParseNamedTexts(std::string_view option, std::string_view text);
+
+// The same, of numbers.
+Result<std::vector<SteeredValue>> ParseSteeredValues(std::string_view option, std::string_view text);
 
 // The other way round: the text that is parsed as the value.
 std::string TextOf(const ImageSize& size);

@@ -21,6 +21,7 @@
 #include "common/view/clip.h"
 #include "common/view/shading.h"
 #include "common/volume/field_info.h"
+#include "common/volume/missing.h"
 
 namespace slabstream {
 
@@ -98,7 +99,8 @@ struct FrameRequest {
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   // Which level of a dataset that has several is drawn (common/planning/levels.h).
   double detail = 1;  // [0, 1000]: the coarsest one whose voxels are at most so many pixels wide; 0: as 1, but coarser as memory needs it
-  std::string level{kAutomatic};  // the number of a level, in [0, kMaxLevels); kAutomatic: as `detail` says
+  std::string level{kAutomatic};     // the number of a level, in [0, kMaxLevels); kAutomatic: as `detail` says
+  Missing missing = Missing::kFail;  // of processes that hold voxels
   Policy policy;
   bool previews = false;  // a picture after each group
   // Pictures may come without depths, and in the codes that a PNG of 8 bits has (ColorCoding::kStraight8): a quarter of the bytes.

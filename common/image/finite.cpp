@@ -33,7 +33,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 std::uint32_t LargestMagnitude(const std::byte* bytes, std::size_t count) {
   std::uint32_t largest = 0;
   std::size_t i = 0;
-#if HWY_TARGET != HWY_SCALAR
   const hn::ScalableTag<std::uint32_t> d;
   const hn::Repartition<std::uint8_t, decltype(d)> d8;  // needs no alignment
   const std::size_t lanes = hn::Lanes(d);
@@ -46,7 +45,6 @@ std::uint32_t LargestMagnitude(const std::byte* bytes, std::size_t count) {
     b = hn::Max(b, load(i + lanes));
   }
   largest = hn::GetLane(hn::MaxOfLanes(d, hn::Max(a, b)));
-#endif
   for (; i < count; ++i) {
     std::uint32_t bits;
     std::memcpy(&bits, bytes + sizeof(bits) * i, sizeof(bits));

@@ -43,7 +43,6 @@ HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
   constexpr float max = std::numeric_limits<Code>::max();
   const std::size_t count = 4 * pixels;
   std::size_t i = 0;
-#if HWY_TARGET != HWY_SCALAR
   const FloatTag d;
   const hn::RebindToUnsigned<FloatTag> du;
   const auto is_alpha = hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(du, 0), hn::Set(du, 3)), hn::Set(du, 3)));
@@ -53,7 +52,6 @@ HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
     const auto shows = hn::Ge(hn::Mul(hn::Set(d, max), alpha), hn::Set(d, 0.5F));
     StoreCodes(d, hn::IfThenElseZero(shows, straight), codes + i);
   }
-#endif
   for (; i < count; ++i) {
     const float alpha = rgba[i | 3], sample = i % 4 == 3 ? alpha : max * alpha >= 0.5F ? rgba[i] / alpha : 0;
     StoreCodes(OneTag(), hn::Set(OneTag(), sample), codes + i);
@@ -63,7 +61,6 @@ HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
 void FromStraight8(const std::uint8_t* codes, std::size_t pixels, float* rgba) {
   const std::size_t count = 4 * pixels;
   std::size_t i = 0;
-#if HWY_TARGET != HWY_SCALAR
   const FloatTag d;
   const hn::RebindToSigned<FloatTag> di;
   const hn::RebindToUnsigned<FloatTag> du;
@@ -74,7 +71,6 @@ void FromStraight8(const std::uint8_t* codes, std::size_t pixels, float* rgba) {
     const auto factor = hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), hn::Broadcast<3>(straight));
     hn::StoreU(hn::Mul(straight, factor), d, rgba + i);
   }
-#endif
   for (; i < count; ++i) rgba[i] = float(codes[i]) / kMax8 * (i % 4 == 3 ? 1 : float(codes[i | 3]) / kMax8);
 }
 

@@ -42,7 +42,6 @@ void Erase(LocalImage& image, PixelRange pixels, std::int32_t frame_width);
 // The row kernels. rgba rows hold 4 * pixel_count floats; rows do not alias, but out may equal front (first) or back (second). False: a
 // written value is not finite; an operand that is not never gives a finite sum.
 bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count);
-bool OverRowReference(const float* front, const float* back, float* out, std::size_t pixel_count);
 
 // The larger value, and the sum, in each channel. Rows as above.
 bool MaximumRow(const float* a, const float* b, float* out, std::size_t pixel_count);

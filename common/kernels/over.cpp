@@ -15,14 +15,6 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-bool OverRow(const float* front, const float* back, float* out, std::size_t pixel_count) {
-  return OverRowReference(front, back, out, pixel_count);
-}
-
-#else
-
 // As many pixels as one vector of D holds. Returns the bits of what it wrote, without signs.
 template <class D>
 HWY_INLINE hn::Vec<hn::RebindToUnsigned<D> > OverVector(D d, const float* front, const float* back, float* out) {
@@ -49,8 +41,6 @@ bool OverRow(const float* front, const float* back, float* out, std::size_t pixe
   return hn::AllTrue(wide_bits, hn::Lt(largest, hn::Set(wide_bits, kInfinity))) &&
          hn::AllTrue(pixel_bits, hn::Lt(largest_of_tail, hn::Set(pixel_bits, kInfinity)));
 }
-
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -16,15 +16,6 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
-                  LocalImage& picture) {
-  ResampleRowsReference(frame, frame_from_picture, y_begin, y_end, picture);
-}
-
-#else
-
 using PixelTag = hn::FixedTag<float, 4>;  // one pixel
 // Up to four neighbouring pixels of a row.
 using PixelsTag = hn::FixedTag<float, HWY_HAVE_SCALABLE ? 4 : HWY_MIN(std::size_t{16}, HWY_MAX_BYTES / sizeof(float))>;
@@ -115,9 +106,9 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
                           Largest(d, bottom) + reach < image.y_begin || Least(d, top) - reach > image.y_end);
   if (places.empty || !places.narrow) return;
   places.inside = IsInside(image, places, 0) && IsInside(image, places, kBatch - 1);  // a line stays a line, so its ends suffice
-  NarrowSpline(places.x, [&](std::int32_t i, auto first, auto left, auto middle, auto right) HWY_ATTR {
+  NarrowSpline(places.x, [&](std::int32_t i, auto first, auto before, auto middle, auto after) HWY_ATTR {
     hn::Store(first, di, places.first_x + i);
-    hn::StoreInterleaved4(left, middle, right, hn::Zero(df), df, places.weight_x + 4 * i);
+    hn::StoreInterleaved4(before, middle, after, hn::Zero(df), df, places.weight_x + 4 * i);
   });
   NarrowSpline(places.y, [&](std::int32_t i, auto first, auto upper, auto middle, auto lower) HWY_ATTR {
     hn::Store(first, di, places.first_y + i);
@@ -260,8 +251,6 @@ void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_pictu
   const bool affine = frame_from_picture[6] == 0 && frame_from_picture[7] == 0;  // of orthographic views
   (affine ? ResampleRowsAs<true> : ResampleRowsAs<false>)(frame, frame_from_picture, y_begin, y_end, picture);
 }
-
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -24,8 +24,6 @@ inline constexpr double kSkewSlack = 0.25;  // pixels
 using ProjectiveMap = std::array<double, 9>;
 void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
                   LocalImage& picture);
-void ResampleRowsReference(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
-                           LocalImage& picture);
 
 // Bounds of all pixels of a picture of width x height pixels that `frame` reaches, and some more.
 PixelBounds ReachedPixels(const PixelBounds& frame, const ProjectiveMap& frame_from_picture, std::int32_t width, std::int32_t height);

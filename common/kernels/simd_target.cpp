@@ -39,8 +39,9 @@ Status LimitSimdTargetByEnvironment() {
   disabled = 0;
   hwy::DisableTargets(disabled);
   if (Targets().empty()) {
-    return Status::InvalidArgument("compiled for " + NameOf(HWY_STATIC_TARGET) +
-                                   ", which this processor does not have: compile for every processor (deploy/build --portable)");
+    return Status::InvalidArgument(
+        "compiled for " + NameOf(HWY_STATIC_TARGET) +
+        " or better, which this processor does not have: on one of 2010 or later, deploy/build --portable serves");
   }
   const char* name = std::getenv("SLABSTREAM_SIMD");
   if (name == nullptr || *name == '\0') return Status::Ok();

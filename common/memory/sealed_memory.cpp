@@ -54,6 +54,9 @@ Result<SealedMemory> SealedMemory::Open(std::uint32_t pid, std::uint32_t file_de
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0) return failure();
   if (!S_ISREG(found.st_mode) || !fits(found)) return other();
+  // Whoever maps what another process shares has it open for reading alone: it does not pass for that process' own.
+  if (::lstat(path.c_str(), &found) != 0) return failure();
+  if ((found.st_mode & S_IWUSR) == 0) return other();
   FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.number() < 0) return failure();
   const int seals = ::fcntl(file.number(), F_GET_SEALS);

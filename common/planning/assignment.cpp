@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <numeric>
 #include <queue>
 #include <tuple>
@@ -44,11 +45,25 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
   return slots;
 }
 
-// Each slot has about as many owners, with neighbouring numbers: these often lie side by side, so that their boxes make longer runs.
+// Owners go to the slots of their host, or to all slots if it has none. Each of them has about as many owners, with neighbouring numbers:
+// these often lie side by side, so that their boxes make longer runs.
 std::vector<std::uint32_t> AssignToOwners(const AssignmentRequest& request) {
-  const std::uint64_t owners = std::max(request.holder_count, request.slots);
+  std::map<std::uint64_t, std::vector<std::uint32_t>> slots_of, holders_of;  // by host; 0: all
+  for (std::uint32_t slot = 0; slot < request.slots; ++slot) {
+    slots_of[0].push_back(slot);
+    if (slot < request.slot_hosts.size() && request.slot_hosts[slot] != 0) slots_of[request.slot_hosts[slot]].push_back(slot);
+  }
+  for (std::uint32_t holder = 0; holder < request.holder_count; ++holder) {
+    const std::uint64_t host = holder < request.holder_hosts.size() ? request.holder_hosts[holder] : 0;
+    holders_of[slots_of.contains(host) ? host : 0].push_back(holder);
+  }
+  std::vector<std::uint32_t> slot_of(request.holder_count);
+  for (const auto& [host, holders] : holders_of) {
+    const std::vector<std::uint32_t>& slots = slots_of.at(host);
+    for (std::size_t i = 0; i < holders.size(); ++i) slot_of[holders[i]] = slots[i * slots.size() / std::max(holders.size(), slots.size())];
+  }
   std::vector<std::uint32_t> slots;
-  for (const std::uint32_t holder : request.holders) slots.push_back(std::uint32_t(holder * std::uint64_t{request.slots} / owners));
+  for (const std::uint32_t holder : request.holders) slots.push_back(slot_of[holder]);
   return slots;
 }
 

@@ -14,6 +14,8 @@ struct AssignmentRequest {
   // By box: who holds its voxels (OwnedBox::owner), numbers below `holder_count`; empty: unknown.
   std::span<const std::uint32_t> holders = {};
   std::uint32_t holder_count = 0;
+  // By holder, and by slot: the host whose memory its processes can read (VolumeSummary::owner_hosts); 0: not known. Empty: of none.
+  std::span<const std::uint64_t> holder_hosts = {}, slot_hosts = {};
 };
 
 struct AssignmentEntry {

@@ -15,6 +15,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/indices.h"
+#include "common/volume/missing.h"
 
 namespace slabstream {
 namespace {
@@ -308,18 +309,21 @@ struct LayoutMaker::State {
     std::vector<std::uint32_t> box_holders;
     for (BoxId id = 0; id < partition.boxes().size(); ++id) {
       const Box& box = partition.boxes()[id];
-      if (!shows(box, id)) continue;
+      if (!shows(box, id) || (!holders.empty() && holders[id] == kNoOwner)) continue;
       shown.push_back(id);
       box_costs.push_back(cost_of(box, id));
       if (!holders.empty()) box_holders.push_back(holders[id]);
     }
+    std::uint32_t holder_count = 0;
+    for (const std::uint32_t holder : holders) holder_count = std::max(holder_count, holder == kNoOwner ? 0 : holder + 1);
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
-    const std::vector<std::uint32_t> owners =
-        policy.assignment->assign({.costs = box_costs,
-                                   .slots = request.slots,
-                                   .holders = box_holders,
-                                   .holder_count = holders.empty() ? 0 : std::ranges::max(holders) + 1});
+    const std::vector<std::uint32_t> owners = policy.assignment->assign({.costs = box_costs,
+                                                                         .slots = request.slots,
+                                                                         .holders = box_holders,
+                                                                         .holder_count = holder_count,
+                                                                         .holder_hosts = request.summary->owner_hosts,
+                                                                         .slot_hosts = request.hosts});
     for (std::size_t i = 0; i < shown.size(); ++i) layout.owners[shown[i]] = owners[i];
     return layout;
   }

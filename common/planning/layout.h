@@ -49,7 +49,8 @@ struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
   const ClassifiedVolume* volume = nullptr;  // it has this summary
   const ResolvedPolicy* policy = nullptr;
-  std::uint32_t slots = 1;  // >= 1
+  std::uint32_t slots = 1;                    // >= 1
+  std::span<const std::uint64_t> hosts = {};  // AssignmentRequest::slot_hosts
   std::int64_t box_bytes_target = kBoxBytesTarget;
   // ResolvedRequest::map and coarser; null: one level
   const LevelMap* map = nullptr;

@@ -108,7 +108,11 @@ Status ResolveOwners(const VolumeSummary& summary, FrameRequest& request) {
   if (summary.stored && NamesOwners(summary.stored->source) && policy.assignment == Policy().assignment && !IsDynamic(policy)) {
     policy.assignment = std::ranges::find_if(Assignments(), &AssignmentEntry::by_owner)->name;
   }
-  if (!FindNamed(Assignments(), policy.assignment)->by_owner) return Status::Ok();
+  if (!FindNamed(Assignments(), policy.assignment)->by_owner) {
+    if (summary.owned == nullptr || std::ranges::count(*summary.owned, kNoOwner, &OwnedBox::owner) == 0) return Status::Ok();
+    return Status::InvalidArgument(
+        fmt::format("missing is 'skip', which needs policy.assignment 'owner', but that is '{}'", policy.assignment));
+  }
   if (summary.owned == nullptr) {
     return Status::InvalidArgument(
         fmt::format("policy.assignment is '{}', but dataset \"{}\" does not lie in pieces", policy.assignment, request.dataset));

@@ -52,6 +52,7 @@ struct RankReport {
   PixelBounds image_bounds;           // pixels of the box's own image, in the frame
   std::uint64_t image_pixels = 0;     // pixels in image_bounds that are not empty: an estimate (SamplePixels)
   std::uint64_t stored_bytes = 0;     // read from the dataset's source for what was received, as they are stored (Chunk::stored_bytes)
+  std::uint64_t sent_bytes = 0;       // on the voxels plane, of what was received: 0 if the worker reads all of it itself
   friend bool operator==(const RankReport&, const RankReport&) = default;
 };
 inline constexpr int kMaxSpans = 64;

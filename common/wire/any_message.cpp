@@ -47,7 +47,7 @@ bool IsOneOf(const FieldDescriptor* field) {
 }
 
 // What is answered by OrderRefused, beside questions.
-using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder, AddVolume, VolumePart>;
+using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder, SteerDataset, AddVolume, VolumePart>;
 
 // Protobuf writes a line to stderr for each string that is not UTF-8; Decode reports it like every other fault.
 void SilenceProtobuf() {

@@ -66,8 +66,9 @@ Result<Messages> Decode(std::span<const std::byte> header);
 template <class Messages>
 Result<Messages> Decode(std::span<const std::byte> header, std::size_t payload_bytes);
 
-// The answer to a SubmitFrame, a question (Question), an order (ShutDown, KeysOrder, DataOrder) or part of a volume (AddVolume, VolumePart)
-// that Decode has refused, so that its client hears why: FrameFailed or OrderRefused. nullopt for every other header.
+// The answer to a SubmitFrame, a question (Question), an order (ShutDown, KeysOrder, DataOrder, SteerDataset) or part of a volume
+// (AddVolume, VolumePart) that Decode has refused, so that its client hears why: FrameFailed or OrderRefused. nullopt for every other
+// header.
 std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, const Status& why);
 
 // "GroupAssignment": for logs and messages.

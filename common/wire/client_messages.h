@@ -13,6 +13,7 @@
 //   KeysOrder   -------------------------->  KeysReply
 //   DataOrder   -------------------------->  DataReply
 //   Any of the last three may be answered by OrderRefused: over encrypted connections they need an admin's key, but for lists of datasets.
+//   SteerDataset ------------------------>  SteerReply, or OrderRefused
 //   SummaryQuery ------------------------>  SummaryReply
 //   SampleQuery ------------------------->  SampleReply
 //   StatisticsQuery --------------------->  StatisticsReply
@@ -70,10 +71,10 @@ inline std::uint64_t BytesToSend(const AddVolume& order) {
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
 using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery,
                                       AddVolume, VolumePart, DropVolume>;
-using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
+using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder, SteerDataset>>;
 using CoordinatorToClient =
     std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply, DataReply, OrderRefused,
-                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, VolumeCredit>;
+                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, VolumeCredit, SteerReply>;
 
 using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery>;
 using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply>;

@@ -3,6 +3,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/frame/dataset_name.h"
 #include "common/renderers/registry.h"
@@ -16,6 +17,13 @@ namespace {
 template <class Items, class Value>
 void CheckRising(const Items& labels, const Value& value, Checker& check) {
   for (std::size_t i = 1; i < labels.size(); ++i) check.That(value(labels[i - 1]) < value(labels[i]), "labels", "values do not rise");
+}
+
+void CheckFinite(std::string_view field, const std::vector<double>& numbers, Checker& check) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto scope = check.In(field, i);
+    check.Finite("", numbers[i]);
+  }
 }
 
 bool IsIdentifier(std::string_view name) {
@@ -89,12 +97,8 @@ void Rules(const Ball& m, Checker& check) { check.Positive("radius", m.radius); 
 
 void Rules(const PathCamera& m, Checker& check) { check.Adopt(Validate(m.view)); }
 
-void Rules(const ViewQuery& m, Checker& check) {
-  for (std::size_t i = 0; i < m.at.size(); ++i) {
-    const auto scope = check.In("at", i);
-    check.Finite("", m.at[i]);
-  }
-}
+void Rules(const ViewQuery& m, Checker& check) { CheckFinite("at", m.at, check); }
+void Rules(const OwnerSteered& m, Checker& check) { CheckFinite("values", m.values, check); }
 
 void Rules(const SentFile& m, Checker& check) {
   check.Adopt(CheckDatasetName(m.name));

@@ -56,6 +56,7 @@ void Rules(const SentFile&, Checker&);
 void Rules(const VolumeCredit&, Checker&);
 void Rules(const SteeredParameter&, Checker&);
 void Rules(const RegisterOwner&, Checker&);
+void Rules(const OwnerSteered&, Checker&);
 
 // Each number is finite and above 0.
 void CheckPositive(std::string_view field, const Vec3& v, Checker& check);

@@ -148,7 +148,7 @@ Status DatasetMachine::State::Advance(Use& use) {
 }
 
 Status DatasetMachine::State::SeekSources(Use& use) {
-  const std::string& name = use.request->dataset;
+  const std::string name = use.entries.front().name;
   Result<ShownAtTime> shown = WhatShows(*use.request, datasets.Find(name)->fields);
   if (!shown.ok()) return shown.status();
   use.entries.resize(1);  // the dataset
@@ -408,7 +408,33 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
   if (full && BytesThatFramesGiveBack() > 0) return WaitForRoom(name);
   datasets.Fail(name, status, now);
   Tell(NoteAbout::kDatasets, LogLevel::kWarning, "{} cannot be read: {}", Named(name), status.message());
+  std::map<UseId, Use> without;
+  if (datasets.Find(name)->source.open && !IsPart(name)) {
+    for (auto next = uses.begin(); next != uses.end();) {
+      const auto use = next++;
+      const FrameRequest& request = *use->second.request;
+      if (request.dataset == name && request.missing != Missing::kFail && !use->second.begun()) without.insert(uses.extract(use));
+    }
+  }
   Lose(name, status, full ? &RefusedRequests::too_large : nullptr);
+  SeekWithout(name, std::move(without));
+}
+
+// What is there of a dataset of which owners are gone, for those who want that rather than nothing.
+void DatasetMachine::State::SeekWithout(const std::string& name, std::map<UseId, Use> without) {
+  uses.merge(without);
+  for (auto& each : uses) {
+    Use& use = each.second;
+    const bool wants = use.request->dataset == name && use.request->missing != Missing::kFail && !use.begun();
+    if (!wants || use.entries.front().name != name) continue;
+    DataSource source = datasets.Find(name)->source;
+    source.missing = use.request->missing;
+    source.statistics = datasets.Find(name)->whole;
+    const std::string part = PartWithout(name, source.missing);
+    datasets.AddPart(part, std::move(source), now);
+    use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{part, Seek(part)}}};
+    TellUse(each);
+  }
 }
 
 // What the dataset is read from is not what it was. Frames that have begun go on with the voxels that they began with.
@@ -417,7 +443,8 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
   const std::string name = DatasetOfPart(changed);
   // What waits for a part waits for the dataset, which is opened anew.
   for (auto& [id, use] : uses) {
-    if (use.begun() || use.stage == Use::Stage::kDataset || use.request->dataset != name) continue;
+    const bool waits = use.stage == Use::Stage::kDataset && use.entries.front().name == name;
+    if (use.begun() || waits || use.request->dataset != name) continue;
     use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{name}}};
   }
   for (auto& [id, open] : questions) {

@@ -177,6 +177,7 @@ struct DatasetMachine::State {
   // ---- voxels
   void LoadData(const std::string& name);
   void FailData(const std::string& name, const Status& status);
+  void SeekWithout(const std::string& name, std::map<UseId, Use> without);
   void RenewData(const std::string& name);
   bool UnloadOne();  // false: all are in use
   std::uint64_t BytesThatFramesGiveBack() const;

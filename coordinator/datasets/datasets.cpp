@@ -139,6 +139,7 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   entry->bytes = bytes;
   entry->fields = std::move(fields);
   entry->statistics.clear();
+  if (entry->source.open) entry->whole = entry->summary;
   retired_.erase(id);  // the same voxels again
   return true;
 }
@@ -164,8 +165,10 @@ bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
 }
 
 void DatasetTable::Fail(const std::string& name, const Status& status, Time now) {
-  Reset(name, now);
   Entry& entry = *Find(name);
+  if (!entry.source.open) RemoveParts(name);  // of an owned one they are for this case
+  Retire(entry);
+  entry = Forgotten(entry, now);
   entry.state = DatasetState::kFailed;
   entry.error = status.message();
 }
@@ -173,7 +176,18 @@ void DatasetTable::Fail(const std::string& name, const Status& status, Time now)
 // The entry as if it had never been loaded.
 DatasetTable::Entry DatasetTable::Forgotten(Entry& entry, Time now) {
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
+  fresh.whole = std::move(entry.whole);
   fresh.checks.End();
+  if (fresh.source.open) {
+    fresh.before = std::move(entry.before);
+    if (entry.state == DatasetState::kReady) {
+      Entry before = entry;
+      before.opened = nullptr;  // its owners may overwrite that time
+      before.stamp = nullptr;
+      before.bytes = 0;
+      fresh.before = std::make_shared<const Entry>(std::move(before));
+    }
+  }
   return fresh;
 }
 
@@ -237,8 +251,10 @@ std::vector<DatasetId> DatasetTable::TakeRetired(const std::function<bool(Datase
 
 std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
   std::vector<DatasetStatus> report;
-  for (const auto& [name, entry] : entries_) {
-    if (entry.awaited != 0) continue;
+  for (const auto& [name, present] : entries_) {
+    if (present.awaited != 0) continue;
+    const bool waits = present.state == DatasetState::kUnloaded || present.state == DatasetState::kLoading;
+    const Entry& entry = waits && present.before != nullptr ? *present.before : present;
     DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
     const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now - entry.since);
     status.since_ms = std::uint64_t(std::max(since, std::chrono::milliseconds(0)).count());

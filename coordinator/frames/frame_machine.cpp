@@ -155,6 +155,12 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
     ask.levels = dataset.levels;
     ask.level = dataset.drawn.front();
   }
+  if (ask.resolved->summary->owned != nullptr) {
+    for (const WorkerId worker : ask.roster.slots) {
+      const Member* const member = roster.Find(worker);
+      ask.hosts.push_back(member == nullptr ? 0 : member->description.memory_scope);
+    }
+  }
   for (const Member& member : roster.members()) {
     const std::uint64_t bytes = member.description.memory_bytes;
     if (member.leaving || bytes == 0) continue;

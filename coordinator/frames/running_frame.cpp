@@ -408,6 +408,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .grid = FrameBounds(plan_.setup),
                              .levels = {},
                              .lowered = request_.lowered,
+                             .missing = planned_->asked.resolved->summary->missing,
                              .view = request_.dataset()->view};
   for (const int level : request_.dataset()->drawn) statistics.levels.push_back({.level = std::uint32_t(level)});
   for (const GroupPlan& group : plan_.groups) {

@@ -72,7 +72,7 @@ std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) 
 }
 
 LayoutTable::Key LayoutTable::KeyOf(const Request& request) {
-  Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target};
+  Key key{*request.volume, *request.policy, request.slots, request.hosts, request.box_bytes_target};
   if (request.map != nullptr) key.map = *request.map;
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
@@ -115,6 +115,7 @@ LayoutRequest LayoutTable::MakingOf(const Request& request, const std::optional<
           .volume = request.volume,
           .policy = request.policy,
           .slots = request.slots,
+          .hosts = request.hosts,
           .box_bytes_target = request.box_bytes_target,
           .map = request.map.get(),
           .coarser = request.coarser,

@@ -41,6 +41,7 @@ class LayoutTable {
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
     std::uint32_t slots = 1;
+    std::vector<std::uint64_t> hosts = {};  // LayoutRequest::hosts
     std::int64_t box_bytes_target = kBoxBytesTarget;
     // The levels that the frame draws (ResolvedRequest::map and coarser).
     std::shared_ptr<const LevelMap> map = {};
@@ -51,8 +52,8 @@ class LayoutTable {
   std::shared_ptr<const Layout> Find(const Request& request);
   // Whether FindMade may find one, for some box_bytes_target.
   bool HasMade(const Request& request);
-  // That layout if it is made; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone, and does not wait for other
-  // threads.
+  // That layout if it is made; null: ask Find. Needs policy, volume, slots, hosts, box_bytes_target and map alone, and does not wait for
+  // other threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
   // Learns from a finished frame of this request, which has occupied voxels; then the layout changes if it should.
@@ -63,6 +64,7 @@ class LayoutTable {
     ClassifiedVolume volume;
     ResolvedPolicy policy;
     std::uint32_t slots = 1;
+    std::vector<std::uint64_t> hosts = {};
     std::int64_t box_bytes_target = kBoxBytesTarget;
     LevelMap map = {};  // with one level: the whole volume
     friend bool operator==(const Key&, const Key&) = default;

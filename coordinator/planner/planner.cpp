@@ -90,7 +90,8 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (resolved.summary->stored && resolved.map == nullptr) return std::nullopt;  // to find its ShownZones may take long
-  LayoutTable::Request wanted{.policy = &resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
+  LayoutTable::Request wanted{
+      .policy = &resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .hosts = request.hosts, .map = resolved.map};
   if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
@@ -126,6 +127,7 @@ LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const Fra
           .summary = resolved.summary.get(),
           .occupied = request.occupied,
           .slots = std::uint32_t(request.roster.slots.size()),
+          .hosts = request.hosts,
           .box_bytes_target = BoxTarget(setup, request),
           .map = resolved.map != nullptr ? resolved.map : ShownZones(setup),
           .coarser = resolved.coarser};

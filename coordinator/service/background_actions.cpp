@@ -23,6 +23,7 @@
 #include "coordinator/service/dataset_id.h"
 #include "data/catalogue/client_file.h"
 #include "data/catalogue/dataset_fields.h"
+#include "data/owned/owned_source.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
 
@@ -243,8 +244,13 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
       summary.indexed = std::make_shared<const BrickRangeList>(DataRanges(bricks, description));
     }
   }
-  const DatasetId id = IdOf(action.name, description, at.stored);
+  // Of voxels that others hold, the text says which they are.
+  const DatasetId id = IdOf(at.source->info().owned.empty() ? action.name : DatasetOfPart(action.name), description, at.stored);
   summary.owned = at.source->info().levels[std::size_t(at.stored.level)].owned;
+  if (const auto owners = OwnedField::Parse(at.source->info().owned); owners.ok()) {
+    for (const OwnerPlace& owner : owners->owners) summary.owner_hosts.push_back(owner.scope);
+    for (const std::string& note : at.source->info().notes) summary.missing = note;
+  }
   const std::uint64_t held = samples.bytes();
   return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), held, at.stamp}, id,
               std::move(samples)};
@@ -260,7 +266,8 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   };
   const auto failed = EndOf<DatasetFailed>(action.name, action.load);
   const DataSource& source = action.source;
-  const FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
+  const FairTasks::Owner server = source.open ? std::hash<std::string>()(action.name)  // who may wait for owners of voxels
+                                              : ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
   if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
   return Post(loads_, barrier.c_str(), load, failed);
 }

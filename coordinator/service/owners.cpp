@@ -1,19 +1,24 @@
 #include "coordinator/service/owners.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <condition_variable>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "common/base/overloaded.h"
+#include "common/base/printable.h"
 #include "common/files/file_stamp.h"
 #include "common/frame/dataset_name.h"
+#include "common/volume/box_assembly.h"
 #include "common/wire/payload.h"
 #include "data/open/open_source.h"
 #include "data/owned/owned_source.h"
@@ -34,9 +39,10 @@ struct Asked {
 struct Owner {
   PeerToken peer = 0;
   RegisterOwner registered;
-  std::uint64_t latest = 0;  // time; 0: none yet
-  Time heard, answered;      // answered: when `out` was empty or last became shorter
-  std::vector<Asked> out;    // at most kMostAskedOfOwner
+  std::uint64_t latest = 0;          // time; 0: none yet
+  std::uint64_t hold = 0, gone = 0;  // as of its last OwnerPing
+  Time heard, answered;              // answered: when `out` was empty or last became shorter
+  std::vector<Asked> out;            // at most kMostAskedOfOwner
   std::deque<Asked> waiting = {};
 };
 
@@ -45,14 +51,26 @@ struct Place {
   std::string why = "has not come yet";  // there is none
 };
 
+bool Has(const Place& place) { return place.owner && place.owner->latest != 0; }  // voxels
+
 struct Field {
   std::vector<Place> places;
   std::uint64_t set = 0;    // another number when an owner comes or goes
-  std::uint64_t whole = 0;  // time; 0: not all owners are there, or one has no time yet
+  std::uint64_t whole = 0;  // time, of the owners that have any; 0: none has, or not all have come since it had owners
+  std::uint64_t shown = 0;  // the last whole time that all were known to hold, and hold; 0: none
+  std::uint64_t hold = 0;   // OwnerPong::hold
+  bool let_go = false;      // some waited for others for kOwnerWaits: until the next whole time nobody waits
+  Time since;               // hold: nobody waits for others for long since then
   bool is_dataset = false;
+  // As opened last: what it was read from stays when an owner has gone. Empty: nobody looks, and all are there.
+  std::vector<std::shared_ptr<const MappedOwner>> mapped = {};
+  std::optional<OwnedVolume> last = {};  // what was shown when the first owner left of those that lack; none: nothing, or none lacks
   std::optional<Time> looked = {};
   OwnerPong told = {};                            // last, without nonce
+  double simulated = 0;                           // of `whole`
   std::vector<SteeredParameter> parameters = {};  // as they are now; they outlive owner 0
+
+  SimulationStatus simulation() const { return {whole, simulated, parameters}; }
 };
 
 // Whether each voxel of `bounds` is in exactly one box, and no box has another voxel. The function of space that counts boxes is known by
@@ -77,7 +95,7 @@ bool OfOneField(const RegisterOwner& a, const RegisterOwner& b) {
 
 }  // namespace
 
-struct Owners::State {
+struct Owners::State : std::enable_shared_from_this<Owners::State> {
   std::mutex mutex;  // guards everything
   Epoch epoch = 0;
   std::function<Status(const std::string&)> name_is_free;  // the service's thread
@@ -85,10 +103,12 @@ struct Owners::State {
   std::map<std::string, Field> fields;                     // with at least one owner
   std::map<PeerToken, std::pair<std::string, std::uint32_t>> peers;
   std::map<std::string, std::map<std::uint64_t, std::size_t>> used;  // sources that live, by field and time
-  std::uint64_t sets = 0;
+  std::uint64_t sets = 0, holds = 0;
+  std::condition_variable changed;
   Time now;
   News news;
   std::vector<std::pair<AskDone, Result<Bytes>>> answers;  // given without the mutex
+  std::vector<OwnedVolume> closed;                         // the same
 
   // Runs `work` with the mutex, then gives answers.
   News Do(Time at, const auto& work) {
@@ -96,8 +116,10 @@ struct Owners::State {
     now = at;
     work();
     const auto given = std::exchange(answers, {});
+    const auto unused = std::exchange(closed, {});
     News result = std::exchange(news, {});
     lock.unlock();
+    changed.notify_all();
     for (const auto& [done, answer] : given) done(answer);
     return result;
   }
@@ -177,7 +199,6 @@ struct Owners::State {
     const std::string name = m.dataset;
     const std::uint32_t number = m.owner;
     std::optional<Owner>& owner = field.places[number].owner;
-    const bool changed = !owner || owner->registered != m;
     if (!owner) owner.emplace().peer = from;
     if (owner->peer != from) {  // another connection: what is out may be lost
       peers.erase(owner->peer);
@@ -186,26 +207,32 @@ struct Owners::State {
     }
     owner->registered = std::move(m);
     owner->heard = now;
+    owner->hold = 0;
     peers[from] = {name, number};
+    NewSet(field);  // it may have overwritten what it held
+    FindShown(field);
     const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
     news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
     if (number == 0) TakeParameters(field);
-    if (!changed) return;
-    field.set = ++sets;
-    FindWhole(name, field);
   }
 
   void Hear(PeerToken from, const OwnerTime& m) {
     Owner& owner = *Find(from);
     if (m.time <= owner.latest) return;
-    owner.latest = m.time;
     const std::string& name = owner.registered.dataset;
-    FindWhole(name, fields.at(name));
+    Field& field = fields.at(name);
+    if (std::exchange(owner.latest, m.time) == 0) NewSet(field);
+    FindWhole(name, field);
+    if (field.whole == m.time) field.simulated = m.simulated;
   }
 
   void Hear(PeerToken from, const OwnerPing& m) {
-    const std::string& name = Find(from)->registered.dataset;
+    Owner& owner = *Find(from);
+    owner.hold = m.hold;
+    owner.gone = m.gone;
+    const std::string& name = owner.registered.dataset;
+    FindShown(fields.at(name));
     OwnerPong pong = Pong(name, fields.at(name));
     pong.nonce = m.nonce;
     news.messages.emplace_back(from, std::move(pong));
@@ -217,19 +244,39 @@ struct Owners::State {
     const auto [name, number] = peers.extract(peer).mapped();
     Field& field = fields.at(name);
     FailAsked(*field.places[number].owner, Status::Unavailable(Named(name, field, number) + " " + why));
+    if (field.shown != 0 && std::ranges::all_of(field.places, Has)) {
+      Forget(field);
+      field.last = AtShownTime(name, field);
+    }
     field.places[number] = {{}, why};
-    field.set = ++sets;
-    field.whole = 0;
+    NewSet(field);
+    FindWhole(name, field);
     if (std::ranges::any_of(field.places, [](const Place& place) { return place.owner.has_value(); })) return;
     if (field.is_dataset) news.datasets.push_back({.name = name, .left = true});
+    Forget(field);
     fields.erase(name);
+  }
+
+  void Forget(Field& field) {
+    if (field.last) closed.push_back(*std::exchange(field.last, std::nullopt));
+  }
+
+  // Others have voxels than before.
+  void NewSet(Field& field) {
+    field.set = ++sets;
+    field.hold = field.shown = 0;
+    field.let_go = false;
   }
 
   // ---- times
   void FindWhole(const std::string& name, Field& field) {
-    std::uint64_t whole = ~std::uint64_t{0};
-    for (const Place& place : field.places) whole = std::min(whole, place.owner ? place.owner->latest : 0);
-    field.whole = whole;
+    std::uint64_t whole = 0;
+    for (const Place& place : field.places) {
+      if (Has(place)) whole = whole == 0 ? place.owner->latest : std::min(whole, place.owner->latest);
+    }
+    if (!field.is_dataset && !std::ranges::all_of(field.places, Has)) whole = 0;
+    if (std::exchange(field.whole, whole) != whole) LetGo(field, false);
+    FindShown(field);
     if (whole == 0 || std::exchange(field.is_dataset, true)) return;
     OwnedData& news_of = news.datasets.emplace_back(OwnedData{.name = name});
     news_of.came.emplace().path = fmt::format("{} owners", field.places.size());  // for the log
@@ -237,13 +284,41 @@ struct Owners::State {
 
   bool IsLookedAt(const Field& field) const { return field.looked && now < *field.looked + kOwnerLooked; }
 
+  void LetGo(Field& field, bool let_go) {
+    if (std::exchange(field.let_go, let_go) != let_go) field.set = ++sets;  // it is opened anew, and says so
+  }
+
+  // While somebody looks, owners are told to hold what they have. Once all have said that they do, and what was gone before, a whole time
+  // can be shown until there is another one.
+  void FindShown(Field& field) {
+    if (!IsLookedAt(field) || field.whole == 0) {
+      field.hold = field.shown = 0;
+      return LetGo(field, false);
+    }
+    if (field.let_go) return;
+    const bool all_alike =
+        std::ranges::all_of(field.places, [&](const Place& place) { return !Has(place) || place.owner->latest == field.whole; });
+    if (all_alike || field.hold == 0) field.since = now;
+    if (field.hold == 0) field.hold = ++holds;
+    const bool held = std::ranges::all_of(field.places, [&](const Place& place) {
+      return !Has(place) || (place.owner->hold == field.hold && place.owner->gone < field.whole);
+    });
+    if (held && std::exchange(field.shown, field.whole) != field.whole) field.since = now;
+    if (held && std::ranges::all_of(field.places, Has)) Forget(field);
+    if (now < field.since + kOwnerWaits) return;
+    field.hold = 0;
+    LetGo(field, true);
+  }
+
   OwnerPong Pong(const std::string& name, const Field& field) const {
     std::set<std::uint64_t> times;
     if (const auto of = used.find(name); of != used.end()) {
       for (const auto& [time, sources] : of->second) times.insert(time);
     }
-    OwnerPong pong{.epoch = epoch, .looked_at = IsLookedAt(field)};
-    if (pong.looked_at && field.whole != 0) times.insert(field.whole);
+    OwnerPong pong{.epoch = epoch, .looked_at = IsLookedAt(field), .hold = field.hold};
+    for (const std::uint64_t time : {field.shown, field.whole}) {
+      if (pong.looked_at && time != 0) times.insert(time);
+    }
     constexpr std::size_t kMost = 64;
     while (times.size() > kMost) times.erase(times.begin());  // no owner has so many slots
     pong.used.assign(times.begin(), times.end());
@@ -268,6 +343,37 @@ struct Owners::State {
     OwnerSteered& steered =
         std::get<OwnerSteered>(news.messages.emplace_back(field.places[0].owner->peer, OwnerSteered{.epoch = epoch}).second);
     for (const SteeredParameter& each : field.parameters) steered.values.push_back(each.value);
+  }
+
+  Result<SimulationStatus> Steer(const SteerDataset& order) {
+    const auto found = fields.find(order.dataset);
+    if (found == fields.end()) {
+      if (name_is_free(order.dataset).ok()) return Status::NotFound(fmt::format("no dataset \"{}\"", Printable(order.dataset)));
+      return Status::InvalidArgument(fmt::format("\"{}\": no simulation holds it", Printable(order.dataset)));
+    }
+    std::vector<SteeredParameter> steered = found->second.parameters;
+    for (const SteeredValue& each : order.values) {
+      const auto parameter = std::ranges::find(steered, each.name, &SteeredParameter::name);
+      if (parameter == steered.end()) return NoSuchParameter(order.dataset, each.name, steered);
+      if (each.value < parameter->least || each.value > parameter->most) {
+        return Status::InvalidArgument(
+            fmt::format("\"{}\": {} is {}, must be in [{}, {}]", order.dataset, each.name, each.value, parameter->least, parameter->most));
+      }
+      parameter->value = each.value;
+    }
+    if (!order.values.empty()) {
+      found->second.parameters = std::move(steered);
+      TellParameters(found->second);
+    }
+    return found->second.simulation();
+  }
+
+  static Status NoSuchParameter(const std::string& dataset, const std::string& name, const std::vector<SteeredParameter>& known) {
+    if (known.empty()) return Status::InvalidArgument(fmt::format("\"{}\" has no parameters", dataset));
+    std::vector<std::string_view> names;
+    for (const SteeredParameter& each : known) names.push_back(each.name);
+    return Status::InvalidArgument(
+        fmt::format("\"{}\" has no parameter '{}', must be one of: {}", dataset, Printable(name), fmt::join(names, ", ")));
   }
 
   // ---- what owners are asked for
@@ -319,6 +425,8 @@ struct Owners::State {
           owner.out.push_back(std::move(owner.waiting.front()));
         }
       }
+      FindShown(field);
+      if (!IsLookedAt(field) && std::ranges::all_of(field.places, Has)) field.mapped.clear();
       const OwnerPong pong = Pong(name, field);
       if (pong != field.told) {
         for (const Place& place : field.places) {
@@ -327,7 +435,8 @@ struct Owners::State {
         field.told = pong;
       }
       // The machine gives another time up as soon as nobody waits for it.
-      if (field.is_dataset && !pong.used.empty() && pong.used.front() != field.whole) news.datasets.push_back({.name = name});
+      if (field.is_dataset && !pong.used.empty() && pong.used.front() != (field.shown != 0 ? field.shown : field.whole))
+        news.datasets.push_back({.name = name});
     }
     for (const PeerToken peer : silent) Lose(peer, "is silent");
   }
@@ -335,13 +444,31 @@ struct Owners::State {
   // ---- from any thread
   void Look(Field& field, Time at) {
     const bool begins = !IsLookedAt(field);
-    field.looked = at;
+    field.looked = std::max(field.looked.value_or(at), at);
     if (begins && wake) wake();
   }
 
-  static Result<std::shared_ptr<VolumeSource>> Open(const std::shared_ptr<State>& state, const std::string& name);
-  static std::shared_ptr<const void> Use(const std::shared_ptr<State>& state, const std::string& name,
-                                         std::uint64_t time);  // with the mutex
+  // Ok: all owners are there, and each has a time.
+  static Status WhoLacks(const std::string& name, const Field& field) {
+    for (std::size_t i = 0; i < field.places.size(); ++i) {
+      const Place& place = field.places[i];
+      if (!place.owner) return Status::Unavailable(Named(name, field, i) + " " + place.why);
+      if (!Has(place)) return Status::Unavailable(Named(name, field, i) + " has no time yet");
+    }
+    return Status::Ok();
+  }
+
+  static Status NoCommonTime(const std::string& name, const Field& field) {
+    const auto latest = [](const Place& place) { return Has(place) ? place.owner->latest : 0; };
+    const auto first = std::ranges::max_element(field.places, {}, latest), last = std::ranges::min_element(field.places, {}, latest);
+    return Status::Unavailable(fmt::format("{} is at time {}, but owner {} at {}: there was no time that all hold for {} s",
+                                           Named(name, field, std::size_t(last - field.places.begin())), latest(*last),
+                                           first - field.places.begin(), latest(*first), kOwnerWaits / std::chrono::seconds(1)));
+  }
+
+  Result<std::shared_ptr<VolumeSource>> Open(const std::string& name, Missing missing);
+  OwnedVolume AtShownTime(const std::string& name, const Field& field);
+  std::shared_ptr<const void> Use(const std::string& name, std::uint64_t time);  // with the mutex
   void Ask(const std::string& name, std::uint32_t number, Incarnation incarnation, Asked asked);
 };
 
@@ -357,9 +484,9 @@ void Owners::State::Ask(const std::string& name, std::uint32_t number, Incarnati
   asked.done(Status::Unavailable(fmt::format("\"{}\": owner {} has left", name, number)));
 }
 
-std::shared_ptr<const void> Owners::State::Use(const std::shared_ptr<State>& state, const std::string& name, std::uint64_t time) {
-  ++state->used[name][time];
-  return {state.get(), [state, name, time](const void*) {
+std::shared_ptr<const void> Owners::State::Use(const std::string& name, std::uint64_t time) {
+  ++used[name][time];
+  return {this, [state = shared_from_this(), name, time](const void*) {
             const std::lock_guard lock(state->mutex);
             std::map<std::uint64_t, std::size_t>& of = state->used.at(name);
             if (--of.at(time) == 0) of.erase(time);
@@ -368,40 +495,82 @@ std::shared_ptr<const void> Owners::State::Use(const std::shared_ptr<State>& sta
           }};
 }
 
-Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::shared_ptr<State>& state, const std::string& name) {
-  std::unique_lock lock(state->mutex);
-  const auto found = state->fields.find(name);
-  if (found == state->fields.end()) return Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
-  Field& field = found->second;
-  state->Look(field, MonotonicNow());
-  OwnedVolume volume{.field = {name, field.whole, {}}};
+// Of the owners that have any voxels.
+OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& field) {
+  OwnedVolume volume{.field = {name, field.shown, {}}};
   std::vector<Incarnation> incarnations;
-  for (std::size_t i = 0; i < field.places.size(); ++i) {
-    const Place& place = field.places[i];
-    if (!place.owner) return Status::Unavailable(Named(name, field, i) + " " + place.why);
-    if (place.owner->latest == 0) return Status::Unavailable(Named(name, field, i) + " has no time yet");
-    const RegisterOwner& owner = place.owner->registered;
+  std::vector<Box> held;
+  for (const Place& place : field.places) {
+    const RegisterOwner& owner = Has(place) ? place.owner->registered : RegisterOwner();
     volume.field.owners.push_back({owner.memory_scope, owner.pid, owner.file_descriptor, owner.incarnation});
-    volume.boxes.push_back(owner.boxes);
     incarnations.push_back(owner.incarnation);
+    volume.boxes.push_back(owner.boxes);
+    held.insert(held.end(), owner.boxes.begin(), owner.boxes.end());
   }
-  const RegisterOwner& any = field.places.front().owner->registered;
+  const RegisterOwner& any = std::ranges::find_if(field.places, Has)->owner->registered;
   volume.description = any.description;
   volume.exact = {*SampleTypeNamed(any.samples), any.description.mapping};
   volume.description.mapping.offset = any.description.mapping.FromStored(KeptTypeOf(volume.exact.type).shift);
-  volume.ask = [state, name, time = field.whole, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
+  volume.of_nobody = Assemble(any.description.geometry.bounds(), held).missing;
+  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
     state->Ask(name, owner, incarnations[owner], {time, box, std::move(done)});
   };
-  volume.growth = std::make_shared<const FileStamp>(FileStamp{.ask = [state, name, time = field.whole, set = field.set](Time now) {
-    const std::lock_guard of_state(state->mutex);
-    const auto known = state->fields.find(name);
-    if (known == state->fields.end()) return true;
-    state->Look(known->second, now);
-    return known->second.whole != time || known->second.set != set;
-  }});
-  volume.use = Use(state, name, field.whole);
+  volume.use = Use(name, field.shown);
+  return volume;
+}
+
+Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& name, Missing missing) {
+  std::unique_lock lock(mutex);
+  Status lacks, fails;
+  changed.wait_until(lock, MonotonicNow() + kOwnerWaits, [&] {
+    const auto found = fields.find(name);
+    const bool there = found != fields.end();
+    lacks = there ? WhoLacks(name, found->second) : Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
+    fails = there && missing != Missing::kFail ? Status::Ok() : lacks;
+    if (!fails.ok() || !wake) return true;
+    Look(found->second, MonotonicNow());
+    return found->second.shown != 0 || (!lacks.ok() && missing == Missing::kLast);
+  });
+  if (!fails.ok()) return fails;
+  if (!wake) return Status::Unavailable("the coordinator ends");
+  const Field& field = fields.at(name);
+  OwnedVolume volume;
+  const bool is_last = !lacks.ok() && missing == Missing::kLast;
+  if (is_last) {
+    if (!field.last) return Status::Unavailable(lacks.message() + ", and nobody looked before");
+    volume = *field.last;
+    volume.missing = lacks.message() + ": this is the last time before";
+  } else if (field.shown == 0) {
+    return NoCommonTime(name, field);
+  } else {
+    volume = AtShownTime(name, field);
+    if (!lacks.ok()) {
+      volume.missing = lacks.message() + ": its voxels show nothing";
+    } else if (field.let_go) {
+      const auto late = std::ranges::find(field.places, field.whole, [](const Place& place) { return place.owner->latest; });
+      volume.missing = fmt::format("{} has given no time after {}, and others have gone on",
+                                   Named(name, field, std::size_t(late - field.places.begin())), field.whole);
+    }
+  }
+  volume.growth = std::make_shared<const FileStamp>(
+      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time now) {
+        const std::lock_guard of_state(state->mutex);
+        const auto known = state->fields.find(name);
+        if (known == state->fields.end()) return true;
+        state->Look(known->second, now);
+        return (!is_last && known->second.shown != time) || known->second.set != set;
+      }});
   lock.unlock();
-  return MakeOwnedSource(std::move(volume), ProcessReadContext());
+  std::vector<std::shared_ptr<const MappedOwner>> mapped;
+  for (const OwnerPlace& place : volume.field.owners) {
+    if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
+  }
+  auto source = MakeOwnedSource(std::move(volume), ProcessReadContext());
+  lock.lock();
+  const auto known = fields.find(name);
+  if (lacks.ok() && known != fields.end()) known->second.mapped = std::move(mapped);
+  lock.unlock();
+  return source;
 }
 
 Owners::Owners(Epoch epoch, std::function<Status(const std::string&)> name_is_free, std::function<void()> wake)
@@ -415,6 +584,7 @@ Owners::~Owners() {
   (void)state_->Do(MonotonicNow(), [this] {
     state_->wake = nullptr;
     for (auto& [name, field] : state_->fields) {
+      state_->Forget(field);
       for (Place& place : field.places) {
         if (place.owner) state_->FailAsked(*place.owner, Status::Unavailable("the coordinator ends"));
       }
@@ -442,9 +612,21 @@ Owners::News Owners::Hear(PeerToken from, OwnerToCoordinator message, const Byte
                message);
   });
   for (OwnedData& data : news.datasets) {
-    if (data.came) data.came->open = [state = state_, name = data.name] { return State::Open(state, name); };
+    if (data.came) data.came->open = [state = state_, name = data.name](Missing missing) { return state->Open(name, missing); };
   }
   return news;
+}
+
+Result<SimulationStatus> Owners::Steer(const SteerDataset& order) {
+  const std::lock_guard lock(state_->mutex);
+  return state_->Steer(order);
+}
+
+void Owners::Describe(std::vector<DatasetStatus>& datasets) const {
+  const std::lock_guard lock(state_->mutex);
+  for (DatasetStatus& each : datasets) {
+    if (const auto field = state_->fields.find(each.name); field != state_->fields.end()) each.simulation = field->second.simulation();
+  }
 }
 
 Owners::News Owners::Tend(Time now) {

@@ -1,8 +1,10 @@
 // Owners: processes that hold the voxels of datasets in their own memory, as the coordinator knows them (common/wire/owner_messages.h).
 //
 // The owners of a field have numbers and boxes that tile its volume. Once all are there, the field's whole time is the least of the latest
-// times that they have committed; then it is a dataset, whose source (data/owned/owned_source.h) has the voxels of that time. Owners are
-// told which times may not be overwritten: those of sources that live, and the whole one while somebody looks.
+// times that they have committed; then it is a dataset, whose source (data/owned/owned_source.h) has the voxels of a whole time. Owners are
+// told which times may not be overwritten: those of sources that live, and while somebody looks the whole one and later ones. Owners that
+// are ahead may have overwritten it before, so a time is shown once all have said that they hold it. Opening waits for that, for
+// kOwnerWaits at most. Owners that wait for others for kOwnerWaits may go on until there is another whole time.
 //
 // An owner is lost when it leaves, or is silent for kOwnerTimeout. Until another one takes its place, the field cannot be opened. When all
 // are lost, the dataset goes.
@@ -25,6 +27,7 @@ namespace slabstream {
 
 inline constexpr Duration kOwnerHeartbeat = std::chrono::seconds(1), kOwnerTimeout = std::chrono::seconds(5);
 inline constexpr Duration kOwnerLooked = std::chrono::seconds(10);   // how long somebody looks who has asked for a field
+inline constexpr Duration kOwnerWaits = std::chrono::seconds(10);    // for slower ones, while somebody looks
 inline constexpr Duration kOwnerAnswers = std::chrono::seconds(10);  // without any, what an owner is asked for fails
 inline constexpr std::size_t kMostAskedOfOwner = 16;                 // requests that are out; others wait
 inline constexpr std::size_t kMostFieldBoxes = 65536;                // of all owners of a field
@@ -45,6 +48,12 @@ class Owners {
   News Hear(PeerToken from, OwnerToCoordinator message, const Bytes& payload, Time now);
   // What time has brought, and other threads: at least every second, after each event, and when `wake` was called.
   News Tend(Time now);
+
+  // Changes parameters, all or none; what to tell the owner comes with the next Tend. NotFound, InvalidArgument: there is nothing to steer,
+  // no such parameter, or a value beyond its limits.
+  Result<SimulationStatus> Steer(const SteerDataset& order);
+  // Fills in what each dataset's simulation is at.
+  void Describe(std::vector<DatasetStatus>& datasets) const;
 
  private:
   struct State;

@@ -111,7 +111,11 @@ struct CoordinatorService::Impl {
   void Perform(ToDatasets& action) { Step(datasets, action); }
   void Perform(DatasetNews& action) { Step(frames, action); }
   void Perform(TellWorkers& action) { Send<WorkerGone>(control, worker_peers, action.to, action.message, {}); }
-  void Perform(ToClient& action) { Send<ClientGone>(clients, client_peers, std::span(&action.to, 1), action.message, action.payload); }
+  void Perform(ToClient& action) {
+    if (auto* const status = std::get_if<StatusReply>(&action.message)) owners.Describe(status->datasets);
+    if (auto* const data = std::get_if<DataReply>(&action.message)) owners.Describe(data->datasets);
+    Send<ClientGone>(clients, client_peers, std::span(&action.to, 1), action.message, action.payload);
+  }
   void Perform(DropClient& action) {
     if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
   }
@@ -334,7 +338,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
   }
 }
 
-// True: the message was an order about keys, or one that its sender may not give. Datasets may be listed by every client.
+// True: the message was an order about keys or simulations, or one that its sender may not give. Datasets may be listed by every client.
 bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role) {
   const auto reply = [&](MessageView answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
   const auto refuse = [&](std::uint64_t nonce, std::string why) { reply(OrderRefused{nonce, Status::InvalidArgument(std::move(why))}); };
@@ -346,6 +350,11 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const ClientTo
   if (const auto* add = std::get_if<AddVolume>(&message)) return only_admin(add->nonce, "adding a volume");
   if (const auto* data = std::get_if<DataOrder>(&message)) {
     return data->action != DataAction::kList && only_admin(data->nonce, "adding, removing and reloading datasets");
+  }
+  if (const auto* steer = std::get_if<SteerDataset>(&message)) {  // whoever may watch a simulation may steer it, as far as it lets them
+    const Result<SimulationStatus> steered = owners.Steer(*steer);
+    steered.ok() ? reply(SteerReply{steer->nonce, *steered}) : reply(OrderRefused{steer->nonce, Bounded(steered.status())});
+    return true;
   }
   const auto* order = std::get_if<KeysOrder>(&message);
   if (order == nullptr) return false;

@@ -326,7 +326,7 @@ Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uin
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
   text->options.describe = true;
-  const auto opened = data.open ? data.open() : OpenSource(text->path, text->options, ProcessReadContext(), beside);
+  const auto opened = data.open ? data.open(data.missing) : OpenSource(text->path, text->options, ProcessReadContext(), beside);
   if (!opened.ok()) return opened.status();
   std::shared_ptr<VolumeSource> source = *opened;
   std::string place = PlaceOf(data, *text, source->info());

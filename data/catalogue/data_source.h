@@ -14,6 +14,7 @@
 #include "common/base/status.h"
 #include "common/files/file_stamp.h"
 #include "common/volume/labels.h"
+#include "common/volume/missing.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/summary.h"
 #include "data/layers/layer_files.h"
@@ -73,8 +74,10 @@ struct DataSource {
   std::shared_ptr<VolumeSource> beside = {};
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
-  // Set: `path` is not used, and voxels stay with the processes that hold them now (SourceInfo::owned). Unavailable: some are not there.
-  std::function<Result<std::shared_ptr<VolumeSource>>()> open = {};
+  // Set: `path` is not used, and voxels stay with the processes that hold them now (SourceInfo::owned). Unavailable: some are not there,
+  // and `missing` wants more, or nobody has it.
+  std::function<Result<std::shared_ptr<VolumeSource>>(Missing)> open = {};
+  Missing missing = Missing::kFail;
   DataLoader load;                         // set: `path` is not used
   std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it
   std::uint64_t held_bytes = 0;            // memory that the source itself takes, loaded or not, since a client has sent it

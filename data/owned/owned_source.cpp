@@ -11,6 +11,7 @@
 
 #include "common/frame/dataset_name.h"
 #include "common/volume/box_assembly.h"
+#include "common/volume/missing.h"
 #include "common/volume/stored_at.h"
 #include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
@@ -81,14 +82,17 @@ class OwnedSource final : public VolumeSource {
              .exact = of.exact,
              .growth = of.growth};
     info_.owned = of.field.Text();
+    if (!of.missing.empty()) info_.notes = {of.missing};
     if (!of.boxes.empty()) {
       OwnedBoxes owned;
       for (std::uint32_t owner = 0; owner < of.boxes.size(); ++owner) {
         for (const Box& box : of.boxes[owner]) owned.push_back({box, owner});
       }
+      for (const Box& box : of.of_nobody) owned.push_back({box, kNoOwner});
       info_.levels.front().owned = std::make_shared<const OwnedBoxes>(std::move(owned));
     }
     info_.version = XXH3_64bits(info_.owned.data(), info_.owned.size());
+    for (const Box& box : of.of_nobody) nobodys_.Add(box, 0, 0);
     for (std::uint32_t owner = 0; owner < of.field.owners.size(); ++owner) {
       if (const auto& memory = shared_->mapped[owner]; memory != nullptr) {
         const std::vector<HeldBox>& boxes = memory->layout().boxes;
@@ -107,7 +111,7 @@ class OwnedSource final : public VolumeSource {
 
   bool Reaches(const Box& box) const override {
     std::vector<Box> missing = {box};
-    for (const Places* places : {&here_, &ghosts_, &elsewhere_}) places->Take(missing, [](const Places::Of&, const Box&) {});
+    for (const Places* places : {&here_, &ghosts_, &nobodys_, &elsewhere_}) places->Take(missing, [](const Places::Of&, const Box&) {});
     return missing.empty();
   }
 
@@ -120,6 +124,10 @@ class OwnedSource final : public VolumeSource {
     for (const Places* places : {&here_, &ghosts_}) {
       places->Take(missing, [&](const Places::Of& from, const Box& part) { copied.emplace_back(from, part); });
     }
+    nobodys_.Take(missing, [&](const Places::Of&, const Box& part) {
+      constexpr std::array<std::byte, 8> kZero = {};
+      CopySamples(info_.exact.type, kZero.data(), {0, 0, 0}, part.size(), shared_->RoomOf(*reading, part));
+    });
     if (!copied.empty()) {
       reading->BeginPart();
       shared_->context->PostDecode([shared = shared_, reading, copied = std::move(copied)] {
@@ -183,7 +191,7 @@ class OwnedSource final : public VolumeSource {
   };
   const std::shared_ptr<Shared> shared_;
   SourceInfo info_;
-  Places here_, ghosts_, elsewhere_;  // what owners on this host own, and what they hold beside; and what other owners own
+  Places nobodys_, here_, ghosts_, elsewhere_;  // what owners on this host own, and what they hold beside; and what other owners own
 };
 
 std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& field, const std::optional<OwnerLayout>& as) {

@@ -40,7 +40,9 @@ struct OwnedVolume {
   OwnedField field;
   VolumeDescription description = {};        // of kept samples (KeptTypeOf)
   ExactType exact = {};                      // as they are held
-  std::vector<std::vector<Box>> boxes = {};  // of each owner; together they tile the volume
+  std::vector<std::vector<Box>> boxes = {};  // of each owner
+  std::vector<Box> of_nobody = {};           // voxels of owners that are gone, which read as 0; together they tile the volume
+  std::string missing = {};                  // VolumeSummary::missing, a note of the source
   AskOwner ask = {};
   std::shared_ptr<const FileStamp> growth = {};  // tells when there is another time
   std::shared_ptr<const void> use = {};          // kept as long as the source

@@ -24,15 +24,16 @@ from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import Service, connect
 from .sources import Level, Source, open
-from .status import Dataset, DatasetLevel, Field, Status, WebTraffic, Worker
+from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
 from .viewer import Viewer
 
 __version__ = "0.2.0"
 
 __all__ = [
-    "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image", "Internal",
-    "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Progress", "Region", "ResourceExhausted",
-    "Sample", "Service", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status", "TransferFunction", "Unavailable",
-    "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open", "presets", "render", "show", "shutdown",
+    "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image",
+    "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter", "Progress",
+    "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status",
+    "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open",
+    "presets", "render", "show", "shutdown",
 ]

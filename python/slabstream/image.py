@@ -76,6 +76,7 @@ class Statistics:
     voxel_bytes: int             # that workers received for it
     stored_bytes: int            # that were read from the dataset's source for it, as they are stored
     lowered: str                 # with detail="auto": which coarser level was drawn, and why; else empty
+    missing: str                 # what the picture lacks, since processes that hold its voxels are gone or late; else empty
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 

@@ -69,7 +69,7 @@ class Owner:
 
     def __init__(self, dataset: str, shape: Sequence[int], dtype: numpy.typing.DTypeLike, boxes: Sequence[Box] | None = None, *,
                  held: Sequence[Box] | None = None, strides: Sequence[Sequence[int]] | None = None, owner: int = 0, owners: int = 1,
-                 spacing: Sequence[float] = (1, 1, 1), origin: Sequence[float] = (0, 0, 0), slots: int = 2,
+                 spacing: Sequence[float] = (1, 1, 1), origin: Sequence[float] = (0, 0, 0), slots: int = 3,
                  parameters: Mapping[str, tuple[float, float, float]] | None = None, service: str | None = None):
         self.dtype = numpy.dtype(dtype).newbyteorder("=")
         self.waited = 0.0  # seconds, in the last begin() or publish()
@@ -83,6 +83,8 @@ class Owner:
             item = self.dtype.itemsize
             strides = [(y * x * item, x * item, item) for _, y, x in self._held]
         self._strides = [tuple(steps) for steps in strides]
+        last = [sum((side - 1) * step for side, step in zip(*each)) for each in zip(self._held, self._strides)]  # sample, in bytes
+        self._memory = [ctypes.c_char * (byte + self.dtype.itemsize) for byte in last]  # types: they take longer to make than begin()
         self._kept: dict[int, Sequence[Array]] = {}  # by time: arrays that may still be read
         self._parameters = tuple(parameters or ())
         field = _Field(dataset.encode(), self.dtype.name.encode(), _xyz(ctypes.c_int32, shape, "shape"),
@@ -104,11 +106,9 @@ class Owner:
         pointers, waited = (ctypes.c_void_p * len(self._held))(), ctypes.c_double()
         _call("begin", self._handle, ctypes.c_double(timeout), pointers, ctypes.byref(waited))
         self.waited = waited.value
-        arrays = []
-        for pointer, shape, strides in zip(pointers, self._held, self._strides):
-            size = sum((side - 1) * step for side, step in zip(shape, strides)) + self.dtype.itemsize
-            samples = numpy.frombuffer((ctypes.c_char * size).from_address(pointer), self.dtype)
-            arrays.append(numpy.lib.stride_tricks.as_strided(samples, shape, strides))
+        arrays: list[Array] = []
+        for pointer, memory, shape, strides in zip(pointers, self._memory, self._held, self._strides):
+            arrays.append(numpy.ndarray(shape, self.dtype, memoryview(memory.from_address(pointer)), strides=strides))
         return arrays
 
     def _commit(self, time: int, simulated: float | None) -> None:

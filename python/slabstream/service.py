@@ -6,6 +6,7 @@ import contextlib
 import copy
 import dataclasses
 import os
+import sys
 from typing import Any, Callable, Iterator, Sequence
 
 from . import probe, schema, values
@@ -18,7 +19,7 @@ from .image import Image, side_by_side
 from .moves import ball_around, cameras_of, times_of, turned_views
 from .options import COMMANDS, takes_options_of
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
-from .status import Dataset, Status, dataset_of, status_of
+from .status import Dataset, Parameter, Simulation, Status, dataset_of, simulation_of, status_of
 from .transfer import TransferFunction, mapped
 from .uploads import upload_of
 from .viewer import Viewer
@@ -244,6 +245,17 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def reload_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
         """Makes the next frame read the files again, even if they seem unchanged."""
         return self._order(schema.DATA_ACTION_RELOAD, names, timeout)
+
+    def steer(self, dataset: str, /, **changes: float) -> Simulation:
+        """Changes parameters of the simulation that holds a dataset: steer("rho", feed=0.03). All of them, or none if one is refused. Its next
+        steps have them. Without any: how far it is."""
+        most = sys.float_info.max
+        steered = [schema.SteeredValue(name=name, value=values.number(name, value, -most, most)) for name, value in changes.items()]
+        return simulation_of(self._connection.ask("steer_dataset", schema.SteerDataset(dataset=dataset, values=steered)).simulation)
+
+    def parameters(self, dataset: str) -> dict[str, Parameter]:
+        """The parameters of the simulation that holds a dataset, by name, as they are now."""
+        return {each.name: each for each in self.steer(dataset).parameters}
 
     def close(self) -> None:
         self._connection.close()

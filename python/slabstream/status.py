@@ -26,6 +26,25 @@ class Field:
 
 
 @dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A number of a simulation that whoever watches it may change, from `least` to `most`."""
+
+    name: str
+    value: float
+    least: float
+    most: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Simulation:
+    """How far a simulation is whose processes hold the voxels of a dataset."""
+
+    time: int         # the number of the latest one that is whole; 0: none
+    simulated: float  # the same in the simulation's own unit
+    parameters: tuple[Parameter, ...]
+
+
+@dataclasses.dataclass(frozen=True)
 class Dataset:
     name: str
     state: str                                      # "unloaded", "loading", "ready" or "failed"
@@ -46,6 +65,7 @@ class Dataset:
     time_unit: str = ""                             # "s", "ms", "min", "h"; "": not known
     field: int = 0                                  # these are shown if nothing is said
     time: int = 0
+    simulation: Simulation | None = None            # None: no processes hold its voxels
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,10 +111,15 @@ class Status:
     web: tuple[WebTraffic, ...] = ()
 
 
+def simulation_of(message: Any) -> Simulation:
+    return schema.read(Simulation, message, parameters=tuple(schema.read(Parameter, each) for each in message.steered))
+
+
 def dataset_of(message: Any) -> Dataset:
     state = schema.word(message, "state", "failed")
+    simulation = simulation_of(message.simulation) if message.HasField("simulation") else None
     if state != "ready":
-        return Dataset(message.name, state, message.error)
+        return Dataset(message.name, state, message.error, simulation=simulation)
     about = message.description
     known = message.fields
     fields = tuple(
@@ -104,7 +129,7 @@ def dataset_of(message: Any) -> Dataset:
     apart = [field for field in fields if not field.channel]
     return schema.read(Dataset, message, state=state, labels=any(field.labels for field in apart), overlay=any(not field.labels for field in apart), shape=schema.zyx(about.size), spacing=schema.zyx(about.spacing),
                        dtype=schema.word(about, "type") or None, value_range=(message.range.min, message.range.max), levels=levels,
-                       fields=fields or (Field(),), times=max(known.times, 1), time_unit=known.time_unit, field=known.field, time=known.time,
+                       fields=fields or (Field(),), times=max(known.times, 1), time_unit=known.time_unit, field=known.field, time=known.time, simulation=simulation,
                        time_step=known.time_step if known.HasField("time_step") else None)
 
 

@@ -67,7 +67,7 @@ class OwnedDataRules : public DataRules {
 
 TEST_F(OwnedDataRules, ComeAreGivenUpWhileNobodyWaitsAndGo) {
   DataSource source("2 owners", "");
-  source.open = [] { return Result<std::shared_ptr<VolumeSource>>(Status::Unavailable("an owner has left")); };
+  source.open = [](Missing) { return Result<std::shared_ptr<VolumeSource>>(Status::Unavailable("an owner has left")); };
   script.Step(OwnedData{"block", source});
   EXPECT_EQ(StateOf("block"), DatasetState::kUnloaded);
   script.Client(kClient, Frame(1, 1));
@@ -76,10 +76,50 @@ TEST_F(OwnedDataRules, ComeAreGivenUpWhileNobodyWaitsAndGo) {
   EXPECT_THAT(HandedOut(Loaded(1)), SizeIs(1));
   EXPECT_EQ(StateOf("block"), DatasetState::kReady);
   script.Step(OwnedData{"block"});
-  EXPECT_EQ(StateOf("block"), DatasetState::kUnloaded) << "the frame ends with what it has begun with";
+  EXPECT_EQ(StateOf("block"), DatasetState::kReady) << "people are told what it was at the time before";
+  EXPECT_THAT(Of<LoadDataset>(script.Client(kClient, Frame(2, 1))), SizeIs(1)) << "the first frame ends with what it has begun with";
   script.Step(OwnedData{.name = "block", .left = true});
   script.Step(OwnedData{.name = "other", .left = true});
   EXPECT_THAT(NamesOf(script.QueryStatus().datasets), ElementsAre("other"));
+}
+
+TEST_F(OwnedDataRules, WhoeverWantsThatSeesWhatIsThereWhileOwnersAreGone) {
+  const auto ended = [&](const Status& status) {
+    const LoadDataset load = script.loads.back();
+    return script.Step(DatasetFailed{load.name, load.load, status});
+  };
+  const Status gone = Status::Unavailable("an owner has left");
+  DataSource source("2 owners", "");
+  source.open = [](Missing) { return Result<std::shared_ptr<VolumeSource>>(Status::Unavailable("nobody asks")); };
+  script.Step(OwnedData{"block", source});
+  SubmitFrame skips = Frame(1, 1), fails = Frame(2, 1);
+  skips.frame.missing = Missing::kSkip;
+  script.Client(kClient, skips);
+  EXPECT_EQ(script.loads.back().source.missing, Missing::kFail) << "all may be there";
+  script.Client(kOther, fails);
+  ASSERT_THAT(script.loads, SizeIs(1));
+  const auto failed = ToClients<FrameFailed>(ended(gone));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].message.status.message(), "an owner has left");
+  ASSERT_THAT(script.loads, SizeIs(2));
+  EXPECT_EQ(script.loads[1].source.missing, Missing::kSkip);
+
+  script.Client(kOther, Frame(3, 1));  // meanwhile the same again
+  ASSERT_THAT(script.loads, SizeIs(3));
+  EXPECT_THAT(ToClients<FrameFailed>(ended(gone)), SizeIs(1));
+  ASSERT_THAT(script.loads, SizeIs(3)) << "what is there is still being loaded";
+  const LoadDataset part = script.loads[1];
+  EXPECT_THAT(HandedOut(script.Step(DatasetLoaded{part.name, part.load, 1, BlockSummary(), 0, std::make_shared<const FileStamp>()})),
+              SizeIs(1));
+
+  SubmitFrame last = Frame(4, 1);
+  last.frame.missing = Missing::kLast;
+  script.Client(kOther, last);
+  ended(gone);
+  EXPECT_EQ(script.loads.back().source.missing, Missing::kLast);
+  EXPECT_THAT(ToClients<FrameFailed>(ended(Status::Unavailable("nobody has it"))), SizeIs(1));
+  script.Step(OwnedData{.name = "block", .left = true});
+  EXPECT_EQ(script.machine.sizes().uses, 1U) << "the frame that has begun";
 }
 
 // ---------------------------------------------------------------- files

@@ -13,11 +13,12 @@ DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md",
 CODE = {".h", ".cpp", ".f90", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
 TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab", "slabstream-laboratory"}
 
-# What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
+# What others name: Slurm, GDCM, FreeSurfer, Python, Catalyst, Ascent; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
 # and pkg-config.
 FOREIGN = {
     "ConnectionError", "LookupError", "TimeoutError", "TypeError", "ValueError", "CancelledError",
     "GraceTime", "KillWait", "JobId", "StartTime", "FreeSurferColorLUT",
+    "catalyst_initialize", "catalyst_execute", "catalyst_results", "catalyst_finalize", "ascent_ghosts",
 }  # fmt: skip
 FOREIGN_OPTIONS = {
     "--mount-proc", "--benchmark_filter", "--health-cmd", "--network", "--replicas", "--user", "--component", "--cflags", "--libs",
@@ -93,9 +94,10 @@ def identifiers(span: str) -> set[str]:
 
 def exists(name: str) -> bool:
     """All its parts stand together in one unit."""
-    wanted = {re.sub(f"^({PREFIXES})", "", word) for word in identifiers(name)}
+    whole = identifiers(name)
+    wanted = {re.sub(f"^({PREFIXES})", "", word) for word in whole}
     wanted = {word for word in wanted if not word.islower() or "_" in word}
-    return any(words.issuperset(wanted) for words in units().values())
+    return any(words.issuperset(wanted) or words.issuperset(whole) for words in units().values())
 
 
 @functools.cache

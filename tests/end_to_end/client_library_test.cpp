@@ -120,6 +120,19 @@ TEST_F(ClientLibraryTest, ErrorsNameWhatIsWrong) {
   EXPECT_EQ(CodeOf([&] { Service::Connect({"", Path("none.json")}); }), ErrorCode::kNotFound);
 }
 
+TEST_F(ClientLibraryTest, SimulationsAreSteered) {
+  Service service = Service::Connect({endpoint_});
+  RunningProgram simulation({SLABSTREAM_STEERED_SIMULATION, endpoint_, "rho"}, directory_);
+  for (const auto end = std::chrono::steady_clock::now() + kProgramTimeout;
+       service.StatusJson().find("\"simulation\"") == std::string::npos && std::chrono::steady_clock::now() < end;) {
+  }
+  service.Steer("rho", {{"level", 200}, {"unused", -1}});
+  EXPECT_THAT(service.StatusJson(), testing::ContainsRegex("\"level\",[^}]*\"value\": 200"));
+  std::string said;
+  EXPECT_EQ(CodeOf([&] { service.Steer("rho", {{"unused", 2}}); }, &said), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(said, "\"rho\": unused is 2, must be in [-1, 1]");
+}
+
 TEST_F(ClientLibraryTest, SeveralThreadsShareAService) {
   Service service = Service::Connect({endpoint_});
   const std::vector<float> alone = service.Render("ball", {{"size", "32"}}).Rgba();

@@ -321,6 +321,34 @@ TEST_F(ServiceTest, DataAddsListsReloadsAndRemoves) {
   EXPECT_THAT(unknown.err_lines(), testing::ElementsAre("slabstream data: no dataset \"nonesuch\": the catalogue has ball"));
 }
 
+TEST_F(ServiceTest, SteerChangesParametersOfASimulation) {
+  Up(endpoint_);
+  RunningProgram simulation({SLABSTREAM_STEERED_SIMULATION, endpoint_, "rho"}, directory_);
+  const auto known = [&] { return Slabstream({"steer", "rho", "--json"}); };
+  ProgramResult told = known();
+  for (const auto end = std::chrono::steady_clock::now() + kProgramTimeout;
+       told.exit_status != 0 && std::chrono::steady_clock::now() < end;) {
+    told = known();
+  }
+  ASSERT_EQ(told.exit_status, 0) << told.err;
+  EXPECT_EQ(Json::Parse(told.out).value()["parameters"][0], (Json{{"name", "level"}, {"value", 100}, {"least", 0}, {"most", 250}}));
+  EXPECT_THAT(MustRun({"steer", "rho", "level=200", "unused=-0.5"}).out,
+              testing::ContainsRegex("time [0-9]+, simulated [0-9.]+\nNAME .*\nlevel +200 +0 +250\nunused +-0.5 +-1 +1\n"));
+  EXPECT_EQ(Json::Parse(known().out).value()["parameters"][1]["value"], -0.5);
+  for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"rho", "level=251"}, "\"rho\": level is 251, must be in [0, 250]"},
+           {{"rho", "lever=1"}, "\"rho\" has no parameter 'lever', must be one of: level, unused"},
+           {{"rho", "level=high"}, "steer level 'high' is not a number"},
+           {{"ball", "level=1"}, "\"ball\": no simulation holds it"},
+           {{"nonesuch"}, "no dataset \"nonesuch\""}}) {
+    std::vector<std::string> command = {"steer"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const ProgramResult refused = Slabstream(command);
+    EXPECT_EQ(refused.exit_status, 2);
+    EXPECT_THAT(refused.err_lines(), testing::ElementsAre("slabstream steer: " + why));
+  }
+}
+
 TEST_F(ServiceTest, LogsTellWhatHappenedInOrder) {
   MakeSphere("other.nrrd", 2, 16);
   Up(endpoint_);

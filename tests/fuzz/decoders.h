@@ -59,6 +59,9 @@ std::vector<FuzzBytes> PrecomputedSeeds();
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 
+bool DecodeOwners(std::span<const std::byte> input);
+std::vector<FuzzBytes> OwnersSeeds();
+
 bool DecodeSweep(std::span<const std::byte> input);
 std::vector<FuzzBytes> SweepSeeds();
 

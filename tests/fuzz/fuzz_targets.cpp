@@ -28,6 +28,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"n5-containers", "attributes and blocks of N5", DecodeN5Container, N5ContainerSeeds},
       {"precomputed", "info files and chunks of precomputed volumes", DecodePrecomputed, PrecomputedSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
+      {"owners", "where owners are, and their memory", DecodeOwners, OwnersSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},
       {"pictures", "headers of PNG and EXR, and how their pictures were made", DecodePicture, PictureSeeds},
       {"page-messages", "what pages and scripts send to the gateway", DecodePageMessage, PageMessageSeeds},

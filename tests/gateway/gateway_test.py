@@ -699,6 +699,32 @@ class HttpTest(WithService):
             subprocess.run(["promtool", "check", "metrics"], input=text, text=True, check=True)
 
 
+class SteeringTest(WithService):
+    def test_parameters_of_a_simulation_are_told_and_changed(self):
+        self.programs.start("../tests/steered_simulation", self.endpoint, "rho")
+        wait_until(lambda: self.get("/api/v1/parameters", dataset="rho")[0] == 200, "the simulation")
+        first = self.gateway.json("/api/v1/parameters?dataset=rho")[1]
+        self.assertEqual(first["parameters"], [{"name": "level", "value": 100, "least": 0, "most": 250}, {"name": "unused", "value": 0, "least": -1, "most": 1}])
+        self.assertAlmostEqual(first["simulated"], first["time"] / 100)
+        post = lambda **fields: self.gateway.json("/api/v1/parameters", method="POST", body=json.dumps({"dataset": "rho", **fields}))
+        status, steered = post(set="level=200,unused=-0.5")
+        self.assertEqual((status, [parameter["value"] for parameter in steered["parameters"]]), (200, [200, -0.5]))
+        listed = lambda: [each["simulation"] for each in self.gateway.json("/api/v1/datasets")[1]["datasets"] if each["name"] == "rho"]
+        wait_until(lambda: any(each["parameters"] == steered["parameters"] and each["time"] > first["time"] for each in listed()), "the list tells")
+        for fields, status, why in [
+            ({"set": "level=251"}, 400, '"rho": level is 251, must be in [0, 250]'),
+            ({"set": "unused=1,lever=1"}, 400, "\"rho\" has no parameter 'lever', must be one of: level, unused"),
+            ({"set": "level"}, 400, "set 'level' is not NAME=VALUE,..."),
+            ({"set": "level=x"}, 400, "set level 'x' is not a number"),
+            ({"level": 3}, 400, "there is no option 'level'"),
+            ({"dataset": "a", "set": "level=1"}, 400, '"a": no simulation holds it'),
+            ({"dataset": "none"}, 404, 'no dataset "none"'),
+        ]:
+            self.assertEqual(post(**fields), (status, {"error": why}))
+        self.assertEqual(self.gateway.json("/api/v1/parameters?dataset=rho&set=level=1"), (405, {"error": "parameters are set by POST"}))
+        self.assertEqual(self.gateway.json("/api/v1/parameters?dataset=rho")[1]["parameters"], steered["parameters"])
+
+
 class ViewTest(WithService):
     def test_a_still_picture_is_that_of_the_command_line(self):
         page = self.page()

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # gray_scott.sh PREFIX EXAMPLE FOLDER: builds EXAMPLE (examples/insitu) in FOLDER against what is installed in PREFIX, runs it on 8 ranks of
-# MPI, and leaves two pictures of it, of a later time each: first.png and second.png. Fails if the dataset does not go with its ranks.
+# MPI, and leaves two pictures of it, of a later time each: first.png and second.png. Fails if it is not steered, or if the dataset does not go
+# with its ranks.
 set -euo pipefail
 prefix="$1" example="$2" folder="$3"
 cd "$folder"
@@ -32,6 +33,8 @@ is_gone() { "$slabstream" status | grep -q 'datasets *0'; }
 
 until_true render first.png
 until_true changed
+"$slabstream" steer gray-scott feed=0.03 > /dev/null
+"$slabstream" steer gray-scott | grep -q 'feed.*0\.03'
 kill "$simulation"
 wait "$simulation" || true
 end=$((SECONDS + 60))

@@ -176,12 +176,14 @@ CHANNEL_CASES: list[tuple[dict, list[str]]] = [
     ({"channels": [0, "Actin"], "color_bar": "K", "legend": True, "size": 160},
      ["--channel", "0,Actin", "--color-bar=K", "--legend", "--size", "160"]),
     ({"blend": "add"}, ["--blend", "add"]),
+    ({"missing": "last"}, ["--missing", "last"]),
 ]
 CHANNEL_SLICE_CASES: list[tuple[dict, list[str]]] = [
     ({"plane": "z", "channels": {"Actin": {"color": "lime"}}, "time": 1},
      ["--plane", "z", "--channel", "Actin", "--channel-color", "Actin=lime", "--time", "1"]),
     ({"plane": "zyx", "color_bar": True, "size": 96, "channels": [0]}, ["--plane", "zyx", "--color-bar", "--size", "96", "--channel", "0"]),
-    ({"plane": "z", "channels": [1], "blend": "max"}, ["--plane", "z", "--channel", "1", "--blend", "max"]),
+    ({"plane": "z", "channels": [1], "blend": "max", "missing": "skip"},
+     ["--plane", "z", "--channel", "1", "--blend", "max", "--missing", "skip"]),
 ]
 # Of an unstructured grid.
 GRID_CASES: list[tuple[dict, list[str]]] = [

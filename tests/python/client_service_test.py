@@ -12,12 +12,13 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import unittest.mock
 
 import numpy as np
 
-from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
+from client_support import PROGRAM, PROGRAMS, START_SECONDS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
 from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
@@ -339,6 +340,35 @@ class AtAService(WithAService):
             self.assertEqual(volume.render(size=20).size, (20, 20))
             self.assertEqual(len(self.service.datasets()), 2)
         self.assertEqual(len(self.service.datasets()), 1)
+
+
+class Steering(WithAService):
+    def test_parameters_of_a_simulation_are_told_and_changed(self) -> None:
+        simulation = subprocess.Popen([PROGRAMS.parent / "tests" / "steered_simulation", self.running.endpoint, "rho"])
+        self.addCleanup(simulation.wait)
+        self.addCleanup(simulation.kill)
+        with ss.connect(endpoint=self.running.endpoint) as service:
+            until = time.monotonic() + START_SECONDS
+            while all(dataset.name != "rho" for dataset in service.status().datasets) and time.monotonic() < until:
+                time.sleep(0.02)
+            self.assertEqual(service.parameters("rho"), {"level": ss.Parameter("level", 100, 0, 250), "unused": ss.Parameter("unused", 0, -1, 1)})
+            steered = service.steer("rho", level=200, unused=-0.5)
+            self.assertEqual([parameter.value for parameter in steered.parameters], [200, -0.5])
+            self.assertAlmostEqual(steered.simulated, steered.time / 100)
+            told = next(dataset.simulation for dataset in service.datasets() if dataset.name == "rho")
+            self.assertEqual(told.parameters, steered.parameters)
+            self.assertGreaterEqual(told.time, steered.time)
+            while np.asarray(service.render("rho", size=16, renderer="mip", transfer="gray-ramp", scalar_range=(0, 250))).max() < 150 and time.monotonic() < until:
+                pass  # of times before that
+            for changes, why in (({"level": 251}, r'"rho": level is 251, must be in \[0, 250\]'), ({"unused": 1, "lever": 1}, "no parameter 'lever', must be one of: level, unused"),
+                                 ({"level": "high"}, "level 'high' is not a number")):
+                with self.assertRaisesRegex(ss.InvalidArgument, why):
+                    service.steer("rho", **changes)
+            self.assertEqual(service.parameters("rho")["level"].value, 200)
+            with self.assertRaisesRegex(ss.InvalidArgument, '"head": no simulation holds it'):
+                service.parameters("head")
+            with self.assertRaisesRegex(ss.NotFound, 'no dataset "none"'):
+                service.parameters("none")
 
 
 class Addresses(InAFolder):

@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "client/client.h"
@@ -61,17 +64,28 @@ struct Array {
   std::size_t first = 0;
 };
 
-TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
+// A coordinator and a worker.
+struct Service {
+  Service() {
+    CoordinatorOptions options;
+    options.client_endpoint = options.worker_endpoint = options.voxels_endpoint = "tcp://127.0.0.1:*";
+    coordinator = CoordinatorService::Start(context, std::move(options)).value();
+    WorkerOptions worker_options;
+    worker_options.coordinator_endpoint = coordinator->worker_endpoint();
+    worker_options.machine.threads = 1;
+    worker = WorkerService::Start(context, worker_options).value();
+    worker->WaitUntilRegistered();
+  }
+  Client Connect() { return Client::Connect(context, coordinator->client_endpoint(), std::chrono::seconds(60)).value(); }
+
   Context context;
-  CoordinatorOptions options;
-  options.client_endpoint = options.worker_endpoint = options.voxels_endpoint = "tcp://127.0.0.1:*";
-  const auto coordinator = CoordinatorService::Start(context, std::move(options)).value();
-  WorkerOptions worker_options;
-  worker_options.coordinator_endpoint = coordinator->worker_endpoint();
-  worker_options.machine.threads = 1;
-  const auto worker = WorkerService::Start(context, worker_options).value();
-  worker->WaitUntilRegistered();
-  Client client = Client::Connect(context, coordinator->client_endpoint(), std::chrono::seconds(60)).value();
+  std::unique_ptr<CoordinatorService> coordinator;
+  std::unique_ptr<WorkerService> worker;
+};
+
+TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
+  Service running;
+  Client client = running.Connect();
   FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 0);
   request.termination = 0;
 
@@ -89,7 +103,7 @@ TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
       {"nowhere dense, backwards", with_ghosts, {2, 26, 700}, {-1, 13, -400}},
       {"a component of three", right, {1, 11, 264}, {3, 33, 800}},
   }};
-  const std::string service = coordinator->worker_endpoint();
+  const std::string service = running.coordinator->worker_endpoint();
   std::uint64_t time = 0;
   for (const Case& each : cases) {
     SCOPED_TRACE(each.name);
@@ -141,6 +155,36 @@ TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
     }
     slabstream_insitu_close(owner);
   }
+}
+
+// A simulation computes the next time from the last one, which lies there.
+TEST(Insitu, TheMemoryOfTheLastTimeIsNotGivenAway) {
+  Service running;
+  const std::string service = running.coordinator->worker_endpoint();
+  slabstream_insitu_field field = Field(service);
+  field.slots = 2;
+  slabstream_insitu* owner = nullptr;
+  ASSERT_EQ(slabstream_insitu_open(&owner, &field), 0) << slabstream_insitu_error();
+  const std::int32_t begin[3] = {0, 0, 0};
+  ASSERT_EQ(slabstream_insitu_add_box(owner, begin, field.size, nullptr, nullptr, nullptr), 0) << slabstream_insitu_error();
+  ASSERT_EQ(slabstream_insitu_start(owner), 0) << slabstream_insitu_error();
+  std::atomic<int> pictures = 0;
+  const std::jthread viewer([&](const std::stop_token& stop) {
+    Client client = running.Connect();
+    while (!stop.stop_requested()) pictures += client.Render(TestRequest(FindRenderer("raycast"), 30, 0), std::chrono::seconds(60)).ok();
+  });
+  const void* last = nullptr;
+  const Time end = MonotonicNow() + std::chrono::seconds(60);
+  for (std::uint64_t time = 1; pictures < 20 && MonotonicNow() < end; ++time) {
+    void* pointer = nullptr;
+    ASSERT_EQ(slabstream_insitu_begin(owner, kPatience, &pointer, nullptr), 0) << slabstream_insitu_error();
+    ASSERT_NE(pointer, last) << "time " << time;
+    std::memset(pointer, int(time % 250), CountIn(kSize));
+    ASSERT_EQ(slabstream_insitu_commit(owner, time, 0), 0) << slabstream_insitu_error();
+    last = pointer;
+  }
+  EXPECT_GE(pictures, 20);
+  slabstream_insitu_close(owner);
 }
 
 TEST(Insitu, WhateverIsWrongIsACodeAndALine) {

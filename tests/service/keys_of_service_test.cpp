@@ -249,6 +249,7 @@ TEST_F(KeysOfServiceTest, EveryClientListsDatasetsAndOnlyAdminsChangeThem) {
     EXPECT_THAT(refused.message(), HasSubstr("needs the service file of role admin, not client"));
     EXPECT_EQ(client.OrderData({})->size(), 1U) << "nothing has changed";
   }
+  EXPECT_THAT(client.Steer({.dataset = "ball"}).status().message(), HasSubstr("no simulation holds it")) << "any client may steer one";
   EXPECT_EQ(admin.OrderData(orders[0])->size(), 2U);
   EXPECT_EQ(admin.OrderData(orders[2])->size(), 2U);
   EXPECT_EQ(admin.OrderData(orders[3])->size(), 1U);

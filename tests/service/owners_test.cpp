@@ -1,5 +1,5 @@
 // Whoever holds which voxels, the picture is that of one renderer that holds the whole volume: for arrangements in any order, any number of
-// owners and workers, both projections, an eye among the boxes, and voxels that the coordinator holds or that are read in parts.
+// owners and workers, both projections, an eye as near as can be, and voxels that the coordinator holds or that are read in parts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,6 +22,7 @@ namespace slabstream {
 namespace {
 
 constexpr Index3 kSize = {44, 36, 52};
+constexpr double kNear = 35;  // the whole volume must be in front of the eye
 
 std::shared_ptr<const Volume> TwoBalls() {
   const auto value = [](const Index3& v) {
@@ -80,28 +81,16 @@ TEST_P(OwnersTest, NeverChangeThePicture) {
     for (const bool in_parts : {false, true}) {
       const std::uint32_t owners = std::array{1U, 3U, 8U, 16U, 5U}[number++ % 5];
       ASSERT_NO_FATAL_FAILURE(Start(arrangement, owners, in_parts));
-      for (const RendererKind* renderer : Renderers()) {
-        if (renderer->Can(Ability::kCells)) continue;
-        for (const Projection projection : renderer->projections()) {
-          for (const bool inside : {false, true}) {
-            if (inside && projection == Projection::kOrthographic) continue;
-            FrameRequest request = TestRequest(renderer, 37, 0);
-            request.policy.assignment = "owner";
-            request.view.projection = projection;
-            request.termination = 0;
-            if (inside) request.view.zoom = 6;
-            SCOPED_TRACE(testing::Message() << arrangement.name << ", " << owners << " owners, " << GetParam() << " workers, "
-                                            << renderer->name() << ", projection " << int(projection) << (in_parts ? ", in parts" : "")
-                                            << (inside ? ", inside" : ""));
-            const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
-            ASSERT_TRUE(picture.ok()) << picture.status().message();
-            // Bit for bit, or what rounding of sums in another order leaves.
-            const float allowed = AllowedDifference(request) > 0 ? 1e-6F : 0;
-            request.policy = {};  // nobody owns what is rendered directly
-            EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), allowed);
-            EXPECT_EQ(picture->statistics.assignment, "owner");
-          }
-        }
+      for (FrameRequest request : RequestsOfRenderers(kNear)) {
+        request.policy.assignment = "owner";
+        SCOPED_TRACE(testing::Message() << arrangement.name << ", " << owners << " owners, " << GetParam() << " workers, "
+                                        << request.renderer << ", projection " << int(request.view.projection) << ", distance "
+                                        << request.view.distance << (in_parts ? ", in parts" : ""));
+        const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
+        ASSERT_TRUE(picture.ok()) << picture.status().message();
+        request.policy = {};  // nobody owns what is rendered directly
+        EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedRounding(request));
+        EXPECT_EQ(picture->statistics.assignment, "owner");
       }
     }
   }

@@ -40,6 +40,25 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
   return request;
 }
 
+// Of each renderer that draws voxels: each projection, and a perspective one whose eye is only so far from the volume's centre.
+inline std::vector<FrameRequest> RequestsOfRenderers(double near) {
+  std::vector<FrameRequest> requests;
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->Can(Ability::kCells)) continue;
+    FrameRequest request = TestRequest(renderer, 37, 0);
+    request.termination = 0;
+    for (const Projection projection : renderer->projections()) {
+      request.view.projection = projection;
+      requests.push_back(request);
+    }
+    if (!renderer->Can(Ability::kPerspective)) continue;
+    request.view.distance = near;
+    request.view.fov_degrees = 60;
+    requests.push_back(request);
+  }
+  return requests;
+}
+
 // The whole volume as one box, without planner's groups, combining or transport.
 inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume, const VolumeSummary& summary) {
   const Result<FramePlan> plan = PlanFrame(request, 1, summary, Roster{{1}});
@@ -101,6 +120,13 @@ float LargestDifference(const A& a, const B& b, ImageSize size) {
 inline float AllowedDifference(const FrameRequest& request) {
   const PixelFormat format = RenderersFor(request).value().front()->format();
   return format == PixelFormat::kRgba ? 2e-5F + float(request.termination) : 0.0F;
+}
+
+// Of pictures of the same samples: 0, or what rounding leaves if sums have another order. Rays add most numbers: a channel is off by up to
+// 7 in the last place of 24 bits, whether boxes are a kd-tree's or lie as owners have them.
+inline float AllowedRounding(const FrameRequest& request) {
+  if (AllowedDifference(request) == 0) return 0;
+  return request.renderer == "raycast" ? 5e-7F : 3e-7F;
 }
 
 // The least alpha that the most opaque pixel of a test picture has: opacity accumulates, but a projection shows that of one value.

@@ -1340,6 +1340,34 @@ class PageTest(unittest.TestCase):
         self.assertEqual(narrow.js(small), [])
         narrow.save(SHOTS, "channels-narrow")
 
+    def test_a_simulation_is_followed_and_steered(self):
+        simulation = self.programs.start("../tests/steered_simulation", self.endpoint, "rho")
+        self.addCleanup(self.programs.end, simulation)
+        told = lambda: self.gateway.json("/api/v1/parameters?dataset=rho")
+        wait_until(lambda: told()[0] == 200, "the simulation")
+        viewer = self.viewer(dataset="rho", layout="quad", window=250, level=125)
+        viewer.settled()
+        level = "document.querySelector('#parameter-level')"
+        viewer.until(f"{level}?.value === '100' && {level}.checkVisibility()")
+        # New times show without a click, in slices, too.
+        viewer.js("(window.drawn.length = 0, true)")
+        for pane in ("3d", "z"):
+            viewer.until("window.drawn.filter(d => d.pane === arguments[0]).length > 3", pane)
+        middle = lambda: (lambda width, height, rgba: rgba[4 * (height // 2 * width + width // 2)])(*viewer.pixels("z"))
+        wait_until(lambda: 80 < middle() < 120, "the grey of 100")
+        viewer.find("#parameter-level").send_keys(Keys.END)
+        wait_until(lambda: told()[1]["parameters"][0]["value"] == 250, "the slider steers")
+        wait_until(lambda: middle() > 240, "and pictures show it")
+        number = viewer.find("[aria-label^='unused, ']")
+        number.send_keys(Keys.CONTROL, "a")
+        number.send_keys("-0.5", Keys.ENTER)
+        wait_until(lambda: told()[1]["parameters"][1]["value"] == -0.5, "the number steers")
+        # What others change shows.
+        self.gateway.request("/api/v1/parameters", method="POST", body=json.dumps({"dataset": "rho", "set": "level=50"}))
+        viewer.until(f"{level}.value === '50'")
+        self.assertEqual(viewer.driver.execute_script((HERE / "accessibility.js").read_text()), [])
+        viewer.save(SHOTS, "simulation")
+
     # ---- slices and what lies below the pointer
 
     def test_slices_share_a_cross_hair(self):

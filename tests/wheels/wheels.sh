@@ -76,6 +76,11 @@ if complaint="$(in_root whole slabstream render ball.nrrd --local --size 0 -o no
   fail "slabstream render --size 0: $complaint"
 fi
 
+say "The library of owners"
+in_root whole python -c 'import slabstream as ss
+with ss.Owner("field", (8, 8, 8), "uint8", service="ipc:///tmp/nobody") as owner:
+    owner.publish(1, __import__("numpy").zeros((8, 8, 8), "uint8"))'
+
 say "Libraries"
 package="$(in_root whole python -c 'import slabstream_programs; print(slabstream_programs.__path__[0])')"
 # shellcheck disable=SC2016  # the inner shell expands them

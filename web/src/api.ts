@@ -17,11 +17,14 @@ export interface Times { count: number; step?: number | null; unit?: string } //
 export type Source = Record<string, string>; // of what is asked about: the dataset, and which of its fields and times
 
 export interface Level { size: [number, number, number]; spacing: [number, number, number]; voxel_bytes: number }
+export interface Parameter { name: string; value: number; least: number; most: number }
+export interface Simulation { time: number; simulated: number; parameters: Parameter[] } // time: a number
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
   layers?: { labels: number | boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
   fields?: Field[]; times?: Times; field?: number; time?: number; // absent: one field, one time
+  simulation?: Simulation; // whose processes hold the voxels
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes

@@ -31,6 +31,7 @@ import { Player } from "./player";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Sending } from "./sending";
+import { simulationSection } from "./simulation_section";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
 import { INITIAL, LOOK, type State, Store } from "./state";
@@ -65,6 +66,8 @@ class Page {
   private asking = ""; // the dataset that is being asked about
   private refused = false; // a view of the dataset
   private listed: readonly Dataset[] = []; // as the gateway told last
+  private readonly simulation: ReturnType<typeof simulationSection>;
+  private simulated: number | undefined; // the time that the simulation was at, as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
   private readonly file = h("input", { type: "file" });
@@ -88,9 +91,10 @@ class Page {
     store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
     bar.set(store.state.colorBar);
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
-    this.shell.panel.append(channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
+    this.simulation = simulationSection(context);
+    this.shell.panel.append(this.simulation.element, channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
-      drawn: ({ frame: { header, view } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
+      drawn: ({ frame: { header, view } }) => { notices.onFrame(header.statistics.missing); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); },
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
@@ -141,8 +145,19 @@ class Page {
       this.store.update({});
       this.player.refresh();
     }
+    this.follow(this.listed.find(each => each.name === dataset));
     this.shell.showDatasets(status.datasets, this.store.state.dataset);
     this.know();
+  }
+
+  // Pictures show the latest time of a simulation.
+  private follow(dataset: Dataset | undefined): void {
+    this.simulation.set(dataset);
+    const time = dataset?.simulation?.time;
+    if (time === this.simulated || document.hidden) return;
+    this.simulated = time;
+    this.viewer.pane.again();
+    this.slices.again();
   }
 
   // The view, the look and what undo knows stay. What of it does not apply shows once the dataset is known.

@@ -48,10 +48,10 @@ export class Notices {
     this.draw();
   }
 
-  // A picture came: nothing is wrong with the view, and nothing is being waited for.
-  onFrame(): void {
-    if (this.error === "" && this.phase === "") return;
-    this.error = "";
+  // A picture came: nothing is wrong with the view, unless it lacks something, and nothing is being waited for.
+  onFrame(lacks = ""): void {
+    if (this.error === lacks && this.phase === "") return;
+    this.error = lacks;
     this.setPhase("");
     this.draw();
   }

@@ -46,6 +46,8 @@ export class Pane {
     if (this.isVisible) this.session.show({ ...view, options: { ...view.options, size: this.size.join("x") } }, inputAt);
   }
 
+  again(): void { if (this.isVisible) this.session.again(); }
+
   end(): void {
     this.watcher.disconnect();
     removeEventListener("resize", this.measure);

@@ -9,7 +9,7 @@ export interface Geometry {
 export interface Span { worker: number; group: number; stage: string; begin_ms: number; end_ms: number }
 export interface Statistics {
   latency_ms: number; queued_ms: number; encode_ms: number; round_trip_ms: number; attempts: number; workers: number; groups: number;
-  imbalance: number; idle_share: number; bytes: { voxels: number; stored: number; images: number; picture: number }; levels: { level: number; boxes: number; voxels: number }[];
+  imbalance: number; idle_share: number; missing?: string; bytes: { voxels: number; stored: number; sent: number; images: number; picture: number }; levels: { level: number; boxes: number; voxels: number }[];
   stages_ms: Record<string, number>; plan: Record<string, string>; timeline?: Span[];
 }
 export interface FrameHeader {
@@ -77,6 +77,12 @@ export class Session {
     this.sent.set(seq, { ...view, seq, inputAt });
     if (this.sent.size > KEPT_VIEWS) this.sent.delete(this.sent.keys().next().value as number);
     this.socket.send(JSON.stringify({ type: "view", seq, ...view }));
+  }
+
+  // The same view, of a dataset that has another time now.
+  again(): void {
+    this.lastSent = "";
+    if (this.wanted) this.show(this.wanted);
   }
 
   end(): void {

@@ -36,6 +36,8 @@ export class Slices {
     for (const slice of this.slices) this.show(slice, inputAt);
   }
 
+  again(): void { for (const { pane } of this.slices) pane.again(); }
+
   at(): Vec3 { return this.context.store.state.crosshair ?? this.context.volume()?.centre ?? [0, 0, 0]; }
 
   // What the panes show, for files.

@@ -31,14 +31,6 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-void Shade(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
-  ShadeOctetsReference(tables, slope_step, octets);
-}
-
-#else
-
 using VoxelTag = hn::FixedTag<float, 4>;  // the channels of a voxel
 
 #if HWY_TARGET <= HWY_AVX3
@@ -183,8 +175,6 @@ void Shade(const ShadeTables& tables, float slope_step, std::span<const OctetWor
   }
 }
 
-#endif
-
 void Clear(std::span<const OctetWork> octets) {
   const hn::CappedTag<float, 16> d;
   for (const OctetWork& octet : octets) {
@@ -205,32 +195,6 @@ void ShadeOctets(const ShadeTables& tables, float slope_step, std::span<const Oc
 }
 
 void ClearOctets(std::span<const OctetWork> octets) { HWY_DYNAMIC_DISPATCH(Clear)(octets); }
-
-void ShadeOctetsReference(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
-  for (const OctetWork& octet : octets) {
-    const VoxelRecord* record = octet.records;
-    for (int i = 0; i < kOctet; ++i) {
-      float* out = octet.rgba + 4 * i;
-      if ((octet.occupied >> i & 1) == 0) {
-        std::fill_n(out, 4, 0.0F);
-        continue;
-      }
-      PhongFactors factors = tables.by_normal[record->normal];
-      if (octet.shares != nullptr) factors = Shared(factors, *octet.shares, std::size_t(i));
-      const float* color = &tables.color[4 * std::size_t{record->bin}];
-      float opacity = color[3];
-      if (tables.levels > 1) {
-        const float level = LevelOf(tables, octet, slope_step, i);
-        const int below = int(level);
-        const float* table = &tables.opacity[std::size_t(tables.levels) * record->bin + std::size_t(below)];
-        opacity = table[0] + (level - float(below)) * (table[1] - table[0]);
-      }
-      for (std::size_t c = 0; c < 3; ++c) out[c] = std::min(color[c] * factors.diffuse + factors.specular, 1.0F) * opacity;
-      out[3] = opacity;
-      ++record;
-    }
-  }
-}
 
 }  // namespace slabstream
 #endif

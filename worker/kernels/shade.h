@@ -44,6 +44,5 @@ struct OctetWork {
 void ShadeOctets(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets);
 // Zeroes what ShadeOctets wrote.
 void ClearOctets(std::span<const OctetWork> octets);
-void ShadeOctetsReference(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets);
 
 }  // namespace slabstream

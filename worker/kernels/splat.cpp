@@ -11,15 +11,6 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-void Filter(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work) {
-  FilterBeamReference(footprint, lattice, work);
-}
-void Composite(const RowWork& work) { CompositeRowReference(work); }
-
-#else
-
 constexpr std::ptrdiff_t kSegmentFloats = 4 * std::ptrdiff_t{kSegment};
 
 // As many voxels to a vector as fit, up to four.
@@ -151,8 +142,6 @@ void Composite(const RowWork& work) {
     default: CompositeSegments<0>(work); break;
   }
 }
-
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

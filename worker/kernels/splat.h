@@ -23,7 +23,6 @@ struct BeamWork {
   std::int32_t first_sample = 0;  // the sample of the row's first pixel
 };
 void FilterBeam(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
-void FilterBeamReference(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
 
 // accumulated = accumulated over S, with S = sum over n < taps of weights[n] * beams[n]: premultiplied, front to back (Porter and Duff
 // 1984), in the open segments that any of the beams fills. A segment closes when its least alpha reaches its
@@ -39,6 +38,5 @@ struct RowWork {
   const float* opaque_alpha = nullptr;  // [words * kWordSegments]; above 1: never
 };
 void CompositeRow(const RowWork& work);
-void CompositeRowReference(const RowWork& work);
 
 }  // namespace slabstream

@@ -224,6 +224,7 @@ void BoxFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actio
   }
   request.storing = true;
   padded->report.stored_bytes += chunk.stored_bytes;
+  padded->report.sent_bytes += payload.size();
   actions.push_back(StoreChunk{padded->key, chunk, std::move(payload)});
 }
 

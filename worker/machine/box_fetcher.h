@@ -43,6 +43,7 @@ class BoxFetcher {
   struct FetchReport {
     std::uint64_t voxel_bytes = 0;
     std::uint64_t stored_bytes = 0;  // Chunk::stored_bytes
+    std::uint64_t sent_bytes = 0;    // payloads
     Time begin, end;                 // first request, last chunk stored; meaningful if voxel_bytes > 0
   };
 

@@ -182,6 +182,7 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
       const BoxFetcher::FetchReport fetched = boxes_.TakeReport(box);
       report.voxel_bytes += fetched.voxel_bytes;
       report.stored_bytes += fetched.stored_bytes;
+      report.sent_bytes += fetched.sent_bytes;
       if (fetched.voxel_bytes > 0) {
         AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
       }

@@ -33,7 +33,7 @@ using Mask = hn::Mask<FloatTag>;
 
 // Pixels of a packet, [y][x].
 constexpr std::size_t kLanes = hn::MaxLanes(FloatTag());
-constexpr std::int32_t kPacketWidth = kLanes < 4 ? std::int32_t(kLanes) : 4, kPacketHeight = std::int32_t(kLanes) / kPacketWidth;
+constexpr std::int32_t kPacketWidth = 4, kPacketHeight = std::int32_t(kLanes) / kPacketWidth;
 
 HWY_INLINE Floats Set(float value) { return hn::Set(FloatTag(), value); }
 HWY_INLINE Ints SetInt(std::int32_t value) { return hn::Set(IntTag(), value); }

@@ -149,6 +149,10 @@ class SLABSTREAM_API Service {
   // ResourceExhausted, DataLoss, DeadlineExceeded, Cancelled.
   Image Render(const std::string& dataset, const Options& options = {}, const RenderCall& call = {});
 
+  // Changes parameters of the simulation that holds a dataset, all or none; its next steps have them. NotFound: the dataset.
+  // InvalidArgument: no simulation holds it, or a name or value is wrong. Unavailable.
+  void Steer(const std::string& dataset, const std::vector<std::pair<std::string, double>>& values);
+
   std::vector<std::string> Datasets();  // names, those of the catalogue in its order
   std::string StatusJson();             // the object that `slabstream status --json` prints; UTF-8
 

@@ -88,6 +88,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"channel-gamma", {"0=0.7", {}}},
     {"channel-opacity", {"0=0.5", {}}},
     {"blend", {"over", {}}},
+    {"missing", {"skip", {}}},
     {"time", {"last", {}}},
     {"decomposition", {"octree", {}}},
     {"axis", {"view", {}}},

@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -141,6 +143,30 @@ TEST_F(ServiceStateTest, RunningMeansAliveAndOfThatName) {
   EXPECT_FALSE(IsRunning(::getpid(), kWorkerProgram));
   EXPECT_FALSE(IsRunning(0, name));
   EXPECT_FALSE(IsRunning(-1, name));
+}
+
+TEST_F(ServiceStateTest, AnOwnerFindsTheServiceThatItNames) {
+  const auto found = [](const std::string& text) {
+    const ServiceChoice choice = ResolveOwnerService(text).value();
+    return choice.endpoint + "|" + choice.file;
+  };
+  ::unsetenv("SLABSTREAM_OWNER_SERVICE");
+  EXPECT_EQ(found(""), "tcp://127.0.0.1:7421|");
+  std::array<char, 16> own_name = {};
+  ASSERT_EQ(::prctl(PR_GET_NAME, own_name.data()), 0);
+  ASSERT_EQ(::prctl(PR_SET_NAME, kCoordinatorProgram), 0);  // this process is a coordinator that runs
+  ServiceState state{.endpoint = "tcp://127.0.0.1:40000", .coordinator = ::getpid(), .worker_endpoint = "tcp://127.0.0.1:40007"};
+  ASSERT_TRUE(SaveState(state).ok());
+  EXPECT_EQ(found(""), "tcp://127.0.0.1:40007|");
+  state.keys_folder = "/keys";
+  ASSERT_TRUE(SaveState(state).ok());
+  EXPECT_EQ(found(""), "|/keys/owner.json");
+  ::setenv("SLABSTREAM_OWNER_SERVICE", "/other/owner.json", 1);
+  EXPECT_EQ(found(""), "|/other/owner.json");
+  EXPECT_EQ(found("ipc:///there"), "ipc:///there|");
+  EXPECT_THAT(ResolveOwnerService("tcp://here").status().message(), testing::HasSubstr("tcp://here"));
+  ::unsetenv("SLABSTREAM_OWNER_SERVICE");
+  ASSERT_EQ(::prctl(PR_SET_NAME, own_name.data()), 0);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/kernels/combine.h"
+#include "tests/common/kernels/over_reference.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

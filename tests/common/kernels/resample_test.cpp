@@ -8,6 +8,7 @@
 
 #include "common/image/add_image.h"
 #include "common/image/image_view.h"
+#include "tests/common/kernels/resample_reference.h"
 #include "tests/support/random_image.h"
 #include "tests/support/simd_targets.h"
 

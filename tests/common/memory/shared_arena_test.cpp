@@ -11,6 +11,7 @@
 #include <string>
 
 #include "common/memory/pooled_vector.h"
+#include "common/memory/sealed_memory.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -93,6 +94,10 @@ TEST(MappedArena, OpensNothingElse) {
   ASSERT_EQ(::ftruncate(unsealed, off_t(kArenaBytes)), 0);
   EXPECT_EQ(code({name.id, name.pid, std::uint32_t(unsealed)}), StatusCode::kInvalidArgument);
   ::close(unsealed);
+  // The arena itself, as whoever maps it has it open for a moment.
+  const int reader = ::open(PlaceOfMemory(name.pid, name.file_descriptor).c_str(), O_RDONLY | O_CLOEXEC);
+  EXPECT_EQ(code({name.id, name.pid, std::uint32_t(reader)}), StatusCode::kInvalidArgument);
+  ::close(reader);
   // Sealed and as large, but of huge pages: without any left, whoever reads it ends.
   if (const int huge = ::memfd_create("huge", MFD_CLOEXEC | MFD_ALLOW_SEALING | MFD_HUGETLB); huge >= 0) {
     if (::ftruncate(huge, off_t(kArenaBytes)) == 0 && ::fcntl(huge, F_ADD_SEALS, F_SEAL_SHRINK) == 0) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "common/base/find_named.h"
@@ -11,6 +12,7 @@
 #include "common/planning/frame_noise.h"
 #include "common/planning/measured_cost.h"
 #include "common/renderers/registry.h"
+#include "common/volume/missing.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/random.h"
 
@@ -44,6 +46,63 @@ TEST(Assignments, GiveEveryBoxASlotAndNoSlotMuchMoreThanOthers) {
         EXPECT_LE(*most - *least, 1U) << entry.name << " " << boxes << " boxes, " << slots << " slots";
       }
     }
+  }
+}
+
+TEST(Assignments, OwnersGoToSlotsOfTheirHost) {
+  Random random(64);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 200; ++i) {
+    std::vector<std::uint64_t> holder_hosts(random.Integer<std::size_t>(1, 20)), slot_hosts(random.Integer<std::size_t>(1, 12));
+    for (auto* hosts : {&holder_hosts, &slot_hosts}) {
+      for (std::uint64_t& host : *hosts) host = random.Integer<std::uint64_t>(0, 3);
+    }
+    std::vector<std::uint32_t> holders(holder_hosts.size());
+    std::iota(holders.begin(), holders.end(), 0U);
+    const std::vector<double> costs(holders.size(), 1.0);
+    const std::vector<std::uint32_t> slots = FindNamed(Assignments(), "owner")
+                                                 ->assign({.costs = costs,
+                                                           .slots = std::uint32_t(slot_hosts.size()),
+                                                           .holders = holders,
+                                                           .holder_count = std::uint32_t(holders.size()),
+                                                           .holder_hosts = holder_hosts,
+                                                           .slot_hosts = slot_hosts});
+    std::map<std::uint64_t, std::map<std::uint32_t, std::size_t>> taken;  // by host and slot
+    for (std::size_t holder = 0; holder < slots.size(); ++holder) {
+      const std::uint64_t host = holder_hosts[holder];
+      const bool has_slot = host != 0 && std::ranges::count(slot_hosts, host) > 0;
+      if (has_slot) EXPECT_EQ(slot_hosts[slots[holder]], host);
+      ++taken[has_slot ? host : 0][slots[holder]];
+    }
+    for (const auto& [host, counts] : taken) {
+      const std::size_t there = host == 0 ? slot_hosts.size() : std::size_t(std::ranges::count(slot_hosts, host));
+      std::size_t all = 0, most = 0;
+      for (const auto& [slot, count] : counts) {
+        all += count;
+        most = std::max(most, count);
+      }
+      EXPECT_LE(most, (all + there - 1) / there);
+    }
+  }
+}
+
+TEST(Assignments, NobodyGetsBoxesOfOwnersThatAreGone) {
+  VolumeSummary summary = FullSummary({64, 64, 64});
+  OwnedBoxes owned;
+  for (const std::uint32_t owner : {0U, 1U, kNoOwner, 3U}) {
+    const auto z = std::int32_t(16 * owned.size());
+    owned.push_back({{{0, 0, z}, {64, 64, z + 16}}, owner});
+  }
+  summary.owned = std::make_shared<const OwnedBoxes>(owned);
+  summary.owner_hosts = {7, 8, 0, 8};
+  const ClassifiedVolume volume{1, std::get<TransferFunction>(SomeRequest().transfer.choice), &DefaultRenderer()};
+  const ResolvedPolicy policy = ResolvePolicy({.assignment = "owner"}, summary.description.geometry);
+  const std::vector<std::uint64_t> hosts = {8, 7};
+  const Layout layout = MakeLayout({.summary = &summary, .volume = &volume, .policy = &policy, .slots = 2, .hosts = hosts});
+  ASSERT_GE(layout.owners.size(), 4U);
+  for (std::size_t box = 0; box < layout.owners.size(); ++box) {
+    const std::uint32_t slots[] = {1, 0, kNoSlot, 0};
+    EXPECT_EQ(layout.owners[box], slots[layout.partition.boxes()[box].begin.z / 16]);
   }
 }
 

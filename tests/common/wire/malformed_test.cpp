@@ -273,9 +273,9 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 23)
+  EXPECT_EQ(seen.size(), limits.size() + 25)
       << "reports, levels and fields are in four messages, parameters and labels in three; datasets, keys, isosurfaces, "
-         "gradients, opacities, traffic, colors, entries, paths, channels and labels that show in two";
+         "gradients, opacities, traffic, colors, entries, paths, channels, labels that show, and values that are steered in two";
 }
 
 TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {
@@ -284,6 +284,7 @@ TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {
       {"Chunk.raw_bytes", kChunkBytes},
       {"DataOrder.items", kMaxDataItemBytes},
       {"FrameStatistics.lowered", kMaxTextBytes},
+      {"FrameStatistics.missing", kMaxTextBytes},
       {"GroupKey.group", kMaxGroups - 1},
       {"Index3.x", kMaxVolumeSide},
       {"Label.name", kMaxLabelNameBytes},

@@ -30,7 +30,7 @@ RankReport FullReport() {
   for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
   for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
   report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = report.stored_bytes =
-      kMax64;
+      report.sent_bytes = kMax64;
   report.image_bounds = {0, 1, 16384, 16384};
   return report;
 }
@@ -324,12 +324,12 @@ std::vector<OwnerTime> SamplesOf() {
 
 template <>
 std::vector<OwnerPing> SamplesOf() {
-  return {{}, {kMax64, kMax64}};
+  return {{}, {kMax64, kMax64, kMax64, kMax64}};
 }
 
 template <>
 std::vector<OwnerPong> SamplesOf() {
-  return {{}, {kMax64, kMax64, true, std::vector<std::uint64_t>(64, kMax64)}};
+  return {{}, {kMax64, kMax64, true, std::vector<std::uint64_t>(64, kMax64), kMax64}};
 }
 
 template <>
@@ -474,6 +474,7 @@ std::vector<FrameReply> SamplesOf() {
   FrameStatistics whole = statistics;
   whole.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
   whole.lowered = kUmlaut;
+  whole.missing = kUmlaut;
   whole.view = Request().view;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
@@ -588,7 +589,20 @@ std::vector<DataOrder> SamplesOf() {
 
 template <>
 std::vector<DataReply> SamplesOf() {
-  return {{}, {kMax64, {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64}, {"b", DatasetState::kLoading}}}};
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64},
+            {"b", DatasetState::kLoading, {}, {}, "", 0, 0, 0, {}, {}, SimulationStatus{7, 0.5, {{"feed", 0, 0.1, 0.03}}}}}}};
+}
+
+template <>
+std::vector<SteerDataset> SamplesOf() {
+  return {{1, "rho", {{"feed", 0.03}}}, {kMax64, kLongName, std::vector<SteeredValue>(64, {std::string(64, 'k'), -1e300})}};
+}
+
+template <>
+std::vector<SteerReply> SamplesOf() {
+  return {{}, {kMax64, {kMax64, -1e300, {{"feed", 0, 0.1, 0.03}}}}};
 }
 
 template <>

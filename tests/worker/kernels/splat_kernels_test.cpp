@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "tests/support/simd_targets.h"
+#include "tests/worker/kernels/shade_reference.h"
+#include "tests/worker/kernels/splat_reference.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/kernels/shade.h"
 #include "worker/kernels/splat.h"

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <type_traits>
 
 #include "worker/rays/sample_look-inl.h"
@@ -25,7 +24,6 @@ namespace slabstream::HWY_NAMESPACE {
 
 // --- Making bricks.
 
-#if HWY_TARGET != HWY_SCALAR
 using ShortTag = hn::CappedTag<std::int16_t, 16>;
 using Shorts = hn::Vec<ShortTag>;
 
@@ -110,33 +108,6 @@ HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t s
     }
   }
 }
-
-#else
-HWY_INLINE GradientCorner CornerAt(const std::uint8_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
-  const auto difference = [&](std::ptrdiff_t offset) { return std::int16_t(at[offset] - at[-offset]); };
-  return {at[0], difference(1), difference(row), difference(slice)};
-}
-HWY_INLINE GradientCorner CornerAt(const std::uint16_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
-  const auto difference = [&](std::ptrdiff_t offset) { return at[offset] - at[-offset]; };
-  const auto of_halves = [&](std::ptrdiff_t offset) { return at[offset] / 2 - at[-offset] / 2; };
-  const std::int32_t x = difference(1), y = difference(row), z = difference(slice);
-  const bool large = std::max({std::abs(x), std::abs(y), std::abs(z)}) > 32767;
-  return {std::int16_t(at[0] - 32768), std::int16_t(large ? of_halves(1) : x), std::int16_t(large ? of_halves(row) : y),
-          std::int16_t(large ? of_halves(slice) : z)};
-}
-
-template <class T>
-HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t slice, std::int32_t rows, std::int32_t slices,
-                            GradientCorner* corners) {
-  for (std::int32_t z = 0; z < slices; ++z) {
-    for (std::int32_t y = 0; y < rows; ++y) {
-      for (std::int32_t x = 0; x < GradientBricks::kRow; ++x) {
-        corners[z * GradientBricks::kSlice + y * GradientBricks::kRow + x] = CornerAt(first + z * slice + y * row + x, row, slice);
-      }
-    }
-  }
-}
-#endif
 
 template <class T>
 HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBricks& bricks, std::int32_t first) {
@@ -263,37 +234,6 @@ struct Entries {
   Floats part[4];
 };
 
-#if HWY_TARGET == HWY_SCALAR
-HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
-  const FloatTag df;
-  const auto at = SetInt(index[0]);
-  return {{hn::GatherIndex(df, table, at), hn::GatherIndex(df, table + 1, at), hn::GatherIndex(df, table + 2, at),
-           hn::GatherIndex(df, table + 3, at)}};
-}
-
-template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const CornerWeights& weights) {
-  const Ints at = SetInt(index[0]);
-  std::int32_t value = 0, x = 0, y = 0, z = 0;
-  const auto add = [&](const GradientCorner& corner, std::int32_t weight) {
-    value += corner.value * weight;
-    x += corner.x * weight;
-    y += corner.y * weight;
-    z += corner.z * weight;
-  };
-  for (int slice = 0; slice < 2; ++slice) {
-    for (int row = 0; row < 2; ++row) {
-      const GradientCorner* const pair = corners + hn::GetLane(at) + slice * GradientBricks::kSlice + row * GradientBricks::kRow;
-      const std::int32_t both = hn::GetLane(weights.pairs[slice][row]);
-      add(pair[0], both & 0xFFFF);
-      add(pair[1], both >> 16);
-    }
-  }
-  const auto of = [](std::int32_t sum) { return Set(float(sum) * (1.0F / (1 << 14))); };
-  if constexpr (sizeof(T) == 2) value += 32768 << 14;
-  return {of(value), {of(x), of(y), of(z)}};
-}
-#else
 // Four registers of four numbers a block as four registers of one number each, by block: 4x4 matrices turned over.
 template <class D>
 HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
@@ -374,7 +314,6 @@ HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const Lan
   if constexpr (sizeof(T) == 2) sums[0] = hn::Add(sums[0], SetInt(32768 << 14));
   return {of(sums[0]), {of(sums[1]), of(sums[2]), of(sums[3])}};
 }
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -7,6 +7,7 @@
 
 #include "common/classification/classification_table.h"
 #include "common/kernels/resample.h"
+#include "tests/common/kernels/resample_reference.h"
 #include "worker/kernels/phong_table.h"
 
 namespace slabstream::testing {

@@ -1,6 +1,6 @@
-#include <algorithm>
+#include "tests/worker/kernels/splat_reference.h"
 
-#include "worker/kernels/splat.h"
+#include <algorithm>
 
 namespace slabstream {
 

@@ -1,6 +1,6 @@
-#include <cmath>
+#include "tests/common/kernels/over_reference.h"
 
-#include "common/kernels/combine.h"
+#include <cmath>
 
 namespace slabstream {
 

@@ -1,3 +1,5 @@
+#include "tests/common/kernels/resample_reference.h"
+
 #include <cstddef>
 
 #include "common/kernels/resample_geometry.h"
