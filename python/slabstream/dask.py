@@ -267,6 +267,13 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         samples, spacing, origin = _upright(volume)
         if not all(length > 0 for along in samples.chunks for length in along):  # or NaN
             raise InvalidArgument("the array has chunks without voxels or of unknown sizes: rechunk() or compute_chunk_sizes() helps")
+
+        def check_chunks(at_one: int) -> None:
+            if samples.npartitions > _MOST_BOXES or at_one > _MOST_BOXES_OF_ONE:
+                raise InvalidArgument(f"the array has {samples.npartitions} chunks, {at_one} of them at one Dask worker: "
+                                      f"at most {_MOST_BOXES}, and {_MOST_BOXES_OF_ONE} at one, can be shown; rechunk() makes larger ones")
+
+        check_chunks(samples.npartitions // max(len(self._client.nthreads()), 1))  # at least; before anything is computed
         keys = list(flatten(samples.__dask_keys__()))
         futures = {future.key: future for future in distributed.futures_of(samples)}
         if not all(key in futures for key in keys):
@@ -281,10 +288,7 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
                 raise Unavailable(f"chunk {key} is on no Dask worker")
             worker = min(who[key], key=lambda address: len(chunks.get(address, ())))
             chunks.setdefault(worker, []).append((key, box))
-        most = max(map(len, chunks.values()))
-        if most > _MOST_BOXES_OF_ONE or samples.npartitions > _MOST_BOXES:
-            raise InvalidArgument(f"the array has {samples.npartitions} chunks, {most} of them at one Dask worker: "
-                                  f"at most {_MOST_BOXES}, and {_MOST_BOXES_OF_ONE} at one, can be shown; rechunk() makes larger ones")
+        check_chunks(max(map(len, chunks.values())))
         dtype = "uint8" if samples.dtype == bool else samples.dtype.newbyteorder("=").name
         field = _Field(self._plugin, f"dask-{os.getpid()}-{next(self._numbers)}", samples.shape, dtype, spacing, origin, chunks)
         self._held[name] = field, list(futures.values())  # not the array: it may be the caller's, which would never go

@@ -134,7 +134,7 @@ class DaskTest(unittest.TestCase):
     def test_what_cannot_be_shown_is_refused_in_one_line(self):
         array = da.from_array(blobs(), 30)
         for wrong, why in ((blobs(), "is not an array of Dask"), (array[array > 5][:, None, None], "nan"),
-                           (array.astype(complex), "complex128"), (da.ones((9000, 2, 2), chunks=1), "at most 4096")):
+                           (array.astype(complex), "complex128"), (da.ones((9000, 2, 2), chunks=1), "and 4096 at one")):
             with self.assertRaisesRegex(ss.InvalidArgument, why) as raised:
                 sd.render(wrong, **VIEW)
             self.assertNotIn("\n", str(raised.exception))
