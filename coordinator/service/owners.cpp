@@ -66,7 +66,8 @@ struct Field {
   std::vector<std::shared_ptr<const MappedOwner>> mapped = {};
   std::optional<OwnedVolume> last = {};  // what was shown when the first owner left of those that lack; none: nothing, or none lacks
   std::optional<Time> looked = {};
-  OwnerPong told = {};                            // last, without nonce
+  OwnerPong told = {};  // last, without nonce
+  Time told_at;
   double simulated = 0;                           // of `whole`
   std::vector<SteeredParameter> parameters = {};  // as they are now; they outlive owner 0
 
@@ -428,11 +429,13 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
       FindShown(field);
       if (!IsLookedAt(field) && std::ranges::all_of(field.places, Has)) field.mapped.clear();
       const OwnerPong pong = Pong(name, field);
-      if (pong != field.told) {
+      // While somebody looks, it comes every heartbeat: who cannot be sent one has ended.
+      if (pong != field.told || (pong.looked_at && now >= field.told_at + kOwnerHeartbeat)) {
         for (const Place& place : field.places) {
           if (place.owner) news.messages.emplace_back(place.owner->peer, pong);
         }
         field.told = pong;
+        field.told_at = now;
       }
       // The machine gives another time up as soon as nobody waits for it.
       if (field.is_dataset && !pong.used.empty() && pong.used.front() != (field.shown != 0 ? field.shown : field.whole))
@@ -627,6 +630,12 @@ void Owners::Describe(std::vector<DatasetStatus>& datasets) const {
   for (DatasetStatus& each : datasets) {
     if (const auto field = state_->fields.find(each.name); field != state_->fields.end()) each.simulation = field->second.simulation();
   }
+}
+
+Owners::News Owners::Gone(PeerToken peer, Time now) {
+  return state_->Do(now, [&] {
+    if (state_->Find(peer) != nullptr) state_->Lose(peer, "has ended");
+  });
 }
 
 Owners::News Owners::Tend(Time now) {

@@ -6,8 +6,8 @@
 // are ahead may have overwritten it before, so a time is shown once all have said that they hold it. Opening waits for that, for
 // kOwnerWaits at most. Owners that wait for others for kOwnerWaits may go on until there is another whole time.
 //
-// An owner is lost when it leaves, or is silent for kOwnerTimeout. Until another one takes its place, the field cannot be opened. When all
-// are lost, the dataset goes.
+// An owner is lost when it leaves, when its connection ends, or when it is silent for kOwnerTimeout. Until another one takes its place, the
+// field cannot be opened. When all are lost, the dataset goes.
 //
 // For the service's thread. Sources that are open may outlive this; what they ask then fails.
 #pragma once
@@ -46,6 +46,7 @@ class Owners {
   ~Owners();
 
   News Hear(PeerToken from, OwnerToCoordinator message, const Bytes& payload, Time now);
+  News Gone(PeerToken peer, Time now);  // it could not be sent a message: its connection has ended
   // What time has brought, and other threads: at least every second, after each event, and when `wake` was called.
   News Tend(Time now);
 

@@ -305,7 +305,10 @@ void CoordinatorService::Impl::Hear(const Incoming& incoming, ToControl& message
 }
 
 void CoordinatorService::Impl::Follow(Owners::News news) {
-  for (const auto& [owner, message] : news.messages) Send<WorkerGone>(control, worker_peers, std::span(&owner, 1), message, {});
+  for (const auto& [owner, message] : news.messages) {
+    Send<WorkerGone>(control, worker_peers, std::span(&owner, 1), message, {});
+    if (worker_peers.IdentityOf(owner) == nullptr) Follow(owners.Gone(owner, MonotonicNow()));
+  }
   for (OwnedData& data : news.datasets) HandleEvent(std::move(data));
 }
 

@@ -99,6 +99,17 @@ class OwnerRulesTest : public testing::Test {
   Status read_;
 };
 
+TEST_F(OwnerRulesTest, AnOwnerWhoseConnectionEndsIsLostAtOnce) {
+  Register();
+  opened_ = Open().value();
+  owners_->Tend(now_);
+  now_ += kOwnerHeartbeat;
+  EXPECT_EQ(Of<OwnerPong>(owners_->Tend(now_)).size(), 2U) << "somebody looks, so each is sent something every second";
+  owners_->Gone(2, now_);
+  EXPECT_EQ(source_().status().message(), "\"rho\": owner 1 of 2 has ended");
+  owners_->Gone(2, now_);
+}
+
 TEST_F(OwnerRulesTest, SilenceLosesAnOwnerAndThenTheDataset) {
   Register();
   now_ += seconds(4);
