@@ -556,11 +556,11 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
     }
   }
   volume.growth = std::make_shared<const FileStamp>(
-      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time now) {
+      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time at) {
         const std::lock_guard of_state(state->mutex);
         const auto known = state->fields.find(name);
         if (known == state->fields.end()) return true;
-        state->Look(known->second, now);
+        state->Look(known->second, at);
         return (!is_last && known->second.shown != time) || known->second.set != set;
       }});
   lock.unlock();
