@@ -71,7 +71,9 @@ TEST(Assignments, OwnersGoToSlotsOfTheirHost) {
     for (std::size_t holder = 0; holder < slots.size(); ++holder) {
       const std::uint64_t host = holder_hosts[holder];
       const bool has_slot = host != 0 && std::ranges::count(slot_hosts, host) > 0;
-      if (has_slot) EXPECT_EQ(slot_hosts[slots[holder]], host);
+      if (has_slot) {
+        EXPECT_EQ(slot_hosts[slots[holder]], host);
+      }
       ++taken[has_slot ? host : 0][slots[holder]];
     }
     for (const auto& [host, counts] : taken) {
