@@ -6,6 +6,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -349,7 +350,7 @@ TEST_F(OwnerRulesTest, LiesHurtNobodyElse) {
   grown = Registration(0, 100);
   grown.description.geometry.size.x = 513;
   EXPECT_THAT(Of<OwnerRefused>(Hear(1, grown)).at(0).second.status.message(), HasSubstr("differ from those of owner 0"));
-  opened_ = source_().value();
+  opened_ = Open().value();
   for (const PeerToken peer : {1, 2}) Hear(peer, OwnerTime{kEpoch, 3, 0});
   EXPECT_EQ(Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 1})).at(0).second.used, (std::vector<std::uint64_t>{5})) << "times rise";
 
@@ -395,6 +396,21 @@ TEST_F(OwnerRulesTest, AnyMessagesInAnyOrderEndWell) {
   std::vector<std::pair<PeerToken, ChunkRequest>> asked;
   std::atomic<int> reads = 0, ended = 0;
   int datasets = 0, welcomes = 0;
+  std::function<Result<std::shared_ptr<VolumeSource>>(Missing)> open;
+  std::uint64_t hold = 0, later = 20;
+  // Whoever opens the volume waits until all owners say that they hold a time, or one is not there.
+  const auto open_now = [&] {
+    std::future<Result<std::shared_ptr<VolumeSource>>> opened = std::async(std::launch::async, open, Missing::kFail);
+    for (int spins = 1; opened.wait_for(Duration::zero()) != std::future_status::ready; ++spins) {
+      for (const PeerToken peer : {1, 2, 3, 4}) {
+        for (const auto& [to, pong] : Of<OwnerPong>(Hear(peer, OwnerPing{kEpoch, 1, hold, 0}))) hold = pong.hold;
+        if (spins % 100 == 0) Hear(peer, OwnerTime{kEpoch, later, 0});
+      }
+      if (spins % 100 == 0) ++later;
+      std::this_thread::yield();
+    }
+    return opened.get();
+  };
   for (int i = 0; i < 20000; ++i) {
     const auto from = PeerToken(random.Integer(1, 4));
     const Epoch epoch = kEpoch + (random.Chance(0.05) ? 1 : 0);
@@ -415,8 +431,8 @@ TEST_F(OwnerRulesTest, AnyMessagesInAnyOrderEndWell) {
       const auto bytes = random.Chance(0.8) ? std::size_t(request.box.voxel_count()) : random.Integer<std::size_t>(1, 9);
       const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(bytes)), Codec::kRaw, chunk);
       news = Hear(random.Chance(0.8) ? peer : from, chunk, payload);
-    } else if (kind == 5 && source_) {
-      if (const auto opened = source_(); opened.ok()) {
+    } else if (kind == 5 && open) {
+      if (const auto opened = open_now(); opened.ok()) {
         ++reads;
         const auto samples = std::make_shared<std::vector<std::byte>>(std::size_t(kRead.voxel_count()));
         (*opened)->Read(0, kRead, BoxRoom::Dense(kRead, samples->data(), false), {}, [&ended, samples](const Status& status) {
@@ -434,7 +450,7 @@ TEST_F(OwnerRulesTest, AnyMessagesInAnyOrderEndWell) {
     welcomes += int(Of<OwnerWelcome>(news).size());
     for (const OwnedData& data : news.datasets) {
       datasets += data.left ? -1 : data.came ? 1 : 0;
-      if (data.came) source_ = data.came->open;
+      if (data.came) open = data.came->open;
     }
     ASSERT_TRUE(datasets == 0 || datasets == 1) << "step " << i;
   }
