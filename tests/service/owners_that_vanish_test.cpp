@@ -110,7 +110,7 @@ TEST_P(OwnersThatVanishTest, AndComeBack) {
 
   owners_[1]->Kill(SIGKILL);
   owners_[1]->Wait();
-  Await([](const Result<Picture>& each) { return !each.ok(); });
+  (void)Await([](const Result<Picture>& each) { return !each.ok(); });
   if (in_place) {
     picture = Await(is_known, Missing::kLast);
     if (picture.ok()) ExpectOneOf(*picture, right_);  // its memory is still mapped
