@@ -261,7 +261,10 @@ void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles*
   const auto& parameters = RequireRenderer(slice.frame.renderer).value()->parameters();
   const auto wanted = [&](const RequestOption& option) {
     if (option.name == "label-opacity") return false;
-    if (option.path == "channels" || option.path.starts_with("fields.") || option.path == "blend" || option.path == "time") return true;
+    if (option.path == "channels" || option.path.starts_with("fields.") || option.path == "blend" || option.path == "time" ||
+        option.path == "missing") {
+      return true;
+    }
     return option.name == "size" || option.name == "transfer" || option.name == "scalar-range" || option.name == "opacity-distance" ||
            std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();
   };
