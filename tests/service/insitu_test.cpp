@@ -107,7 +107,8 @@ TEST(Insitu, ArraysOfAnyStridesAreDrawn) {
   std::uint64_t time = 0;
   for (const Case& each : cases) {
     SCOPED_TRACE(each.name);
-    const slabstream_insitu_field field = Field(service);
+    slabstream_insitu_field field = Field(service);
+    field.slots = 2;
     slabstream_insitu* owner = nullptr;
     ASSERT_EQ(slabstream_insitu_open(&owner, &field), 0) << slabstream_insitu_error();
     const bool by_default = each.strides[0] == 0;

@@ -40,6 +40,7 @@ std::vector<FrameRecord> TwoFrames() {
                       {Stage::kCombine, frame.statistics.begin_ns + 8'000'000, frame.statistics.begin_ns + 9'000'000}};
       report.voxel_bytes = i == 0 ? 1000 : 0;
       report.stored_bytes = i == 0 ? 300 : 0;
+      report.sent_bytes = i == 0 ? 250 : 0;
       report.image_bytes = 50;
       frame.statistics.reports.push_back(report);
     }
@@ -59,7 +60,7 @@ TEST(StatsJsonTest, HasThePromisedFields) {
                                  {"balance", "dynamic"},
                                  {"combine", "fan-in"}}));
   EXPECT_EQ(stats["renderer"], "shear") << "which the request left to the service";
-  EXPECT_EQ(stats["bytes"], (Json{{"voxels", 2000}, {"stored", 600}, {"images", 200}}));
+  EXPECT_EQ(stats["bytes"], (Json{{"voxels", 2000}, {"stored", 600}, {"sent", 500}, {"images", 200}}));
   ASSERT_EQ(stats["frames"].size(), 2U);
   const Json& second = stats["frames"][1];
   EXPECT_EQ(second["latency_ms"], 40.0);
