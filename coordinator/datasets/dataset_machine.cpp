@@ -427,9 +427,10 @@ void DatasetMachine::State::SeekWithout(const std::string& name, std::map<UseId,
     Use& use = each.second;
     const bool wants = use.request->dataset == name && use.request->missing != Missing::kFail && !use.begun();
     if (!wants || use.entries.front().name != name) continue;
-    DataSource source = datasets.Find(name)->source;
+    const DatasetTable::Entry& entry = *datasets.Find(name);
+    DataSource source = entry.source;
     source.missing = use.request->missing;
-    source.statistics = datasets.Find(name)->whole;
+    if (entry.before != nullptr) source.statistics = entry.before->overview();
     const std::string part = PartWithout(name, source.missing);
     datasets.AddPart(part, std::move(source), now);
     use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{part, Seek(part)}}};

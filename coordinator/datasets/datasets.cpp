@@ -139,7 +139,6 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   entry->bytes = bytes;
   entry->fields = std::move(fields);
   entry->statistics.clear();
-  if (entry->source.open) entry->whole = entry->summary;
   retired_.erase(id);  // the same voxels again
   return true;
 }
@@ -176,7 +175,6 @@ void DatasetTable::Fail(const std::string& name, const Status& status, Time now)
 // The entry as if it had never been loaded.
 DatasetTable::Entry DatasetTable::Forgotten(Entry& entry, Time now) {
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
-  fresh.whole = std::move(entry.whole);
   fresh.checks.End();
   if (fresh.source.open) {
     fresh.before = std::move(entry.before);

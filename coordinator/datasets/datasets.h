@@ -71,7 +71,6 @@ class DatasetTable {
     std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
     std::shared_ptr<const DatasetFields> fields;   // of a dataset, once it was ready; null: it has one field, of which nothing is known
     std::shared_ptr<VolumeSource> opened;  // gives other times and channels (DataSource::beside); null: nothing is open, or it holds voxels
-    std::shared_ptr<const VolumeSummary> whole;                      // of an owned dataset: when it was ready last; null: it never was
     std::map<int, std::shared_ptr<const VolumeSummary>> statistics;  // of a dataset with several times: of its fields, as far as known
     std::shared_ptr<const FileStamp> stamp;                          // kReady only: of its files as they were read; null: they never change
     std::string error;                                               // kFailed only
@@ -80,7 +79,8 @@ class DatasetTable {
     CheckCounter checks;                                             // at its files, while it is ready
     // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
     CheckId awaited = 0;
-    // Of a dataset that processes hold: as it was when it was ready, which is told until it is ready at another time.
+    // Of a dataset that processes hold: as it was when it was ready last; null: it never was. It is told until there is another time, and
+    // pictures while owners are gone have its statistics.
     std::shared_ptr<const Entry> before = {};
 
     // What is known of its voxels before a level is chosen. kReady only.
