@@ -14,6 +14,7 @@
 
 #include "client/owner/volume_owner.h"
 #include "client/service/service_state.h"
+#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/threads/guarded.h"
 #include "data/sources/copy_samples.h"
@@ -38,7 +39,8 @@ struct BoxArray {
 
 struct slabstream_insitu {
   VolumeOwnerOptions options;
-  std::vector<BoxArray> arrays;  // of options.layout.boxes
+  std::vector<BoxArray> arrays;        // of options.layout.boxes
+  std::vector<std::uint64_t> to_held;  // from start on: bytes from the first sample of each array to that of what is held
   std::string service;
   Context context;
   std::unique_ptr<VolumeOwner> owner;  // null before start; ends before the context
@@ -69,6 +71,11 @@ Status After(const slabstream_insitu* handle, const char* function) {
 
 Index3 IndexOf(const std::int32_t* xyz) { return {xyz[0], xyz[1], xyz[2]}; }
 Vec3 VectorOf(const double* xyz) { return {xyz[0], xyz[1], xyz[2]}; }
+
+Status NotOnDemand(const slabstream_insitu& handle, const char* function) {
+  if (handle.options.make == nullptr) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{}: boxes are made on demand, and adopt commits a time", function));
+}
 
 Result<VolumeOwner::Slot> Begin(slabstream_insitu& handle, double timeout_seconds) {
   if (!(timeout_seconds >= 0)) return Status::InvalidArgument(fmt::format("timeout of {} s, must be at least 0", timeout_seconds));
@@ -171,11 +178,39 @@ int slabstream_insitu_parameter(slabstream_insitu* handle, const char* name, dou
   });
 }
 
+int slabstream_insitu_on_demand(slabstream_insitu* handle, const slabstream_insitu_maker* maker) {
+  return Call("on_demand", [&] {
+    if (Status status = Before(handle, "on_demand"); !status.ok()) return status;
+    if (maker == nullptr || maker->make == nullptr || maker->drop == nullptr) {
+      return Status::InvalidArgument("on_demand: maker, make or drop is NULL");
+    }
+    handle->options.made_bytes = maker->most_bytes;
+    handle->options.make = [handle, maker = *maker](std::size_t box, std::uint64_t time) -> Result<MadeBox> {
+      const void* samples = nullptr;
+      std::array<char, 1024> error = {};
+      const int code = maker.make(maker.context, std::uint32_t(box), time, &samples, error.data(), std::uint32_t(error.size()));
+      error.back() = '\0';
+      if (code < 0 || code >= kStatusCodeCount) return Status::Internal(fmt::format("make returned {}, which is no code", code));
+      if (code != 0) return Status(StatusCode(code), Printable(error.data()));
+      if (samples == nullptr) return Status::Internal(fmt::format("make gave no samples of box {}", box));
+      // What is held of it begins behind ghosts outside the field.
+      const std::uint64_t to_held = handle->to_held[box];
+      return MadeBox(static_cast<const std::byte*>(samples) + to_held,
+                     [maker, box, time, samples](const std::byte*) { maker.drop(maker.context, std::uint32_t(box), time, samples); });
+    };
+    return Status::Ok();
+  });
+}
+
 int slabstream_insitu_start(slabstream_insitu* handle) {
   return Call("start", [&] {
     if (Status status = Before(handle, "start"); !status.ok()) return status;
     Result<ServiceChoice> service = ResolveOwnerService(handle->service);
     if (!service.ok()) return service.status();
+    handle->to_held.clear();
+    for (std::size_t i = 0; i < handle->arrays.size(); ++i) {
+      handle->to_held.push_back(handle->options.layout.boxes[i].offset - handle->arrays[i].offset);
+    }
     VolumeOwnerOptions options = handle->options;
     options.endpoint = service->endpoint;
     options.service_file = service->file;
@@ -190,6 +225,7 @@ int slabstream_insitu_start(slabstream_insitu* handle) {
 int slabstream_insitu_begin(slabstream_insitu* handle, double timeout_seconds, void** pointers, double* waited_seconds) {
   return Call("begin", [&] {
     if (Status status = After(handle, "begin"); !status.ok()) return status;
+    if (Status status = NotOnDemand(*handle, "begin"); !status.ok()) return status;
     if (pointers == nullptr && !handle->arrays.empty()) return Status::InvalidArgument("begin: pointers is NULL");
     const Result<VolumeOwner::Slot> slot = Begin(*handle, timeout_seconds);
     if (!slot.ok()) return slot.status();
@@ -210,6 +246,7 @@ int slabstream_insitu_publish(slabstream_insitu* handle, uint64_t time, double s
                               const int64_t (*strides)[3], double timeout_seconds) {
   return Call("publish", [&] {
     if (Status status = After(handle, "publish"); !status.ok()) return status;
+    if (Status status = NotOnDemand(*handle, "publish"); !status.ok()) return status;
     const std::vector<BoxArray>& arrays = handle->arrays;
     for (std::size_t i = 0; i < arrays.size(); ++i) {
       if (pointers == nullptr || pointers[i] == nullptr) return Status::InvalidArgument(fmt::format("publish: pointer {} is NULL", i));
@@ -230,10 +267,9 @@ int slabstream_insitu_adopt(slabstream_insitu* handle, uint64_t time, double sim
   return Call("adopt", [&] {
     if (Status status = After(handle, "adopt"); !status.ok()) return status;
     std::vector<const std::byte*> arrays;
-    for (std::size_t i = 0; i < handle->arrays.size(); ++i) {
+    for (std::size_t i = 0; handle->options.make == nullptr && i < handle->arrays.size(); ++i) {
       if (pointers == nullptr || pointers[i] == nullptr) return Status::InvalidArgument(fmt::format("adopt: pointer {} is NULL", i));
-      const std::uint64_t to_held = handle->options.layout.boxes[i].offset - handle->arrays[i].offset;
-      arrays.push_back(static_cast<const std::byte*>(pointers[i]) + to_held);
+      arrays.push_back(static_cast<const std::byte*>(pointers[i]) + handle->to_held[i]);
     }
     const Result<VolumeOwner::Slot> slot = Begin(*handle, timeout_seconds);
     if (!slot.ok()) return slot.status();

@@ -72,6 +72,21 @@ SLABSTREAM_INSITU_API int slabstream_insitu_add_box(slabstream_insitu* handle, c
  * digits and '_'. At most 64 of them. Those of owner 0 are used; others may declare them, too. */
 SLABSTREAM_INSITU_API int slabstream_insitu_parameter(slabstream_insitu* handle, const char* name, double least, double most, double value);
 
+/* How boxes are made on demand. make: sets `samples` to the first sample of the array of the box (its number in the order of add_box) at a
+ * time. They stay until drop is told. It may take long, but must end soon once close is called. If it returns a slabstream_insitu_code,
+ * pictures that need the box fail with the line that it writes into `error`, which has room for `error_bytes`. drop: nobody reads these
+ * samples any more. Both are called on threads of the library, or within begin, adopt and close. */
+typedef struct {
+  int (*make)(void* context, uint32_t box, uint64_t time, const void** samples, char* error, uint32_t error_bytes);
+  void (*drop)(void* context, uint32_t box, uint64_t time, const void* samples);
+  void* context;
+  uint64_t most_bytes; /* of samples that are kept, those that were asked for last; one box is kept in any case */
+} slabstream_insitu_maker;
+
+/* Before start, and in all owners of the field: boxes are made when a picture needs them. Each time is then committed by adopt, whose
+ * pointers are NULL. */
+SLABSTREAM_INSITU_API int slabstream_insitu_on_demand(slabstream_insitu* handle, const slabstream_insitu_maker* maker);
+
 /* Takes the memory of all slots, and begins to look for the service. INVALID_ARGUMENT names what is wrong with field, boxes or parameters.
  */
 SLABSTREAM_INSITU_API int slabstream_insitu_start(slabstream_insitu* handle);

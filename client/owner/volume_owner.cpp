@@ -32,17 +32,20 @@ constexpr Duration kOthersLeave = std::chrono::seconds(10);  // what an owner be
 
 struct VolumeOwner::Impl {
   Impl(RegisterOwner as, OwnerLayout of_layout, std::shared_ptr<OwnerMemory> of_owner, std::shared_ptr<const MappedOwner> mapped,
-       Socket to_coordinator)
+       MakeBox make, std::uint64_t made_bytes, Socket to_coordinator)
       : registration(std::move(as)),
         layout(std::move(of_layout)),
         memory(std::move(of_owner)),
         own(std::move(mapped)),
+        maker(make == nullptr ? nullptr
+                              : std::make_unique<BoxMaker>(memory, own, made_bytes, std::move(make), [this] { wakeup.Notify(); })),
         socket(std::move(to_coordinator)),
         thread([this](const std::stop_token& stop) { Run(stop); }) {}
 
   void Run(const std::stop_token& stop);
   void Hear(CoordinatorToOwner message, Time now);
   void Answer(const ChunkRequest& request);
+  void Answer(const ChunkRequest& request, Result<Bytes> samples);
   void Send(MessageView message, const Bytes& payload = {}) { (void)socket.Send({}, Encode(message), payload); }
   void Forget();                                  // the coordinator: nobody uses a time any more
   std::optional<std::uint32_t> FreeSlot() const;  // of the oldest time; with the mutex
@@ -57,6 +60,7 @@ struct VolumeOwner::Impl {
   const std::shared_ptr<OwnerMemory> memory;
   const std::shared_ptr<const MappedOwner> own;  // the same memory, to be read while it is written
   Wakeup wakeup;
+  const std::unique_ptr<BoxMaker> maker;  // null: boxes are not made on demand
 
   mutable std::mutex mutex;  // guards what follows
   std::condition_variable changed;
@@ -135,15 +139,22 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
   const Box& box = request.box;
   const std::size_t sample_bytes = BytesPerSample(layout.samples);
   const auto of = std::ranges::find_if(layout.boxes, [&](const HeldBox& each) { return !box.empty() && each.box.Contains(box); });
-  std::vector<std::byte> samples;
-  Status status = Status::InvalidArgument("no box of this owner has these voxels");
-  if (of != layout.boxes.end() && request.chunk == 0 && std::size_t(box.voxel_count()) <= kMostAskedBytes / sample_bytes) {
-    samples.resize(std::size_t(box.voxel_count()) * sample_bytes);
-    status = own->Read(std::size_t(of - layout.boxes.begin()), box, request.dataset, BoxRoom::Dense(box, samples.data(), true));
+  const bool fits = std::size_t(box.voxel_count()) <= kMostAskedBytes / sample_bytes || (maker != nullptr && request.in_place);
+  if (of == layout.boxes.end() || request.chunk != 0 || !fits) {
+    return Answer(request, Status::InvalidArgument("no box of this owner has these voxels"));
   }
-  if (!status.ok()) return Send(ChunkRefused{epoch, request.dataset, box, request.chunk, status});
-  Chunk chunk{.epoch = epoch, .dataset = request.dataset, .box = box, .chunk = request.chunk};
-  const Bytes payload = PackChunk(Bytes(std::move(samples)), Codec::kRaw, chunk);
+  const auto number = std::size_t(of - layout.boxes.begin());
+  if (maker != nullptr) return maker->Ask(number, request);
+  std::vector<std::byte> samples(std::size_t(box.voxel_count()) * sample_bytes);
+  const Status read = own->Read(number, box, request.dataset, BoxRoom::Dense(box, samples.data(), true));
+  Answer(request, read.ok() ? Result(Bytes(std::move(samples))) : read);
+}
+
+void VolumeOwner::Impl::Answer(const ChunkRequest& request, Result<Bytes> samples) {
+  if (request.epoch != epoch) return;  // it was asked by another coordinator
+  if (!samples.ok()) return Send(ChunkRefused{epoch, request.dataset, request.box, request.chunk, samples.status()});
+  Chunk chunk{.epoch = epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+  const Bytes payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
   Send(chunk, payload);
 }
 
@@ -157,11 +168,14 @@ void VolumeOwner::Impl::Run(const std::stop_token& stop) {
         Result<CoordinatorToOwner> message = Decode<CoordinatorToOwner>(incoming->header(), incoming->payload().size());
         if (message.ok()) Hear(*std::move(message), MonotonicNow());
       }
+      for (BoxMaker::Answer& each : maker == nullptr ? std::vector<BoxMaker::Answer>() : maker->TakeAnswers()) {
+        Answer(each.request, std::move(each.samples));
+      }
       if (socket.refused()) Tell([this] { refused = Status::Unavailable("the coordinator refuses the key of this owner"); });
       const Time now = MonotonicNow();
       if (epoch != 0 && now >= heard + timeout) Forget();
       OwnerTime time{.epoch = epoch};
-      OwnerPing ping{.epoch = epoch};
+      OwnerPing ping{.epoch = epoch, .making = maker != nullptr && maker->is_making()};
       {
         const std::lock_guard lock(mutex);
         ended = !refused.ok();
@@ -221,8 +235,14 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
                    .owners = options.owners,
                    .description = options.description,
                    .samples = std::string(ToString(layout.samples)),
-                   .steered = std::move(options.parameters)};
-  for (const HeldBox& each : layout.boxes) as.boxes.push_back(each.box);
+                   .steered = std::move(options.parameters),
+                   .on_demand = options.make != nullptr};
+  layout.on_demand = as.on_demand;
+  if (layout.on_demand) layout.slot_bytes = 0;
+  for (HeldBox& each : layout.boxes) {
+    if (layout.on_demand) each.offset = 0;
+    as.boxes.push_back(each.box);
+  }
   Result<std::shared_ptr<OwnerMemory>> memory = OwnerMemory::Create(as.incarnation, layout);
   if (!memory.ok()) return memory.status();
   // The coordinator would drop what it cannot decode.
@@ -236,7 +256,8 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
   Result<Socket> socket = Socket::Dealer(context, socket_options);
   if (!socket.ok()) return socket.status();
   if (Status connected = socket->Connect(options.endpoint); !connected.ok()) return connected;
-  auto impl = std::make_unique<Impl>(std::move(as), std::move(layout), *std::move(memory), *own, *std::move(socket));
+  auto impl = std::make_unique<Impl>(std::move(as), std::move(layout), *std::move(memory), *own, std::move(options.make),
+                                     options.made_bytes, *std::move(socket));
   return std::unique_ptr<VolumeOwner>(new VolumeOwner(std::move(impl)));
 }
 
@@ -258,6 +279,7 @@ Result<VolumeOwner::Slot> VolumeOwner::Begin(Duration timeout) {
   impl_->begun = slot;
   const std::uint64_t freed = std::exchange(impl_->times.at(*slot), 0);
   impl_->gone = std::max(impl_->gone, freed);
+  if (impl_->maker != nullptr) impl_->maker->SetTime(*slot, 0);
   return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, freed};
 }
 
@@ -267,7 +289,9 @@ Status VolumeOwner::Commit(std::uint64_t time, double simulated, std::span<const
   if (const std::size_t boxes = impl_->layout.boxes.size(); !arrays.empty() && arrays.size() != boxes) {
     return Status::InvalidArgument(fmt::format("arrays of {} boxes, must be of {}", arrays.size(), boxes));
   }
+  if (impl_->maker != nullptr && !arrays.empty()) return Status::InvalidArgument("arrays of boxes that are made on demand");
   impl_->memory->Commit(*impl_->begun, time, simulated, arrays);
+  if (impl_->maker != nullptr) impl_->maker->SetTime(*impl_->begun, time);
   impl_->Tell([&] {
     impl_->times.at(*impl_->begun) = impl_->latest = time;
     impl_->simulated = simulated;

@@ -5,6 +5,9 @@
 // The process goes on whether there is a service or not: it registers when one is there, and again after it was away. Only while pictures
 // are made of a time, Begin waits rather than giving its memory away.
 //
+// An owner may make its boxes on demand (`make`). Then step 2 gives no samples: a box is made when a picture needs it, and kept within a
+// budget.
+//
 // A thread of its own talks with the coordinator and sends voxels to hosts that cannot map this process's memory. Begin and Commit are for
 // one thread.
 #pragma once
@@ -16,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "client/owner/box_maker.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/transport/context.h"
@@ -38,6 +42,9 @@ struct VolumeOwnerOptions {
   bool share_memory = true;  // else voxels travel
   // What whoever watches may change, of owner 0 alone: at most 64, no name twice; names are identifiers of at most 64 characters.
   std::vector<SteeredParameter> parameters = {};
+  // Not null: boxes are made on demand, as in all other owners of the field, and at most `made_bytes` of them are kept, and the last one.
+  MakeBox make = nullptr;
+  std::uint64_t made_bytes = 0;
 };
 
 class VolumeOwner {
@@ -59,7 +66,7 @@ class VolumeOwner {
   // `simulated`: the simulation's own time, in its own unit. `arrays`: samples that already lie elsewhere in this process are read there,
   // and the slot takes no memory for them. For each box, it has the address of the first sample of what is held, or null: the sample is in
   // the slot. Arrays must not change until the slot is begun again or this ends. InvalidArgument: nothing was begun, `time` is not above
-  // that of the last call, or arrays are neither none nor as many as boxes.
+  // that of the last call, or arrays are neither none nor as many as boxes. Boxes that are made on demand have neither slots nor arrays.
   Status Commit(std::uint64_t time, double simulated, std::span<const std::byte* const> arrays = {});
 
   // The present value of each of the options' parameters, in that order. Any thread.

@@ -66,9 +66,13 @@ class WorkFields {
     return *drawn_;
   }
 
+  const ClipRegion& clip() const { return clip_; }
+  // Whether clipping may leave a sample in the box.
+  bool Keeps(const Box& box) const { return clip_.MayKeep(request_.summary->description.geometry.InDataSpace(box)); }
+
   // Whether any sample that `box` owns may show something.
   bool Shows(const Box& box) {
-    if (!clip_.MayKeep(request_.summary->description.geometry.InDataSpace(box))) return false;
+    if (!Keeps(box)) return false;
     const Box with_halo = Grown(box, request_.volume->renderer()->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr || request_.summary->stored) return visibility_.AnyVisible(with_halo);
     return !Of(BalanceBy::kOccupied).Hull(with_halo).empty();
@@ -338,14 +342,35 @@ struct LayoutMaker::State {
     return false;
   }
 
-  // Boxes as their owners hold them, or parts of these that fit the target.
+  // Boxes as their owners hold them, or parts of these that fit the target. Those that are made on demand are not joined: of a joined box
+  // all would be made where one shows.
   Layout MakeByOwner(const ResolvedPolicy& policy) {
     const auto fits = [&](const Box& box) { return BytesOf({box, 0}) <= request.box_bytes_target || box.voxel_count() == 1; };
-    OwnerPartition made = DivideByOwners(request.summary->description.geometry.bounds(), *request.summary->owned, fits);
+    OwnedBoxes owned = *request.summary->owned;
+    for (std::uint32_t i = 0; request.summary->on_demand && i < owned.size(); ++i) owned[i].owner = i;
+    OwnerPartition made = DivideByOwners(request.summary->description.geometry.bounds(), owned, fits);
+    for (std::uint32_t& owner : made.owners) owner = request.summary->on_demand ? (*request.summary->owned)[owner].owner : owner;
     Layout layout = Assign(std::move(made.partition), policy, made.owners);
     layout.touching = FindTouching(layout.partition);
+    if (request.summary->on_demand && !fields.clip().empty()) FillClipped(layout);
     layout.group_bytes = std::uint64_t(request.box_bytes_target);
     return layout;
+  }
+
+  // Voxels of other boxes in the halo of one are not read if clipping leaves nothing that reads them.
+  void FillClipped(Layout& layout) {
+    const std::span<const Box> boxes = layout.partition.boxes();
+    const auto fill = [&](BoxId of, BoxId other) {
+      const std::int32_t reach = request.volume->renderer()->reach();
+      if (layout.owners[of] == kNoSlot || layout.filled[of].size() == kMaxFilled) return;
+      const Box part = Intersection(PaddedBoxOf({boxes[of], 0}), boxes[other]);
+      if (!part.empty() && !fields.Keeps(Grown(part, reach, layout.partition.bounds()))) layout.filled[of].push_back({part, 0});
+    };
+    layout.filled.resize(boxes.size());
+    for (const TouchingBoxes& pair : layout.touching) {
+      fill(pair.first, pair.second);
+      fill(pair.second, pair.first);
+    }
   }
 
   std::optional<UnreadParts> FindUnread() const {

@@ -59,6 +59,7 @@ struct VolumeSummary {
   std::shared_ptr<const BrickRangeList> indexed = nullptr;
   // Who holds which voxels, where that is known: processes, or the pieces that they wrote. The boxes tile the volume. Null: not known.
   std::shared_ptr<const OwnedBoxes> owned = nullptr;
+  bool on_demand = false;                       // owners make their boxes when somebody asks for them
   std::vector<std::uint64_t> owner_hosts = {};  // by owner that is a process: who can read its memory (SharedMemoryScope); 0: nobody
   std::string missing = {};                     // one line: what the volume lacks, since owners are gone or late; else empty
   std::vector<std::uint32_t> cells;             // for an unstructured grid, by brick: cells with their centres there; empty: it is no grid

@@ -93,7 +93,7 @@ Result<QuestionReply> AnswerAtTime(const SummaryQuery& query, const AnswerQuesti
   std::shared_ptr<const VolumeSummary> own = samples.own;
   if (const auto& source = samples.in_parts.source != nullptr ? samples.in_parts.source : samples.read_from; source != nullptr) {
     const bool far = summary.stored && !SchemeOf(summary.stored->source).empty();
-    const Result<Survey> survey = SurveySource(*source, far ? kFarSurvey : SurveyBytes());
+    const Result<Survey> survey = SurveySource(*source, SurveyBytesOf(source->info(), far));
     if (!survey.ok()) return survey.status();
     own = survey->summary;
   }

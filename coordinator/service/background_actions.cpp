@@ -247,6 +247,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
   // Of voxels that others hold, the text says which they are.
   const DatasetId id = IdOf(at.source->info().owned.empty() ? action.name : DatasetOfPart(action.name), description, at.stored);
   summary.owned = at.source->info().levels[std::size_t(at.stored.level)].owned;
+  summary.on_demand = at.source->info().on_demand;
   if (const auto owners = OwnedField::Parse(at.source->info().owned); owners.ok()) {
     for (const OwnerPlace& owner : owners->owners) summary.owner_hosts.push_back(owner.scope);
     for (const std::string& note : at.source->info().notes) summary.missing = note;

@@ -33,6 +33,7 @@ using AskDone = std::function<void(Result<Bytes>)>;
 struct Asked {
   std::uint64_t time = 0;
   Box box;
+  bool in_place = false;
   AskDone done;
 };
 
@@ -91,7 +92,7 @@ bool Tile(const Box& bounds, const std::vector<Box>& boxes) {
 }
 
 bool OfOneField(const RegisterOwner& a, const RegisterOwner& b) {
-  return a.owners == b.owners && a.description == b.description && a.samples == b.samples;
+  return a.owners == b.owners && a.description == b.description && a.samples == b.samples && a.on_demand == b.on_demand;
 }
 
 }  // namespace
@@ -157,7 +158,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     for (const Place& place : field->places) {
       if (place.owner && !OfOneField(place.owner->registered, m)) {
         return Wrong(StatusCode::kUnavailable, m,
-                     fmt::format("owners, description or samples differ from those of owner {}", place.owner->registered.owner));
+                     fmt::format("owners, description, samples or on_demand differ from those of owner {}", place.owner->registered.owner));
       }
     }
     const std::optional<Owner>& taken = field->places[m.owner].owner;
@@ -232,6 +233,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     Owner& owner = *Find(from);
     owner.hold = m.hold;
     owner.gone = m.gone;
+    if (m.making) owner.answered = now;
     const std::string& name = owner.registered.dataset;
     FindShown(fields.at(name));
     OwnerPong pong = Pong(name, fields.at(name));
@@ -379,7 +381,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
 
   // ---- what owners are asked for
   void Request(const Owner& owner, const Asked& asked) {
-    news.messages.emplace_back(owner.peer, ChunkRequest{.epoch = epoch, .dataset = asked.time, .box = asked.box});
+    news.messages.emplace_back(owner.peer,
+                               ChunkRequest{.epoch = epoch, .dataset = asked.time, .box = asked.box, .in_place = asked.in_place});
   }
 
   void FailAsked(Owner& owner, const Status& why) {
@@ -390,7 +393,10 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   }
 
   void Answer(Owner& owner, std::uint64_t time, const Box& box, Result<Bytes> answer) {
-    const auto asked = std::ranges::find_if(owner.out, [&](const Asked& each) { return each.time == time && each.box == box; });
+    // The same box may be asked for in place, too, which is answered by no bytes.
+    const auto asked = std::ranges::find_if(owner.out, [&](const Asked& each) {
+      return each.time == time && each.box == box && (!answer.ok() || each.in_place == (answer->size() == 0));
+    });
     if (asked == owner.out.end()) return;  // nobody waits for it any more
     answers.emplace_back(std::move(asked->done), std::move(answer));
     owner.out.erase(asked);
@@ -514,9 +520,14 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
   volume.description = any.description;
   volume.exact = {*SampleTypeNamed(any.samples), any.description.mapping};
   volume.description.mapping.offset = any.description.mapping.FromStored(KeptTypeOf(volume.exact.type).shift);
+  volume.on_demand = any.on_demand;
+  for (const Box& box : held) {
+    if (any.on_demand && box.begin == Index3{}) volume.field.block = box.size();
+  }
   volume.of_nobody = Assemble(any.description.geometry.bounds(), held).missing;
-  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
-    state->Ask(name, owner, incarnations[owner], {time, box, std::move(done)});
+  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, bool in_place,
+                                                                                    AskDone done) {
+    state->Ask(name, owner, incarnations[owner], {time, box, in_place, std::move(done)});
   };
   volume.use = Use(name, field.shown);
   return volume;

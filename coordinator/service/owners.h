@@ -9,6 +9,8 @@
 // An owner is lost when it leaves, when its connection ends, or when it is silent for kOwnerTimeout. Until another one takes its place, the
 // field cannot be opened. When all are lost, the dataset goes.
 //
+// An owner that makes its boxes on demand may take any time for one: it answers as long as it says that it is making.
+//
 // For the service's thread. Sources that are open may outlive this; what they ask then fails.
 #pragma once
 

@@ -199,6 +199,10 @@ void VoxelServer::Run(const std::stop_token& stop) {
           guarded([&] { OnCut(std::move(*cut)); });
           continue;
         }
+        if (auto* const made = std::get_if<Made>(&done)) {
+          guarded([&] { OnMade(std::move(*made)); });
+          continue;
+        }
         auto& read = std::get<ReadDone>(done);
         --reads_.at(read.asked->request.dataset).begun;
         guarded([&] { Reply(read.asked->identity, read.asked->request, std::move(read.answer)); });
@@ -228,8 +232,9 @@ void VoxelServer::Answer(const Incoming& incoming) {
   }
   if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
   if (samples.in_parts.source != nullptr) {
-    std::deque<Asked>& waiting = reads_[request.dataset].waiting;
     const Asked asked = {incoming.identity, request, samples.in_parts};
+    if (samples.in_parts.source->info().on_demand) return MakeFirst(asked);
+    std::deque<Asked>& waiting = reads_[request.dataset].waiting;
     if (std::ranges::none_of(waiting, [&](const Asked& other) { return other.IsSame(asked); })) waiting.push_back(asked);
     return ReadNext(request.dataset);
   }
@@ -241,6 +246,33 @@ void VoxelServer::Answer(const Incoming& incoming) {
           Bytes payload = PackChunk(std::move(cut), codec_, chunk);
           return std::pair(chunk, std::move(payload));
         }));
+}
+
+void VoxelServer::MakeFirst(Asked asked) {
+  std::vector<Asked>& waiting = reads_[asked.request.dataset].awaits_making;
+  if (std::ranges::any_of(waiting, [&](const Asked& other) { return other.IsSame(asked); })) return;
+  waiting.push_back(asked);
+  const Status begun = Guarded("a chunk of voxels", [&] {
+    asked.from.source->Make(asked.request.box, [inbox = read_, asked](Status status) { inbox->Post(Made{asked, std::move(status)}); });
+    return Status::Ok();
+  });
+  if (!begun.ok()) OnMade({std::move(asked), begun});
+}
+
+void VoxelServer::OnMade(Made made) {
+  const ChunkRequest& request = made.asked.request;
+  Reads& reads = reads_[request.dataset];
+  std::erase_if(reads.awaits_making, [&](const Asked& each) { return each.IsSame(made.asked); });
+  if (made.status.ok() && !request.in_place) {
+    reads.waiting.push_back(made.asked);
+  } else if (made.status.ok()) {
+    Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+    Bytes none = PackChunk(Bytes(), Codec::kRaw, chunk);
+    Reply(made.asked.identity, request, std::pair(chunk, std::move(none)));
+  } else {
+    Reply(made.asked.identity, request, made.status);
+  }
+  ReadNext(request.dataset);
 }
 
 void VoxelServer::ReadNext(DatasetId dataset) {
@@ -268,7 +300,7 @@ void VoxelServer::ReadNext(DatasetId dataset) {
     --reads.begun;  // its place is free again
     Reply(asked->identity, request, begun);
   }
-  if (reads.waiting.empty() && reads.begun == 0) reads_.erase(dataset);
+  if (reads.awaits_making.empty() && reads.waiting.empty() && reads.begun == 0) reads_.erase(dataset);
 }
 
 void VoxelServer::Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer) {

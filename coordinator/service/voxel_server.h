@@ -103,6 +103,9 @@ class VoxelServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
+  // Of a source that is made on demand: has the voxels made, and then replies or reads them.
+  void MakeFirst(Asked asked);
+  void OnMade(Made made);
   // Reads the next voxels that must be read first; Reply follows when they are there.
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
@@ -120,6 +123,10 @@ class VoxelServer {
     std::shared_ptr<const Asked> asked;
     Result<std::pair<Chunk, Bytes>> answer;
   };
+  struct Made {
+    Asked asked;
+    Status status;
+  };
   // The cells of a box, which is not empty, as EncodeMesh makes them.
   struct CellsCut {
     std::shared_ptr<const GridCells> of;
@@ -133,6 +140,7 @@ class VoxelServer {
 
   static constexpr std::size_t kReadAtOnce = 32;  // chunks of a dataset, which are in memory until they are sent
   struct Reads {                                  // the reads of a dataset
+    std::vector<Asked> awaits_making;             // no two the same
     std::deque<Asked> waiting;                    // no two the same
     std::size_t begun = 0;                        // and not ended
   };
@@ -156,7 +164,7 @@ class VoxelServer {
   FairTasks cuts_{2};                                                            // by dataset, so that one box of each is cut at a time
   LimitedLog complaints_;                                                        // the thread's
   std::map<DatasetId, Reads> reads_;                                             // the thread's
-  using Done = std::variant<ReadDone, CellsCut>;
+  using Done = std::variant<ReadDone, Made, CellsCut>;
   const std::shared_ptr<Mailbox<Done>> read_ = std::make_shared<Mailbox<Done>>();  // reads and cuts may outlive this
   Socket socket_;                                                                  // the thread's
   std::jthread thread_;                                                            // last member

@@ -253,9 +253,7 @@ Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::strin
     auto known = std::make_shared<const VolumeSummary>(UnreadSummary(source->info().finest(), *statistics));
     return ReadableSource(OpenedSource{std::move(source), {0, true, std::move(known)}, std::move(place), nullptr, std::move(index)});
   }
-  // Each time of what others hold is surveyed, and perhaps they are far.
-  const bool far = !SchemeOf(place).empty() || !source->info().owned.empty();
-  Result<Survey> survey = SurveySource(*source, far ? kFarSurvey : SurveyBytes(), &progress);
+  Result<Survey> survey = SurveySource(*source, SurveyBytesOf(source->info(), !SchemeOf(place).empty()), &progress);
   if (!survey.ok()) return survey.status();
   if (labels != nullptr) {
     VolumeSummary with_labels = *survey->summary;

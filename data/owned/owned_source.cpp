@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <charconv>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -76,11 +78,12 @@ class OwnedSource final : public VolumeSource {
   OwnedSource(OwnedVolume volume, std::vector<std::shared_ptr<const MappedOwner>> mapped, SourceContext context)
       : shared_(std::make_shared<Shared>(std::move(volume), std::move(mapped), std::move(context))) {
     const OwnedVolume& of = shared_->volume;
-    info_ = {.levels = {{of.description, Uniform(kBrick)}},
+    info_ = {.levels = {{of.description, of.field.block}},
              .format = "owners",
              .file_type = std::string(ToString(of.exact.type)),
              .exact = of.exact,
-             .growth = of.growth};
+             .growth = of.growth,
+             .on_demand = of.on_demand};
     info_.owned = of.field.Text();
     if (!of.missing.empty()) info_.notes = {of.missing};
     if (!of.boxes.empty()) {
@@ -109,10 +112,25 @@ class OwnedSource final : public VolumeSource {
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return {.stored_bytes = shared_->asked_bytes, .chunks = 0}; }
 
-  bool Reaches(const Box& box) const override {
+  Reach Reaches(const Box& box) const override {
     std::vector<Box> missing = {box};
-    for (const Places* places : {&here_, &ghosts_, &nobodys_, &elsewhere_}) places->Take(missing, [](const Places::Of&, const Box&) {});
-    return missing.empty();
+    bool made = true;
+    for (const Places* places : {&here_, &ghosts_}) {
+      places->Take(missing, [&](const Places::Of& from, const Box&) { made = made && shared_->IsMade(from); });
+    }
+    for (const Places* places : {&nobodys_, &elsewhere_}) places->Take(missing, [](const Places::Of&, const Box&) {});
+    return !missing.empty() ? Reach::kNever : made ? Reach::kNow : Reach::kOnceMade;
+  }
+
+  void Make(const Box& box, ReadDone done) override {
+    const auto reading = std::make_shared<BoxReading>(box, BoxRoom(), std::stop_token(), std::move(done));
+    std::vector<Box> missing = {box};
+    for (const Places* places : {&here_, &elsewhere_}) {
+      places->Take(missing, [&](const Places::Of& from, const Box&) {
+        if (!shared_->IsMade(from)) shared_->AskToMake(shared_, reading, from);
+      });
+    }
+    reading->EndPart();
   }
 
   using VolumeSource::Read;
@@ -134,7 +152,13 @@ class OwnedSource final : public VolumeSource {
         for (const auto& [from, part] : copied) {
           if (!reading->goes_on()) break;
           const Status read = shared->mapped[from.owner]->Read(from.box, part, shared->volume.field.time, shared->RoomOf(*reading, part));
-          if (!read.ok()) reading->Fail(shared->Named(read));
+          if (read.ok()) continue;
+          if (shared->volume.on_demand && shared->volume.ask) {
+            ForEachAsked(part, BytesPerSample(shared->volume.exact.type),
+                         [&](const Box& asked) { shared->Ask(shared, reading, from.owner, asked); });
+          } else {
+            reading->Fail(shared->Named(read));
+          }
         }
         if (reading->stop().stop_requested()) reading->GiveUp();
         reading->EndPart();
@@ -165,9 +189,37 @@ class OwnedSource final : public VolumeSource {
     }
     Status Named(const Status& status) const { return {status.code(), fmt::format("\"{}\": {}", volume.field.dataset, status.message())}; }
 
+    // Others are not known to be.
+    bool IsMade(const Places::Of& from) const {
+      return mapped[from.owner] != nullptr && mapped[from.owner]->Has(from.box, volume.field.time);
+    }
+
+    // What several wait for is asked for once.
+    void AskToMake(const std::shared_ptr<Shared>& self, const std::shared_ptr<BoxReading>& reading, const Places::Of& from) {
+      reading->BeginPart();
+      const std::pair key(from.owner, from.box);
+      {
+        const std::lock_guard lock(mutex);
+        std::vector<std::shared_ptr<BoxReading>>& waiting = made[key];
+        waiting.push_back(reading);
+        if (waiting.size() > 1) return;
+      }
+      const auto& memory = mapped[from.owner];
+      const Box& box = memory != nullptr ? memory->layout().boxes[from.box].box : volume.boxes[from.owner][from.box];
+      volume.ask(from.owner, box, true, [self, key](const Result<Bytes>& answer) {
+        std::unique_lock lock(self->mutex);
+        const auto waiting = self->made.extract(key);
+        lock.unlock();
+        for (const std::shared_ptr<BoxReading>& each : waiting.mapped()) {
+          if (!answer.ok()) each->Fail(answer.status());
+          each->EndPart();
+        }
+      });
+    }
+
     void Ask(const std::shared_ptr<Shared>& self, const std::shared_ptr<BoxReading>& reading, std::uint32_t owner, const Box& box) {
       reading->BeginPart();
-      volume.ask(owner, box, [self, reading, box](Result<Bytes> samples) {
+      volume.ask(owner, box, false, [self, reading, box](Result<Bytes> samples) {
         self->context->PostDecode([self, reading, box, samples = std::move(samples)] {
           const SampleType type = self->volume.exact.type;
           const Index3 size = box.size();
@@ -188,6 +240,8 @@ class OwnedSource final : public VolumeSource {
     const std::vector<std::shared_ptr<const MappedOwner>> mapped;  // of each owner; null: it is not on this host
     const SourceContext context;
     std::atomic<std::uint64_t> asked_bytes = 0;
+    std::mutex mutex;
+    std::map<std::pair<std::uint32_t, std::size_t>, std::vector<std::shared_ptr<BoxReading>>> made;  // who waits for it; with the mutex
   };
   const std::shared_ptr<Shared> shared_;
   SourceInfo info_;
@@ -198,7 +252,9 @@ std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& fiel
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
   for (const OwnerPlace& place : field.owners) {
     const Result<std::shared_ptr<const MappedOwner>> owner = MappedOwner::Open(place);
-    const bool fits = owner.ok() && (!as || ((*owner)->layout().size == as->size && (*owner)->layout().samples == as->samples)) &&
+    const bool fits = owner.ok() &&
+                      (!as || ((*owner)->layout().size == as->size && (*owner)->layout().samples == as->samples &&
+                               (*owner)->layout().on_demand == as->on_demand)) &&
                       (*owner)->Reaches(field.time);
     mapped.push_back(fits ? *owner : nullptr);
   }
@@ -208,7 +264,7 @@ std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& fiel
 }  // namespace
 
 std::string OwnedField::Text() const {
-  std::string text = fmt::format("{}{}:{:x}:", kOwnersMark, dataset, time);
+  std::string text = fmt::format("{}{}:{:x}:{:x}.{:x}.{:x}:", kOwnersMark, dataset, time, block.x, block.y, block.z);
   std::uint64_t scope = 0;
   for (const OwnerPlace& owner : owners) {
     if (owner.scope != std::exchange(scope, owner.scope)) text += fmt::format("@{:x}.", owner.scope);
@@ -224,7 +280,12 @@ Result<OwnedField> OwnedField::Parse(const std::string& text) {
   rest.remove_prefix(kOwnersMark.size());
   OwnedField field;
   const std::optional<std::string_view> name = TakeUpTo(rest, ':');
-  if (!name || !CheckDatasetName(std::string(*name)).ok() || !TakeNumber(rest, ':', field.time)) return wrong();
+  Index3& block = field.block;
+  if (!name || !CheckDatasetName(std::string(*name)).ok() || !TakeNumber(rest, ':', field.time) || !TakeNumber(rest, '.', block.x) ||
+      !TakeNumber(rest, '.', block.y) || !TakeNumber(rest, ':', block.z) || Min(block, Uniform(1)) != Uniform(1) ||
+      Max(block, Uniform(kMaxVolumeSide)) != Uniform(kMaxVolumeSide)) {
+    return wrong();
+  }
   field.dataset = *name;
   for (OwnerPlace owner; !rest.empty(); field.owners.push_back(owner)) {
     if (rest.front() == '@') {
@@ -239,7 +300,8 @@ Result<OwnedField> OwnedField::Parse(const std::string& text) {
 }
 
 std::shared_ptr<VolumeSource> MakeOwnedSource(OwnedVolume volume, const SourceContext& context) {
-  auto mapped = MapOwners(volume.field, OwnerLayout{.samples = volume.exact.type, .size = volume.description.geometry.size});
+  auto mapped = MapOwners(
+      volume.field, OwnerLayout{.samples = volume.exact.type, .size = volume.description.geometry.size, .on_demand = volume.on_demand});
   return std::make_shared<OwnedSource>(std::move(volume), std::move(mapped), context);
 }
 
@@ -256,8 +318,10 @@ Result<std::shared_ptr<VolumeSource>> OpenOwned(const std::string& text, const S
       description.geometry.size = layout.size;
       description.type = KeptTypeOf(layout.samples).type;
       volume.exact.type = layout.samples;
+      volume.on_demand = layout.on_demand;
     }
-    if (layout.size != description.geometry.size || layout.samples != volume.exact.type) owner = nullptr;  // it is asked for its own
+    if (layout.size != description.geometry.size || layout.samples != volume.exact.type || layout.on_demand != volume.on_demand)
+      owner = nullptr;  // it is asked for its own
   }
   if (volume.description.geometry.size == Index3{}) {
     return Status::Unavailable(fmt::format("\"{}\": its owners are on other hosts", volume.field.dataset));

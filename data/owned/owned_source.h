@@ -1,5 +1,6 @@
 // A volume whose voxels stay with the processes that own them (owners), at one time. Those of owners on this host are read in their memory
-// (owner_memory.h); those of others by a function of whoever can ask them: the coordinator.
+// (owner_memory.h); those of others by a function of whoever can ask them: the coordinator. It also asks owners for boxes that they make
+// on demand.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,7 @@ struct OwnedField {
   std::string dataset;
   std::uint64_t time = 0;
   std::vector<OwnerPlace> owners;
+  Index3 block = Uniform(kBrick);  // SourceLevel::block: of boxes that are made on demand the first one's size
 
   std::string Text() const;
   // InvalidArgument: not a text of owners.
@@ -31,9 +33,9 @@ struct OwnedField {
   friend bool operator==(const OwnedField&, const OwnedField&) = default;
 };
 
-// Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest. Calls `done` once, on any thread, which it must
-// not hold up.
-using AskOwner = std::function<void(std::uint32_t owner, const Box& box, std::function<void(Result<Bytes>)> done)>;
+// Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest; or, `in_place`, to make the box, whatever its
+// size: then there are no bytes. Calls `done` once, on any thread, which it must not hold up.
+using AskOwner = std::function<void(std::uint32_t owner, const Box& box, bool in_place, std::function<void(Result<Bytes>)> done)>;
 
 // What the coordinator knows of a field.
 struct OwnedVolume {
@@ -41,6 +43,7 @@ struct OwnedVolume {
   VolumeDescription description = {};        // of kept samples (KeptTypeOf)
   ExactType exact = {};                      // as they are held
   std::vector<std::vector<Box>> boxes = {};  // of each owner
+  bool on_demand = false;                    // all owners make their boxes on demand
   std::vector<Box> of_nobody = {};           // voxels of owners that are gone, which read as 0; together they tile the volume
   std::string missing = {};                  // VolumeSummary::missing, a note of the source
   AskOwner ask = {};

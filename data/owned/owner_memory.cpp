@@ -23,7 +23,7 @@ struct OwnerHeader {
   std::uint64_t magic, incarnation;
   std::uint32_t version, samples;
   std::array<std::int32_t, 3> size;
-  std::uint32_t boxes, slots, unused;
+  std::uint32_t boxes, slots, on_demand;
   std::uint64_t slot_bytes;
   std::uint64_t address;  // of this header in the owner: who finds the incarnation there reads the memory of that process
   std::array<OwnerSlot, kMostOwnerSlots> of_slots;
@@ -32,23 +32,27 @@ struct OwnerHeader {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x534c41424f574e52ULL;  // "SLABOWNR"
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::uint64_t kPage = 4096;
 constexpr std::int64_t kMostStride = std::int64_t{1} << 40;  // so that no sum of steps within a volume overflows
 
 static_assert(std::atomic<double>::is_always_lock_free && sizeof(OwnerHeader) == 256 && sizeof(HeldBox) == 80);
 
+Status NotMade(std::size_t box) { return Status::Unavailable(fmt::format("box {} is not made, or was dropped", box)); }
 std::uint64_t InPages(std::uint64_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
-using ArrayAddress = std::atomic<std::uint64_t>;
+struct HeldArray {
+  std::atomic<std::uint64_t> address;     // 0: in the slot, or not made
+  std::atomic<std::uint64_t> generation;  // of a box that is made on demand
+};
 std::uint64_t BytesOfHeader(std::uint64_t boxes, std::uint64_t slots) {
-  return sizeof(OwnerHeader) + boxes * (sizeof(HeldBox) + slots * sizeof(ArrayAddress));
+  return sizeof(OwnerHeader) + boxes * (sizeof(HeldBox) + slots * sizeof(HeldArray));
 }
 std::uint64_t BeginOfSlot(const OwnerLayout& layout, std::uint64_t slot) {
   return InPages(BytesOfHeader(layout.boxes.size(), layout.slots)) + slot * InPages(layout.slot_bytes);
 }
-ArrayAddress* ArraysOf(const SealedMemory& memory, const OwnerLayout& layout, std::uint64_t slot) {
+HeldArray* ArraysOf(const SealedMemory& memory, const OwnerLayout& layout, std::uint64_t slot) {
   const std::size_t boxes = layout.boxes.size();
-  return reinterpret_cast<ArrayAddress*>(memory.data() + BytesOfHeader(boxes, 0)) + slot * boxes;
+  return reinterpret_cast<HeldArray*>(memory.data() + BytesOfHeader(boxes, 0)) + slot * boxes;
 }
 
 }  // namespace
@@ -87,7 +91,8 @@ Status OwnerLayout::Check() const {
       if (stride < 1 || stride > kMostStride) return wrong(fmt::format("a stride of {} of box {}, limit {}", stride, i, kMostStride));
       last += std::uint64_t(held[axis] - 1) * std::uint64_t(stride);
     }
-    if (const std::uint64_t bytes = (last + 1) * BytesPerSample(samples); each.offset > slot_bytes || bytes > slot_bytes - each.offset) {
+    const std::uint64_t bytes = (last + 1) * BytesPerSample(samples);
+    if (!on_demand && (each.offset > slot_bytes || bytes > slot_bytes - each.offset)) {
       return wrong(fmt::format("box {} takes {} bytes from {} on, a slot has {}", i, bytes, each.offset, slot_bytes));
     }
   }
@@ -109,6 +114,7 @@ Result<std::shared_ptr<OwnerMemory>> OwnerMemory::Create(std::uint64_t incarnati
   header.boxes = std::uint32_t(layout.boxes.size());
   header.slots = layout.slots;
   header.slot_bytes = layout.slot_bytes;
+  header.on_demand = layout.on_demand ? 1 : 0;
   header.address = reinterpret_cast<std::uint64_t>(&header);
   std::ranges::copy(layout.boxes, reinterpret_cast<HeldBox*>(&header + 1));
   header.magic = kMagic;
@@ -118,6 +124,7 @@ Result<std::shared_ptr<OwnerMemory>> OwnerMemory::Create(std::uint64_t incarnati
 std::span<std::byte> OwnerMemory::Begin(std::uint32_t slot) {
   OwnerSlot& of = header().of_slots.at(slot);
   of.generation.store(of.generation | 1, std::memory_order_relaxed);
+  for (std::size_t box = 0; layout_.on_demand && box < layout_.boxes.size(); ++box) Make(slot, box, nullptr);
   // Readers see that before anything that is written to the slot from now on.
   std::atomic_thread_fence(std::memory_order_seq_cst);
   return {memory_.data() + BeginOfSlot(layout_, slot), layout_.slot_bytes};
@@ -126,14 +133,22 @@ std::span<std::byte> OwnerMemory::Begin(std::uint32_t slot) {
 void OwnerMemory::Commit(std::uint32_t slot, std::uint64_t time, double simulated, std::span<const std::byte* const> arrays) {
   CHECK(arrays.empty() || arrays.size() == layout_.boxes.size()) << "arrays for " << arrays.size() << " boxes";
   // Where Yama guards processes, readers need its consent: they are no children of this one.
-  if (!arrays.empty() && !std::exchange(has_arrays_, true)) LetProcessesReadMemory();
+  if ((!arrays.empty() || layout_.on_demand) && !std::exchange(has_arrays_, true)) LetProcessesReadMemory();
   for (std::size_t box = 0; has_arrays_ && box < layout_.boxes.size(); ++box) {
-    ArraysOf(memory_, layout_, slot)[box] = arrays.empty() ? 0 : reinterpret_cast<std::uint64_t>(arrays[box]);
+    ArraysOf(memory_, layout_, slot)[box].address = arrays.empty() ? 0 : reinterpret_cast<std::uint64_t>(arrays[box]);
   }
   OwnerSlot& of = header().of_slots.at(slot);
   of.time = time;
   of.simulated = simulated;
   of.generation.store((of.generation | 1) + 1, std::memory_order_seq_cst);
+}
+
+void OwnerMemory::Make(std::uint32_t slot, std::size_t box, const std::byte* array) {
+  HeldArray& of = ArraysOf(memory_, layout_, slot)[box];
+  of.address = 0;
+  // Readers see that before anything becomes of the samples, and before there are others.
+  of.generation.fetch_add(1, std::memory_order_seq_cst);
+  of.address = reinterpret_cast<std::uint64_t>(array);
 }
 
 OwnerMemory::~OwnerMemory() {
@@ -164,7 +179,8 @@ Result<std::shared_ptr<const MappedOwner>> MappedOwner::Open(const OwnerPlace& p
   OwnerLayout layout{.samples = SampleType(std::min(header.samples, 255U)),
                      .size = {header.size[0], header.size[1], header.size[2]},
                      .slots = header.slots,
-                     .slot_bytes = header.slot_bytes};
+                     .slot_bytes = header.slot_bytes,
+                     .on_demand = header.on_demand != 0};
   const std::uint64_t boxes = header.boxes;
   if (boxes > kMostOwnedBoxes || BytesOfHeader(boxes, 0) > memory->size()) return wrong("has too many boxes");
   const auto* const first = reinterpret_cast<const HeldBox*>(&header + 1);
@@ -189,10 +205,20 @@ bool MappedOwner::Reaches(std::uint64_t time) const {
   const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
   for (std::uint32_t slot = 0; slot < layout_.slots; ++slot) {
     if (header.of_slots.at(slot).time != time) continue;
-    const ArrayAddress* const arrays = ArraysOf(memory_, layout_, slot);
-    if (std::any_of(arrays, arrays + layout_.boxes.size(), [](const ArrayAddress& each) { return each != 0; })) return CheckProcess().ok();
+    const HeldArray* const arrays = ArraysOf(memory_, layout_, slot);
+    const auto elsewhere = [](const HeldArray& each) { return each.address != 0; };
+    if (layout_.on_demand || std::any_of(arrays, arrays + layout_.boxes.size(), elsewhere)) return CheckProcess().ok();
   }
   return true;
+}
+
+bool MappedOwner::Has(std::size_t box, std::uint64_t time) const {
+  if (!layout_.on_demand) return true;
+  const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
+  for (std::uint32_t slot = 0; slot < layout_.slots; ++slot) {
+    if (header.of_slots.at(slot).time == time && ArraysOf(memory_, layout_, slot)[box].address != 0) return true;
+  }
+  return false;
 }
 
 Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const {
@@ -208,16 +234,21 @@ Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, c
     const OwnerSlot& of = header.of_slots.at(slot);
     const std::uint64_t generation = of.generation.load(std::memory_order_acquire);
     if (generation % 2 != 0 || of.time != time) continue;
-    if (const std::uint64_t array = ArraysOf(memory_, layout_, slot)[box]; array != 0) {
+    const HeldArray& held = ArraysOf(memory_, layout_, slot)[box];
+    const std::uint64_t made = held.generation.load(std::memory_order_acquire);
+    if (const std::uint64_t array = held.address.load(std::memory_order_acquire); array != 0) {
       copied = CopyProcessSamples(place_.pid, layout_.samples, array + skipped, from.strides, part.size(), out);
       // Afterwards: a process that is still there was there all the time, so that no other one had its id.
       if (copied.ok()) copied = CheckProcess();
+    } else if (layout_.on_demand) {
+      copied = NotMade(box);
     } else {
       const std::byte* const begin = memory_.data() + BeginOfSlot(layout_, slot);
       CopySamples(layout_.samples, begin + from.offset + skipped, from.strides, part.size(), out);
     }
     std::atomic_thread_fence(std::memory_order_acquire);
-    if (of.generation.load(std::memory_order_relaxed) == generation) return copied;
+    if (of.generation.load(std::memory_order_relaxed) != generation) continue;
+    return held.generation.load(std::memory_order_relaxed) == made ? copied : NotMade(box);
   }
   return Status::Unavailable(fmt::format("time {} is not held any more: the owner has gone on", time));
 }

@@ -2,12 +2,15 @@
 //
 //   header    what is held (OwnerLayout), and for each slot its generation and time
 //   boxes     one HeldBox after the other
-//   arrays    for each slot and box: where its samples lie in the owner's own memory; 0: in the slot
+//   arrays    for each slot and box: where its samples lie in the owner's own memory; 0: in the slot, or not made
 //   slots     each has room for all boxes at one time, and begins at a page
 //
 // The owner writes a time into a slot while readers read another one. A slot's generation is odd while it is written and rises with each
 // use. A reader copies samples and looks at the generation before and after: another one means that what it has copied may be anything.
 // Samples in the owner's own memory are copied by the kernel (process_memory.h).
+//
+// An owner may make boxes on demand. Then slots have no memory, and each box of a slot is made and dropped while the slot keeps its time.
+// It has a generation of its own, which rises whenever it is made or dropped: readers look at that, too.
 #pragma once
 
 #include <array>
@@ -44,6 +47,7 @@ struct OwnerLayout {
   std::vector<HeldBox> boxes = {};
   std::uint32_t slots = 2;
   std::uint64_t slot_bytes = 0;
+  bool on_demand = false;  // boxes are made when somebody asks for them: slots have no memory, offsets are 0
 
   // Gives each box a place without gaps, x fastest, one after the other.
   void PlaceDense();
@@ -54,7 +58,7 @@ struct OwnerLayout {
 
 struct OwnerHeader;
 
-// The owner's end. One thread writes.
+// The owner's end. One thread at a time writes.
 class OwnerMemory {
  public:
   // Errors of OwnerLayout::Check and SealedMemory::Create. `incarnation`: random; readers name it.
@@ -68,6 +72,9 @@ class OwnerMemory {
   // All of it is written; `time` is not 0. `arrays`: for each box where the first sample of what is held of it lies, if not in the slot
   // (null); or nothing. They do not change until the next Begin of the slot.
   void Commit(std::uint32_t slot, std::uint64_t time, double simulated, std::span<const std::byte* const> arrays = {});
+  // Of a layout on demand: the box is made, and its first sample lies at `array`; or, null, it is dropped: readers notice before this
+  // returns. Each Begin drops all boxes of the slot.
+  void Make(std::uint32_t slot, std::size_t box, const std::byte* array);
 
  private:
   OwnerMemory(SealedMemory memory, const OwnerLayout& layout) : memory_(std::move(memory)), layout_(layout) {}
@@ -93,9 +100,12 @@ class MappedOwner {
   static Result<std::shared_ptr<const MappedOwner>> Open(const OwnerPlace& place);
 
   const OwnerLayout& layout() const { return layout_; }
-  // False: this time is in arrays of the owner, and the system does not let this process read them.
+  // False: this time is in arrays of the owner, or boxes are made on demand, and the system does not let this process read them.
   bool Reaches(std::uint64_t time) const;
-  // The samples of `part` of what box number `box` holds. Unavailable: no slot has this time any more, or as of ReadProcessMemory.
+  // Whether samples of this box can be read now. False: it is not made.
+  bool Has(std::size_t box, std::uint64_t time) const;
+  // The samples of `part` of what box number `box` holds. Unavailable: no slot has this time any more, the box is not made, or as of
+  // ReadProcessMemory.
   Status Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const;
 
  private:

@@ -80,6 +80,7 @@ struct SourceInfo {
   // Where more times may come: the state of the folder of such files before they were counted, or of a store behind an address. Null:
   // `files` tell.
   std::shared_ptr<const FileStamp> growth = {};
+  bool on_demand = false;                 // others make its voxels when somebody asks for them, and drop them (VolumeSource::Make)
   std::string owned = {};                 // others hold its voxels (data/owned): the text by which any process opens it, to keep no copy
   std::string folder = {};                // whose other files hold the chunks, an object each; empty: `files` hold them
   std::optional<StoredAxes> stored = {};  // none: a source does not tell
@@ -122,6 +123,9 @@ struct BoxRoom {
   bool exact = false;               // samples are those of SourceInfo::exact, not of the level's type
 };
 
+// Whether a process gets voxels of a source that others hold (data/owned).
+enum class Reach : std::uint8_t { kNever, kOnceMade, kNow };
+
 class VolumeSource {
  public:
   VolumeSource() = default;
@@ -135,10 +139,13 @@ class VolumeSource {
   // Null: it must be opened for itself, since its format has metadata of each; or there is no such.
   virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
 
-  // Whether Read gets the voxels of this box of level 0. False, of what others hold (data/owned): another process must be asked.
-  virtual bool Reaches(const Box& /*box*/) const { return true; }
+  // Whether Read gets the voxels of this box of level 0. If not, of what others hold (data/owned): another process must be asked.
+  virtual Reach Reaches(const Box& /*box*/) const { return Reach::kNow; }
 
   using ReadDone = std::function<void(Status)>;
+  // Of a source that is made on demand: has all voxels of the box made, each where it is held. Some may be dropped again before the others
+  // are made. Calls `done` exactly once, on any thread, perhaps before this returns. Errors of who makes them.
+  virtual void Make(const Box& /*box*/, ReadDone done) { done(Status::Ok()); }
   // Fills `out` with the samples of `box`, of the level's type or, if out.exact, as they are stored, and writes nothing between its rows.
   // `box` is not empty and lies inside the level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay
   // until then. Once `stop` is told to stop, what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of

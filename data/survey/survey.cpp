@@ -11,7 +11,7 @@ namespace slabstream {
 namespace {
 
 // Blocks of the source, or several of them together, spread evenly: about `most` bytes in all.
-std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
+std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most, std::size_t places) {
   constexpr std::size_t kLeastBytes = 1U << 20;
   const Box bounds = level.description.geometry.bounds();
   Index3 block = level.block;
@@ -20,7 +20,7 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   }
   // Of a block that is larger than the sample, a part is enough.
   for (const auto bytes = [&] { return std::int64_t(CountIn(block) * BytesPerSample(level.description.type)); };
-       bytes() > std::max(most, 2 * kPieceBytes);) {
+       bytes() > std::max(most, 2 * kPieceBytes) / std::int64_t(places);) {
     std::int32_t& longest = block[*std::ranges::max_element(kAxes, {}, [&](Axis axis) { return block[axis]; })];
     longest = (longest + 1) / 2;
   }
@@ -28,7 +28,7 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   const Index3 counts = (bounds.end + block - Uniform(1)) / block;
   const std::size_t all = CountIn(counts);
   const double share = std::min(1.0, double(most) / double(level.description.voxel_bytes()));
-  const auto count = std::clamp<std::size_t>(std::size_t(share * double(all)), 1, all);
+  const auto count = std::clamp<std::size_t>(std::size_t(share * double(all)), std::min(places, all), all);
   // One of each stretch of them: each time at another place in it, or rows of blocks as long as a stretch would give the same column.
   constexpr double kGoldenRatio = 0.6180339887498949;
   std::vector<Box> sample;
@@ -43,6 +43,12 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
 
 }  // namespace
 
+SurveyBytes SurveyBytesOf(const SourceInfo& info, bool far) {
+  if (info.on_demand) return kMadeSurvey;
+  // Each time of what others hold is surveyed, and perhaps they are far.
+  return far || !info.owned.empty() ? kFarSurvey : SurveyBytes();
+}
+
 Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most, ReadProgress* progress) {
   const std::vector<SourceLevel>& levels = source.info().levels;
   const auto bytes = [&](std::size_t level) { return levels[level].description.voxel_bytes(); };
@@ -52,7 +58,7 @@ Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most, ReadP
   }
   const VolumeDescription& description = levels[level].description;
   const bool whole = bytes(level) <= most.exact;
-  const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], most.coarse);
+  const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], most.coarse, most.places);
 
   PiecewiseSummary pieces(description);
   if (progress != nullptr) {

@@ -23,9 +23,14 @@ namespace slabstream {
 inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes = std::int64_t{128} << 20;
 struct SurveyBytes {
   std::int64_t exact = kExactBytes, coarse = kSurveyBytes;
+  std::size_t places = 1;  // that a sample is taken from, at least, if the level has as many
 };
 // The survey of a source behind an address reads less: the first picture waits until the bytes have come.
 inline constexpr SurveyBytes kFarSurvey = {.exact = 8 << 20, .coarse = 8 << 20};
+// Of voxels that are made on demand, a sample costs as much as the block that it lies in.
+inline constexpr SurveyBytes kMadeSurvey = {.exact = 8 << 20, .coarse = 8 << 20, .places = 8};
+// `far`: the source is behind an address.
+SurveyBytes SurveyBytesOf(const SourceInfo& info, bool far);
 
 struct Survey {
   int level = 0;        // the level that `summary` describes

@@ -20,10 +20,13 @@ import time as clock
 import weakref
 from typing import Any, Mapping, Sequence
 
+import dask
 import dask.array
 import distributed
 import numpy
+import numpy.typing
 from dask.core import flatten
+from dask.optimization import cull
 from distributed.comm import get_address_host
 from distributed.diagnostics.plugin import SchedulerPlugin, WorkerPlugin
 
@@ -43,7 +46,9 @@ _MOST_TRIES = 8            # of a picture, if owners go
 _TRY_AGAIN_SECONDS = 0.25  # once longer for each try: until Dask knows that a worker of its has gone
 _MOST_ARRAYS = 4           # that are kept for further pictures
 _MEMORY_PART = 3           # of a Dask worker's memory: for the worker beside it
+_KEPT_PART = 4             # of the same: for chunks of a lazy array
 _LEAST_MEMORY = 1 << 30
+_CLOSE_SECONDS = 1.0       # that an event loop waits for an owner to leave
 _MOST_BOXES, _MOST_BOXES_OF_ONE = 65536, 4096  # docs/wire.md, section 8
 
 Box = tuple[tuple[int, int], ...]  # (begin, end) along z, y and x
@@ -106,6 +111,7 @@ class _Beside(WorkerPlugin):
 
     def setup(self, worker: Any) -> None:
         self.owners: dict[str, Owner] = {}
+        self._lock, self._client = threading.Lock(), None
         memory, of_dask = self._memory, worker.memory_manager.memory_limit
         if memory is None and of_dask:
             memory = f"{max(of_dask // _MEMORY_PART, _LEAST_MEMORY) >> 20}M"
@@ -114,10 +120,26 @@ class _Beside(WorkerPlugin):
         self._program = _Program("slabstream-worker", self._files, "--threads", str(worker.state.nthreads), *limit, *service)
         self.service = f"{self._program.folder}/owner.json" if self._files else self._endpoint
 
+    def client_of(self, worker: Any) -> Any:
+        """A client of the scheduler that computes chunks. Not for the event loop."""
+        with self._lock:
+            if self._client is None:
+                self._client = distributed.Client(worker.scheduler.address, security=worker.security, set_as_default=False)
+            return self._client
+
+    def leave(self, dataset: str) -> None:
+        """Waits little: an owner ends once the event loop goes on, perhaps."""
+        owner = self.owners.pop(dataset, None)
+        if owner is not None:
+            closing = threading.Thread(target=owner.close, daemon=True)
+            closing.start()
+            closing.join(_CLOSE_SECONDS)
+
     def teardown(self, worker: Any) -> None:
-        for owner in self.owners.values():
-            owner.close()
-        self.owners.clear()
+        for dataset in list(self.owners):
+            self.leave(dataset)
+        if self._client is not None:
+            threading.Thread(target=self._client.close, daemon=True).start()
         self._program.end()
 
 
@@ -133,6 +155,14 @@ class _Field:
     origin: tuple[float, ...]
     chunks: Mapping[str, Sequence[tuple[Any, Box]]]  # by the address of a Dask worker: keys and boxes of its chunks
 
+    def owner_at(self, dask_worker: Any, kind: Any = Owner, **options: Any) -> Any:
+        boxes = [box for _, box in self.chunks[dask_worker.address]]
+        owner = kind(self.dataset, self.shape, self.dtype, boxes, owner=list(self.chunks).index(dask_worker.address),
+                     owners=len(self.chunks), spacing=self.spacing, origin=self.origin,
+                     service=dask_worker.plugins[self.plugin].service, **options)
+        dask_worker.plugins[self.plugin].owners[self.dataset] = owner
+        return owner
+
 
 def _in_place(chunk: Any, dtype: str) -> Any:
     """The chunk, or a copy if its samples cannot be read where they lie."""
@@ -146,24 +176,95 @@ def _in_place(chunk: Any, dtype: str) -> Any:
 
 def _own(field: _Field, dask_worker: Any) -> None:
     """On a Dask worker: becomes the owner of its chunks."""
-    plugin, chunks = dask_worker.plugins[field.plugin], field.chunks[dask_worker.address]
+    chunks = field.chunks[dask_worker.address]
     missing = [key for key, _ in chunks if key not in dask_worker.data]
     if missing:
         raise Unavailable(f"chunk {missing[0]} is not at {dask_worker.address} any more")
     arrays = [_in_place(dask_worker.data[key], field.dtype) for key, _ in chunks]
     item = numpy.dtype(field.dtype).itemsize
     strides = [[step if length > 1 else item for length, step in zip(array.shape, array.strides)] for array in arrays]
-    owner = Owner(field.dataset, field.shape, field.dtype, [box for _, box in chunks], strides=strides,
-                  owner=list(field.chunks).index(dask_worker.address), owners=len(field.chunks), spacing=field.spacing,
-                  origin=field.origin, service=plugin.service)
-    plugin.owners[field.dataset] = owner
-    owner.publish(1, arrays, copy=False)
+    field.owner_at(dask_worker, strides=strides).publish(1, arrays, copy=False)
+
+
+class _Chunks:
+    """Has Dask compute the chunks of a lazy array that a Dask worker owns, when they are asked for. It keeps what Dask computes as long as
+    the arrays of make()."""
+
+    def __init__(self, field: _Field, graph: Mapping[Any, Any], dask_worker: Any):
+        self._field, self._graph, self._dask_worker = field, graph, dask_worker
+        self._keys = [key for key, _ in field.chunks[dask_worker.address]]
+        self.computed: collections.Counter[Any] = collections.Counter()  # by key; for tests
+        self._ended, self._happened = False, threading.Event()
+
+    def end(self) -> None:
+        """From any thread: make() returns soon, and fails."""
+        self._ended = True
+        self._happened.set()
+
+    def _wait(self, holds: Any) -> None:
+        while not holds() and not self._ended:
+            self._happened.wait()
+            self._happened.clear()
+        if self._ended:
+            raise Unavailable(f"{self._dask_worker.address} does not own the array any more")
+
+    def make(self, box: int, _: int) -> numpy.typing.NDArray[Any]:
+        key, worker = self._keys[box], self._dask_worker
+        self.computed[key] += 1
+        graph, _ = cull(self._graph, [key])
+        (future,) = worker.plugins[self._field.plugin].client_of(worker).get(
+            graph, [key], sync=False, workers=[worker.address], allow_other_workers=True)
+        future.add_done_callback(lambda _: self._happened.set())
+        self._wait(future.done)
+        if future.status == "error":
+            error = future.exception()
+            kind = Unavailable if isinstance(error, (distributed.KilledWorker, OSError)) else InvalidArgument
+            raise kind(f"chunk {key}: {type(error).__name__}: {error}")
+        if future.status != "finished":
+            raise Unavailable(f"chunk {key} was {future.status} while it was computed")
+        found: list[Any] = []
+
+        def look() -> None:  # on the event loop, whose data it is
+            found.append(worker.data.get(key))
+            self._happened.set()
+
+        worker.loop.add_callback(look)
+        self._wait(lambda: found)
+        chunk = future.result() if found[0] is None else found[0]
+        array = numpy.ascontiguousarray(_in_place(chunk, self._field.dtype))
+        kept = array.view(_KeptArray)
+        kept.future = future
+        return kept
+
+
+class _KeptArray(numpy.ndarray[Any, Any]):
+    """An array that keeps what Dask has computed for it."""
+
+    future: Any = None
+
+
+class _LazyOwner(Owner):
+    """An owner that ends while a chunk is being computed."""
+
+    chunks: _Chunks | None = None
+
+    def close(self) -> None:
+        if self.chunks is not None:
+            self.chunks.end()
+        super().close()
+
+
+def _own_lazy(field: _Field, graph: Mapping[Any, Any], dask_worker: Any) -> None:
+    """On a Dask worker: becomes the owner of chunks that it has computed when they are asked for."""
+    chunks = _Chunks(field, graph, dask_worker)
+    limit = dask_worker.memory_manager.memory_limit
+    owner = field.owner_at(dask_worker, _LazyOwner, make=chunks.make, budget=limit // _KEPT_PART if limit else _LEAST_MEMORY)
+    owner.chunks = chunks
+    owner.publish(1)
 
 
 def _leave(plugin: str, dataset: str, dask_worker: Any) -> None:
-    owner = dask_worker.plugins[plugin].owners.pop(dataset, None)
-    if owner is not None:
-        owner.close()
+    dask_worker.plugins[plugin].leave(dataset)
 
 
 def _told(plugin: str, dask_scheduler: Any) -> Any:
@@ -232,9 +333,9 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         """A picture of a dask.array.Array, or of an xarray.DataArray of one. Axes, `spacing`, `origin` and coordinates are as of
         slabstream.load(). `time`: a number, of an array with four axes.
 
-        Chunks of a persisted array stay where they are. Any other array is computed by Dask first, and stays for further pictures until
-        nobody has it any more, or until three others have been shown. If chunks go meanwhile, the picture comes once Dask has computed them
-        again; it fails if Dask cannot."""
+        Chunks of a persisted array stay where they are. Of any other array, Dask computes the chunks that pictures need, and drops them
+        when others need their memory. The array stays known until nobody has it any more, or until three others have been shown. If chunks
+        go meanwhile, the picture comes once Dask has computed them again; it fails if Dask cannot."""
         volume = volume_of(array if time is None else at_time(array, time), spacing, origin)
         if not isinstance(volume.samples, dask.array.Array):
             raise InvalidArgument(f"a {type(array).__name__} is not an array of Dask: slabstream.render() takes it")
@@ -276,32 +377,56 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
         check_chunks(samples.npartitions // max(len(self._client.nthreads()), 1))  # at least; before anything is computed
         keys = list(flatten(samples.__dask_keys__()))
         futures = {future.key: future for future in distributed.futures_of(samples)}
-        if not all(key in futures for key in keys):
-            futures = {future.key: future for future in distributed.futures_of(self._client.persist(samples))}
+        boxes = list(zip(keys, _boxes(samples.chunks)))
+        lazy = not all(key in futures for key in keys)
+        chunks = self._deal(boxes) if lazy else self._find(boxes, futures)
+        check_chunks(max(map(len, chunks.values())))
+        dtype = "uint8" if samples.dtype == bool else samples.dtype.newbyteorder("=").name
+        field = _Field(self._plugin, f"dask-{os.getpid()}-{next(self._numbers)}", samples.shape, dtype, spacing, origin, chunks)
+        self._held[name] = field, list(futures.values())  # not the array: it may be the caller's, which would never go
+        try:
+            if lazy:
+                graph = dict(dask.optimize(samples)[0].__dask_graph__())
+                for worker, of_worker in chunks.items():
+                    needed, _ = cull(graph, [key for key, _ in of_worker])
+                    # What is persisted of it stays known to the scheduler by its keys.
+                    needed = {key: task for key, task in needed.items() if not isinstance(task, distributed.Future)}
+                    self._run(_own_lazy, field, needed, workers=[worker])
+            else:
+                self._run(_own, field, workers=list(chunks))
+            self._wait_for(name)
+        except BaseException:
+            self._forget(name)
+            raise
+
+    def _deal(self, boxes: Sequence[tuple[Any, Box]]) -> dict[str, list[tuple[Any, Box]]]:
+        """Chunks that nobody has yet, in contiguous ranges, to all Dask workers."""
+        workers = sorted(self._client.nthreads())[: len(boxes)]
+        if not workers:
+            raise Unavailable("there is no Dask worker")
+        ends = [len(boxes) * i // len(workers) for i in range(len(workers) + 1)]
+        return {worker: list(boxes[begin:end]) for worker, begin, end in zip(workers, ends, ends[1:])}
+
+    def _find(self, boxes: Sequence[tuple[Any, Box]], futures: Mapping[Any, Any]) -> dict[str, list[tuple[Any, Box]]]:
+        """Chunks of a persisted array, where they are."""
         distributed.wait(list(futures.values()))
         who = self._client.who_has(list(futures.values()))
         chunks: dict[str, list[tuple[Any, Box]]] = {}
-        for key, box in zip(keys, _boxes(samples.chunks)):
+        for key, box in boxes:
             if futures[key].status == "error":
                 futures[key].result()  # raises what the computation has raised
             if not who.get(key):
                 raise Unavailable(f"chunk {key} is on no Dask worker")
             worker = min(who[key], key=lambda address: len(chunks.get(address, ())))
             chunks.setdefault(worker, []).append((key, box))
-        check_chunks(max(map(len, chunks.values())))
-        dtype = "uint8" if samples.dtype == bool else samples.dtype.newbyteorder("=").name
-        field = _Field(self._plugin, f"dask-{os.getpid()}-{next(self._numbers)}", samples.shape, dtype, spacing, origin, chunks)
-        self._held[name] = field, list(futures.values())  # not the array: it may be the caller's, which would never go
-        try:
-            for answer in self._client.run(_own, field, workers=list(chunks), on_error="return").values():
-                if isinstance(answer, SlabstreamError):
-                    raise answer
-                if isinstance(answer, Exception):
-                    raise Unavailable(f"a Dask worker does not answer: {answer}")
-            self._wait_for(name)
-        except BaseException:
-            self._forget(name)
-            raise
+        return chunks
+
+    def _run(self, function: Any, *arguments: Any, workers: Sequence[str]) -> None:
+        for answer in self._client.run(function, *arguments, workers=workers, on_error="return").values():
+            if isinstance(answer, SlabstreamError):
+                raise answer
+            if isinstance(answer, Exception):
+                raise Unavailable(f"a Dask worker does not answer: {answer}")
 
     def _is_there(self, name: str) -> bool:
         """The coordinator has the dataset of a held array."""

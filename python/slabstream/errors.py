@@ -67,6 +67,11 @@ class Internal(SlabstreamError):
 _KINDS = (Internal, InvalidArgument, NotFound, Unavailable, ResourceExhausted, DataLoss, Cancelled, DeadlineExceeded, Internal)  # by code
 
 
+def code_of(error: BaseException) -> int:
+    """The code of a Status that says what a caller's function has raised."""
+    return _KINDS.index(type(error), 1) if type(error) in _KINDS else _KINDS.index(InvalidArgument)
+
+
 def error_of(code: int, message: str) -> SlabstreamError:
     """The exception for a Status of the wire. The service's sentence names fields and options of the command line: here they are keywords."""
     return (_KINDS[code] if 0 <= code < len(_KINDS) else Internal)(in_keywords(message))

@@ -2,6 +2,7 @@
 """Pictures of Dask's arrays are those of the same arrays in numpy, wherever chunks lie, and while workers come and go (deploy/check dask)."""
 from __future__ import annotations
 
+import contextlib
 import gc
 import ipaddress
 import os
@@ -57,6 +58,29 @@ def in_place(dask_worker):
     return all(any(np.shares_memory(array, chunk) for chunk in chunks) for array in shown)
 
 
+def lazy_chunks(dask_worker):
+    return [owner.chunks for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values() if hasattr(owner, "chunks")]
+
+
+def computed(dask_worker):
+    return {key: count for chunks in lazy_chunks(dask_worker) for key, count in chunks.computed.items()}
+
+
+def forget_computed(dask_worker):
+    for chunks in lazy_chunks(dask_worker):
+        chunks.computed.clear()
+
+
+def kept_bytes(dask_worker):
+    return max((sum(array.nbytes for array in owner._made.values()) for plugin in dask_worker.plugins.values()
+                for owner in getattr(plugin, "owners", {}).values()), default=0)
+
+
+def set_kept_part(part):
+    before, sd._KEPT_PART = sd._KEPT_PART, part
+    return before
+
+
 class DaskTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -97,16 +121,67 @@ class DaskTest(unittest.TestCase):
             with self.subTest(what):
                 self.assert_like(sd.render(turned, **VIEW), np.ascontiguousarray(turned.compute()))
 
-    def test_a_lazy_array_is_computed_once_for_several_pictures(self):
+    def test_a_lazy_array_is_given_up_with_its_chunks(self):
         lazy = da.from_array(blobs(), 30).map_blocks(lambda block: block * 2)
         held = len(self.client.who_has())
-        self.assert_like(sd.render(lazy, **VIEW), 2 * blobs())
-        tasks = len(self.client.who_has())
-        self.assert_like(sd.render(lazy, **VIEW | {"azimuth": 60}), 2 * blobs(), azimuth=60)
-        self.assertEqual(len(self.client.who_has()), tasks)
+        for azimuth in (25, 60):
+            self.assert_like(sd.render(lazy, **VIEW | {"azimuth": azimuth}), 2 * blobs(), azimuth=azimuth)
+        self.assertGreater(sum(count for counts in self.client.run(computed).values() for count in counts.values()), 0)
         del lazy
         gc.collect()
         wait_until(lambda: len(self.client.who_has()) <= held, "chunks of a lazy array are given up with it")
+
+    def test_a_lazy_array_larger_than_what_is_kept(self):
+        array = blobs((64, 64, 64))
+        lazy = da.from_array(array, 16).map_blocks(lambda block: block + 1) - 1  # 64 chunks of 16 KiB, of which each worker keeps two
+        with self.keeping(2 * 16**3 * 4):
+            for azimuth in (25, 200):
+                self.assert_like(sd.render(lazy, **VIEW | {"azimuth": azimuth}), array, azimuth=azimuth)
+            counts = self.computed()
+            self.assertEqual(len(counts), 64)
+            self.assertGreater(max(counts.values()), 1, "dropped chunks come again")
+            self.assertLessEqual(max(self.client.run(kept_bytes).values()), 3 * 16**3 * 4)
+
+            # Where it is clipped, no chunk behind the cut is needed.
+            for clip_box, expected in (("0:64,0:64,20:28v", {(1, y, x) for y in range(4) for x in range(4)}), ("20:28,36:44,4:12v", {(0, 2, 1)})):
+                self.client.run(forget_computed)
+                self.assert_like(sd.render(lazy, clip_box=clip_box, **VIEW), array, clip_box=clip_box)
+                self.assertLessEqual({key[1:] for key in self.computed()}, expected)
+
+    def test_a_chunk_that_raises_fails_in_one_line(self):
+        def fail(block):
+            raise ValueError("the sea is rough")
+
+        lazy = da.from_array(blobs(), 30).map_blocks(fail, dtype=np.float32)
+        with self.assertRaisesRegex(ss.InvalidArgument, "owner [0-2] of 3: chunk .*: ValueError: the sea is rough") as raised:
+            sd.render(lazy, **VIEW)
+        self.assertNotIn("\n", str(raised.exception))
+
+    def test_persisted_parts_of_a_lazy_array_stay(self):
+        array = blobs()
+        persisted = da.from_array(array, 30).persist()
+        self.assert_like(sd.render(persisted * 2, **VIEW), 2 * array)
+        self.assert_like(sd.render(persisted[::2], spacing=(2, 1, 1), **VIEW), array[::2], spacing=(2, 1, 1))
+
+    def test_a_killed_worker_costs_no_picture_of_a_lazy_array(self):
+        array = blobs()
+        lazy = da.from_array(array, 20) * 1
+        self.assert_like(sd.render(lazy, **VIEW), array)
+        os.kill(next(iter(self.client.run(os.getpid).values())), signal.SIGKILL)
+        self.assert_like(sd.render(lazy, **VIEW | {"azimuth": 10}), array, azimuth=10)
+        self.client.wait_for_workers(3)
+
+    def computed(self):
+        return {key: count for counts in self.client.run(computed).values() for key, count in counts.items()}
+
+    @contextlib.contextmanager
+    def keeping(self, kept):
+        """Each Dask worker keeps so many bytes of chunks of lazy arrays that are shown meanwhile."""
+        before = set(self.client.run(set_kept_part, (2 << 30) // kept).values())
+        try:
+            yield
+        finally:
+            self.client.run(set_kept_part, *before)
 
     def test_an_array_that_nobody_has_is_given_up(self):
         array = da.from_array(blobs(), 30).persist()

@@ -65,7 +65,7 @@ bool DecodeOwners(std::span<const std::byte> bytes) {
 
 std::vector<FuzzBytes> OwnersSeeds() {
   std::vector<FuzzBytes> seeds;
-  for (const char* const text : {"owned:rho:1f:@9.1.2.3,@8.4.5.6,7.8.9,", "owned:a.b-c:0:"}) {
+  for (const char* const text : {"owned:rho:1f:10.10.10:@9.1.2.3,@8.4.5.6,7.8.9,", "owned:a.b-c:0:1.ff.20:"}) {
     seeds.push_back(FuzzSeed().Put(std::uint8_t{0}).Put(std::string_view(text)).bytes());
   }
   for (const SampleType type : {SampleType::kUint16, SampleType::kFloat64}) {
@@ -73,6 +73,8 @@ std::vector<FuzzBytes> OwnersSeeds() {
     layout.boxes = {{.box = {{0, 0, 0}, {3, 5, 4}}, .held = {{0, 0, 0}, {4, 5, 4}}},
                     {.box = {{3, 0, 0}, {6, 5, 4}}, .held = {{2, 0, 0}, {6, 5, 4}}}};
     layout.PlaceDense();
+    layout.on_demand = type == SampleType::kUint16;
+    if (layout.on_demand) layout.slot_bytes = 0;
     const auto owner = OwnerMemory::Create(kIncarnation, layout).value();
     (void)owner->Begin(1);
     owner->Commit(1, 1, 0.5);

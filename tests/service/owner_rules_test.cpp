@@ -26,9 +26,10 @@ using testing::MatchesRegex;
 constexpr Epoch kEpoch = 9;
 constexpr Index3 kSides = {512, 512, 32};  // eight times what an owner is asked for at once
 
-RegisterOwner Registration(std::uint32_t owner, std::uint64_t incarnation) {
+RegisterOwner Registration(std::uint32_t owner, std::uint64_t incarnation, bool on_demand = false) {
   RegisterOwner m{.incarnation = incarnation, .dataset = "rho", .owner = owner, .owners = 2, .samples = "uint8"};
   m.description.geometry.size = kSides;
+  m.on_demand = on_demand;
   m.boxes = {{{0, 0, std::int32_t(owner) * 16}, {512, 512, std::int32_t(owner) * 16 + 16}}};
   return m;
 }
@@ -48,9 +49,9 @@ class OwnerRulesTest : public testing::Test {
     return owners_->Hear(from, std::move(message), payload, now_);
   }
   // Both owners, at time 5.
-  void Register() {
+  void Register(bool on_demand = false) {
     for (const std::uint32_t owner : {0U, 1U}) {
-      EXPECT_EQ(Of<OwnerWelcome>(Hear(owner + 1, Registration(owner, owner + 100))).size(), 1U);
+      EXPECT_EQ(Of<OwnerWelcome>(Hear(owner + 1, Registration(owner, owner + 100, on_demand))).size(), 1U);
       const Owners::News news = Hear(owner + 1, OwnerTime{kEpoch, 5, 0});
       ASSERT_EQ(news.datasets.size(), owner);
       if (owner == 1) open_ = news.datasets[0].came->open;
@@ -256,6 +257,44 @@ TEST_F(OwnerRulesTest, ReadsFailInOneLine) {
     owners_->Tend(now_);
   }
   EXPECT_THAT(AwaitRead().message(), MatchesRegex("\"rho\": owner [01] of 2 answers no request for voxels"));
+}
+
+TEST_F(OwnerRulesTest, AnOwnerThatMakesABoxIsWaitedFor) {
+  Register(true);
+  EXPECT_EQ(Of<OwnerRefused>(Hear(3, Registration(1, 300))).size(), 1U) << "all owners or none make boxes on demand";
+  opened_ = Open().value();
+  EXPECT_TRUE(opened_->info().on_demand);
+  EXPECT_EQ(opened_->info().levels[0].block, (Index3{512, 512, 16}));
+  int ended = 0;
+  Status made;
+  const auto done = [&](const Status& status) {
+    ++ended;
+    made = status;
+  };
+  opened_->Make({{0, 0, 0}, kSides}, done);
+  opened_->Make({{0, 0, 0}, {8, 8, 8}}, done);
+  const auto asked = Of<ChunkRequest>(owners_->Tend(now_));
+  ASSERT_EQ(asked.size(), 2U) << "each box once";
+  for (int i = 0; i < 60; ++i) {
+    now_ += seconds(1);
+    for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{.epoch = kEpoch, .making = true});
+    owners_->Tend(now_);
+  }
+  EXPECT_EQ(ended, 0);
+  for (const auto& [peer, request] : asked) {
+    EXPECT_TRUE(request.in_place);
+    if (peer == 1) {
+      Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
+      const Bytes payload = PackChunk(Bytes(), Codec::kRaw, chunk);
+      Hear(peer, chunk, payload);
+      EXPECT_EQ(ended, 1);
+      EXPECT_TRUE(made.ok()) << made.message();
+    } else {
+      Hear(peer, ChunkRefused{kEpoch, request.dataset, request.box, 0, Status::InvalidArgument("the sea is rough")});
+      EXPECT_EQ(made.message(), "\"rho\": owner 1 of 2: the sea is rough");
+    }
+  }
+  EXPECT_EQ(ended, 2);
 }
 
 TEST_F(OwnerRulesTest, ReadsEndWithTheCoordinator) {

@@ -195,7 +195,10 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         ++in_flight;
         if (!padded.requested) padded.report.begin = now;
         padded.requested = true;
-        actions.push_back(SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
+        const auto failed = padded.failures.find(chunk);
+        const bool in_place = padded.stored_at != nullptr && (failed == padded.failures.end() || failed->second < kMostInPlace);
+        actions.push_back(
+            SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk, in_place}, padded.stored_at});
       }
     }
   }
@@ -212,6 +215,7 @@ void BoxFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actio
   HeldBox* padded = FindRequested(chunk.dataset, place);
   if (padded == nullptr) return;  // a duplicate, or nobody waits for it now
   InFlight& request = in_flight_.at({padded->key.generation, place});
+  if (chunk.raw_bytes == 0) return Retry(padded->key.generation, place, Status::Unavailable("voxels that were made were dropped unread"));
   if (chunk.chunk == kFirstCellChunk) {
     SetCellBytes(*padded, chunk.cell_bytes);
     in_flight_bytes_ -= request.bytes - padded->BytesOf(place);
@@ -278,8 +282,10 @@ void BoxFetcher::ExpireRequests(Time now) {
   for (const auto& [generation, chunk] : expired) {
     const HeldBox* const padded = Find(generation);
     const std::string from = padded == nullptr || padded->stored_at == nullptr ? "" : padded->stored_at->source + ": ";
+    const bool of_owners = padded != nullptr && padded->stored_at != nullptr && NamesOwners(padded->stored_at->source);
     Retry(generation, chunk,
-          Status::Unavailable(fmt::format("{}chunk {} of a padded box did not arrive within {} ms", from, chunk.chunk, waited)));
+          Status::Unavailable(fmt::format("{}chunk {} of a padded box did not arrive within {} ms", from, chunk.chunk, waited)),
+          !of_owners);
   }
 }
 
@@ -291,14 +297,14 @@ Time BoxFetcher::NextExpiry() const {
   return next;
 }
 
-void BoxFetcher::Retry(Generation generation, const ChunkPlace& chunk, const Status& why) {
+void BoxFetcher::Retry(Generation generation, const ChunkPlace& chunk, const Status& why, bool counts) {
   const auto request = in_flight_.find({generation, chunk});
   in_flight_bytes_ -= request->second.bytes;
   in_flight_.erase(request);
   HeldBox* padded = Find(generation);
   if (padded == nullptr) return;
   padded->missing.push_back(chunk);
-  if (++padded->failures[chunk] >= config_.chunk_attempts) {
+  if (counts && ++padded->failures[chunk] >= config_.chunk_attempts) {
     GiveUp(*padded, Status(why.code(), fmt::format("{}, {} times", why.message(), config_.chunk_attempts)));
   }
 }

@@ -6,6 +6,7 @@
 //      by box.
 //   2. RequestChunks, in the order in which padded boxes will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive
 //      within chunk_timeout, or arrives damaged, is requested again, chunk_attempts times; then the padded box is given up (TakeFailures).
+//      Of voxels that owners hold the coordinator knows whether they will come, so they are waited for until it refuses them.
 //   3. complete(padded box): it can be rendered from. Release when that is done; the padded box stays cached.
 // Clients that wait for voxels at the same time have equal parts of the credit.
 // Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then others as far as they exceed
@@ -98,6 +99,8 @@ class BoxFetcher {
   std::size_t chunk_requests() const { return in_flight_.size(); }
 
  private:
+  // Then samples that are made on demand are sent: in place they were dropped as often before they were read.
+  static constexpr int kMostInPlace = 3;
   static constexpr std::size_t kMostRequests =
       48;  // at a time, of blocks, which may be small: a coordinator queues few more (kMaxQueuedChunks)
 
@@ -157,7 +160,8 @@ class BoxFetcher {
   std::uint64_t most_cached() const { return std::min(config_.cache_bytes, room_); }
   void Unpin(std::span<const Generation> sources);
   void SetCellBytes(HeldBox& padded, std::uint64_t bytes);
-  void Retry(Generation padded, const ChunkPlace& chunk, const Status& why);
+  // `counts`: as one of chunk_attempts.
+  void Retry(Generation padded, const ChunkPlace& chunk, const Status& why, bool counts = true);
   void GiveUp(HeldBox& padded, Status status);
   void RetireCovered(HeldBox& complete);
   void Drop(Generation padded, WorkerActions& actions);

@@ -173,7 +173,8 @@ struct SendControl {
   WorkerToCoordinator message;
 };
 // To the coordinator, unless this worker reads the voxels itself, straight to where the padded box stores them; then only ChunkStored
-// comes.
+// comes. `request.in_place`: if voxels must be made first and this worker can read them then, it may ask for that; a chunk of
+// 0 bytes tells.
 struct SendChunkRequest {
   BoxKey padded;
   ChunkRequest request;

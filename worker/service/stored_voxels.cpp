@@ -104,8 +104,14 @@ struct StoredVoxels::Shared {
   void End(const SendChunkRequest& wanted, VolumeSource& source, const Status& status) {
     const ChunkRequest& request = wanted.request;
     WorkerEvent event = ChunkStored{wanted.padded, request.box, request.chunk, {}, status.ok() ? source.TakeStoredBytes() : 0};
-    if (status.code() == StatusCode::kUnavailable) Lose({wanted.stored->source, wanted.stored->version});
-    if (!status.ok()) {
+    // What was dropped is asked for again.
+    const bool dropped = source.info().on_demand && status.code() == StatusCode::kUnavailable;
+    if (dropped) {
+      event = ChunkStored{wanted.padded, request.box, request.chunk, status};
+    } else if (status.code() == StatusCode::kUnavailable) {
+      Lose({wanted.stored->source, wanted.stored->version});
+    }
+    if (!status.ok() && !dropped) {
       event = MessageReceived{ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, status}, {}};
     }
     const std::lock_guard lock(mutex);
@@ -123,15 +129,18 @@ StoredVoxels::~StoredVoxels() {
   shared_->deliver = nullptr;
 }
 
-bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now) {
+bool StoredVoxels::Read(SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now) {
   const ChunkRequest& request = wanted.request;
   const StoredAt& stored = *wanted.stored;
+  const bool may_ask = std::exchange(wanted.request.in_place, false);
   if (request.chunk != 0) return false;  // not all samples of its box: BoxFetcher asks for none like that
   std::shared_ptr<VolumeSource> source;
   {
     const std::lock_guard lock(shared_->mutex);
     source = shared_->SourceAt(stored, now, shared_);
-    if (source == nullptr || !source->Reaches(request.box)) return false;
+    const Reach reach = source == nullptr ? Reach::kNever : source->Reaches(request.box);
+    wanted.request.in_place = may_ask && reach == Reach::kOnceMade;
+    if (reach != Reach::kNow) return false;
     if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
   const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };

@@ -28,8 +28,8 @@ class StoredVoxels {
   StoredVoxels& operator=(const StoredVoxels&) = delete;
 
   // Begins to read a piece of stored voxels into the padded box, unless that is under way: ChunkStored or ChunkRefused will come. False:
-  // the coordinator must be asked.
-  bool Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now);
+  // the coordinator must be asked; `in_place` of the request then tells whether to have the voxels made is enough.
+  bool Read(SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now);
 
  private:
   struct Shared;  // with reads that outlive this

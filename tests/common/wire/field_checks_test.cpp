@@ -260,8 +260,8 @@ TEST(FieldChecks, Chunks) {
        "ChunkRequest.chunk: 3 is not in [0, 0]"},  // a voxel has at most three samples
   });
   Check<Chunk>({
-      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(0); }, "Chunk.raw_bytes: 0 is not in [1, 1048576]"},
-      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(kChunkBytes + 1); }, "Chunk.raw_bytes: 1048577 is not in [1, 1048576]"},
+      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(0); }, "Chunk.encoded_bytes: 1 is not in [0, 0]"},
+      {[](auto& e) { e.mutable_chunk()->set_raw_bytes(kChunkBytes + 1); }, "Chunk.raw_bytes: 1048577 is not in [0, 1048576]"},
       {[](auto& e) { e.mutable_chunk()->set_encoded_bytes(2); }, "Chunk.encoded_bytes: 2 is not in [1, 1]"},
       {[](auto& e) { e.mutable_chunk()->set_encoded_bytes(0); }, "Chunk.encoded_bytes: 0 is not in [1, 1]"},
   });

@@ -309,7 +309,18 @@ std::vector<RegisterOwner> SamplesOf() {
            .description = Description(),
            .samples = "uint16",
            .steered = {{"feed", 0, 0.1, 0.03}, {std::string(64, '_'), -1e300, 1e300, 1e300}, {"K2", 1, 1, 1}}},
-          {kMax64, kLongName, 4095, 4096, RectilinearDescription(), std::string(16, 's'), {kOneVoxel, kWholeBox}, kMax64, kMax32, kMax32}};
+          {kMax64,
+           kLongName,
+           4095,
+           4096,
+           RectilinearDescription(),
+           std::string(16, 's'),
+           {kOneVoxel, kWholeBox},
+           kMax64,
+           kMax32,
+           kMax32,
+           {},
+           true}};
 }
 
 template <>
@@ -324,7 +335,7 @@ std::vector<OwnerTime> SamplesOf() {
 
 template <>
 std::vector<OwnerPing> SamplesOf() {
-  return {{}, {kMax64, kMax64, kMax64, kMax64}};
+  return {{}, {kMax64, kMax64, kMax64, kMax64, true}};
 }
 
 template <>
@@ -350,13 +361,14 @@ std::vector<OwnerSteered> SamplesOf() {
 template <>
 std::vector<ChunkRequest> SamplesOf() {
   return {{1, 2, 3, kOneVoxel, 0},
-          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1},
+          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1, true},
           {1, 2, 3, kOneVoxel, kFirstCellChunk}};
 }
 
 template <>
 std::vector<Chunk> SamplesOf() {
   return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0},
+          {1, 2, kOneVoxel, 0, Codec::kRaw, 0, 0, 0},
           {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64},
           {1, 2, kOneVoxel, kFirstCellChunk + 2, Codec::kZstd, 5, 4, 0, 2 * kChunkBytes + 5}};
 }

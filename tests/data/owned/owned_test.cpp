@@ -20,10 +20,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <numeric>
 #include <optional>
+#include <thread>
 #include <utility>
 
+#include "common/volume/box_assembly.h"
+#include "common/volume/indices.h"
 #include "common/volume/stored_at.h"
 #include "data/owned/owned_source.h"
 #include "data/owned/process_memory.h"
@@ -85,7 +90,7 @@ class OwnedVolumeOf {
     volume.field.dataset = "rho";
     volume.description = {{.size = size_}, ScalarType::kFloat32, {}};
     volume.exact = {SampleType::kFloat32, {}};
-    volume.ask = [this](std::uint32_t, const Box& box, const std::function<void(Result<Bytes>)>& done) {
+    volume.ask = [this](std::uint32_t, const Box& box, bool, const std::function<void(Result<Bytes>)>& done) {
       ++asked;
       const std::vector<float> samples = Of(box, volume.field.time);
       const auto bytes = std::as_bytes(std::span(samples));
@@ -175,16 +180,16 @@ TEST(OwnedSource, BoxesAreThoseOfOneArrayHereAndAsked) {
       const std::vector<float> expected = of.Of(box, 2);
       EXPECT_EQ(ReadBox(*here, box), expected);
       EXPECT_EQ(of.asked, 0);
-      EXPECT_TRUE(mixed->Reaches(box));
+      EXPECT_EQ(mixed->Reaches(box), Reach::kNow);
       EXPECT_EQ(ReadBox(*mixed, box), expected);
-      if (opened.ok() && (*opened)->Reaches(box)) {
+      if (opened.ok() && (*opened)->Reaches(box) == Reach::kNow) {
         EXPECT_EQ(ReadBox(**opened, box), expected);
       }
       of.asked = 0;
     }
     EXPECT_EQ(opened.ok(), std::abs(owners) > 1) << "every second owner is on this host";
     if (opened.ok()) {
-      EXPECT_FALSE((*opened)->Reaches(of.Bounds()));
+      EXPECT_EQ((*opened)->Reaches(of.Bounds()), Reach::kNever);
     }
     EXPECT_EQ(OpenOwned(of.volume.field.Text(), Here()).value()->info().version, here->info().version);
   }
@@ -221,15 +226,15 @@ TEST(OwnedSource, OwnersWhoseArraysCannotBeReadAreAsked) {
 }
 
 TEST(OwnedField, ATextIsReadAsItWasWritten) {
-  OwnedField field{"rho", ~std::uint64_t{0}, {}};
+  OwnedField field{"rho", ~std::uint64_t{0}, {}, Uniform(kMaxVolumeSide)};
   for (std::uint32_t i = 0; i < 4096; ++i)
     field.owners.push_back({i < 64 ? 0 : ~std::uint64_t{i / 64}, 0xFFFFFFFF - i, i, ~std::uint64_t{i}});
   const std::string text = field.Text();
   EXPECT_LE(text.size(), kMaxSourceBytes) << "of 4096 owners";
   EXPECT_EQ(OwnedField::Parse(text).value(), field);
   for (std::size_t length = 0; length < 60; ++length) (void)OwnedField::Parse(text.substr(0, length));
-  for (const char* wrong :
-       {"", "owned:", "owned:a/b:1:", "owned:rho:1", "owned:rho:x:", "owned:rho:1:1.2.3", "owned:rho:1:@1,", "owned:rho:1:-1.2.3,"}) {
+  for (const char* wrong : {"", "owned:", "owned:a/b:1:1.1.1:", "owned:rho:1", "owned:rho:x:1.1.1:", "owned:rho:1:", "owned:rho:1:0.1.1:",
+                            "owned:rho:1:1.1.10000:", "owned:rho:1:1.1.1:1.2.3", "owned:rho:1:1.1.1:@1,", "owned:rho:1:1.1.1:-1.2.3,"}) {
     EXPECT_FALSE(OwnedField::Parse(wrong).ok()) << wrong;
   }
 }
@@ -319,6 +324,122 @@ TEST(OwnerMemory, ASlotTakesNoMemoryForSamplesThatLieElsewhere) {
   ASSERT_EQ(::fstat(int(owner.memory->file_descriptor()), &found), 0);
   EXPECT_GE(found.st_size, off_t(2 * OwnerOfArray::kBytes));
   EXPECT_LE(found.st_blocks * 512, 4096) << "the header";
+}
+
+// An owner on demand of boxes whose samples are their numbers in the volume. What it drops becomes something else at once.
+class MakingOwner {
+ public:
+  static constexpr Index3 kSize = {12, 10, 8}, kBoxSize = {4, 5, 4};
+
+  MakingOwner() : boxes_(CutAtBlocks({{}, kSize}, kBoxSize)), made_(boxes_.size()) {
+    OwnerLayout layout{.samples = SampleType::kFloat32, .size = kSize};
+    for (const Box& box : boxes_) layout.boxes.push_back({.box = box, .held = box});
+    layout.PlaceDense();
+    for (HeldBox& each : layout.boxes) each.offset = 0;
+    layout.slot_bytes = 0;
+    layout.on_demand = true;
+    memory_ = OwnerMemory::Create(kIncarnation, layout).value();
+    (void)memory_->Begin(0);
+    memory_->Commit(0, 1, 0);
+    volume.field = {"rho", 1, {{SharedMemoryScope(), std::uint32_t(::getpid()), memory_->file_descriptor(), kIncarnation}}, kBoxSize};
+    volume.description = {{.size = kSize}, ScalarType::kFloat32, {}};
+    volume.exact = {SampleType::kFloat32, {}};
+    volume.boxes = {boxes_};
+    volume.on_demand = true;
+    volume.ask = [this](std::uint32_t, const Box& box, bool in_place, const std::function<void(Result<Bytes>)>& done) {
+      if (in_place) {
+        Make(std::size_t(std::ranges::find(boxes_, box) - boxes_.begin()));
+        return done(Bytes());
+      }
+      const std::vector<float> samples = Of(box);
+      const auto bytes = std::as_bytes(std::span(samples));
+      done(Bytes(std::vector<std::byte>(bytes.begin(), bytes.end())));
+    };
+  }
+
+  static std::vector<float> Of(const Box& box) {
+    std::vector<float> samples;
+    for (const Index3& voxel : IndicesIn(box)) samples.push_back(float(NumberIn(kSize, voxel)));
+    return samples;
+  }
+  std::size_t count() const { return boxes_.size(); }
+  void Make(std::size_t box) {
+    const std::lock_guard lock(mutex_);
+    if (made_[box] != nullptr) return;
+    ++times_made;
+    made_[box] = std::make_unique<std::vector<float>>(Of(boxes_[box]));
+    memory_->Make(0, box, reinterpret_cast<const std::byte*>(made_[box]->data()));
+  }
+  void Drop(std::size_t box) {
+    const std::lock_guard lock(mutex_);
+    if (made_[box] == nullptr) return;
+    memory_->Make(0, box, nullptr);
+    std::ranges::fill(*made_[box], -1.0F);
+    made_[box].reset();
+  }
+
+  OwnedVolume volume;
+  std::atomic<int> times_made = 0;
+
+ private:
+  static constexpr std::uint64_t kIncarnation = 99;
+  const std::vector<Box> boxes_;
+  std::shared_ptr<OwnerMemory> memory_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<std::vector<float>>> made_;
+};
+
+TEST(OwnedSource, BoxesOnDemandAreMadeOnceAndReadInPlace) {
+  MakingOwner owner;
+  const auto source = MakeOwnedSource(owner.volume, Here());
+  const auto worker = OpenOwned(owner.volume.field.Text(), Here()).value();
+  EXPECT_TRUE(source->info().on_demand);
+  EXPECT_TRUE(worker->info().on_demand);
+  EXPECT_EQ(worker->info().levels[0].block, MakingOwner::kBoxSize);
+  const Box two = {{2, 1, 1}, {6, 4, 3}};
+  EXPECT_EQ(worker->Reaches(two), Reach::kOnceMade);
+  std::vector<float> samples(std::size_t(two.voxel_count()));
+  EXPECT_THAT(worker->ReadNow(0, two, std::as_writable_bytes(std::span(samples))).message(), HasSubstr("is not made, or was dropped"));
+  EXPECT_EQ(ReadBox(*source, two), MakingOwner::Of(two)) << "samples are asked for";
+  Status made = Status::Internal("it did not end");
+  source->Make(two, [&](const Status& status) { made = status; });
+  EXPECT_TRUE(made.ok()) << made.message();
+  EXPECT_EQ(owner.times_made, 2);
+  EXPECT_EQ(worker->Reaches(two), Reach::kNow);
+  EXPECT_EQ(ReadBox(*worker, two), MakingOwner::Of(two));
+  source->Make(two, [](const Status&) {});
+  EXPECT_EQ(owner.times_made, 2);
+}
+
+TEST(OwnedSource, WhatIsDroppedUnderAReaderIsNeverWrong) {
+  Random random(7);
+  SCOPED_TRACE(random.trace());
+  MakingOwner owner;
+  const auto worker = OpenOwned(owner.volume.field.Text(), Here()).value();
+  std::atomic<bool> ends = false;
+  std::vector<std::jthread> makers;
+  for (int i = 0; i < 2; ++i) {
+    makers.emplace_back([&, of_thread = Random(random.Integer(0, 1 << 30))]() mutable {
+      while (!ends) {
+        const auto box = of_thread.Integer<std::size_t>(0, owner.count() - 1);
+        of_thread.Integer(0, 1) == 0 ? owner.Make(box) : owner.Drop(box);
+      }
+    });
+  }
+  int right = 0;
+  for (int tries = 0; right < 500 && tries < 1'000'000; ++tries) {
+    const Box box = RandomBox(random, {{}, MakingOwner::kSize});
+    std::vector<float> samples(std::size_t(box.voxel_count()));
+    const Status read = worker->ReadNow(0, box, std::as_writable_bytes(std::span(samples)));
+    if (!read.ok()) {
+      ASSERT_EQ(read.code(), StatusCode::kUnavailable);
+      continue;
+    }
+    ++right;
+    ASSERT_EQ(samples, MakingOwner::Of(box));
+  }
+  ends = true;
+  EXPECT_EQ(right, 500);
 }
 
 // What `child` exits with, which runs in a process of its own while this one runs `meanwhile` with its id and its first number.

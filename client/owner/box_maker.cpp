@@ -1,0 +1,108 @@
+#include "client/owner/box_maker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/threads/guarded.h"
+#include "data/sources/copy_samples.h"
+
+namespace slabstream {
+
+BoxMaker::BoxMaker(std::shared_ptr<OwnerMemory> memory, std::shared_ptr<const MappedOwner> own, std::uint64_t most_bytes, MakeBox make,
+                   std::function<void()> answered)
+    : memory_(std::move(memory)),
+      own_(std::move(own)),
+      most_bytes_(most_bytes),
+      make_(std::move(make)),
+      answered_(std::move(answered)),
+      thread_([this] { Run(); }) {}
+
+BoxMaker::~BoxMaker() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  std::unique_lock lock(mutex_);
+  Drop(kept_.DropIf([](const auto&) { return true; }), lock);
+}
+
+void BoxMaker::SetTime(std::uint32_t slot, std::uint64_t time) {
+  std::unique_lock lock(mutex_);
+  times_[slot] = time;
+  if (time == 0) Drop(kept_.DropIf([slot](const auto& entry) { return entry.key.first == slot; }), lock);
+}
+
+// Readers notice before the samples go. These go without the mutex: their owner may do anything then.
+void BoxMaker::Drop(LruMap<Key, MadeBox>::Entries dropped, std::unique_lock<std::mutex>& lock) {
+  for (const auto& each : dropped) memory_->Make(each.key.first, each.key.second, nullptr);
+  lock.unlock();
+  dropped.clear();
+}
+
+void BoxMaker::Ask(std::size_t box, const ChunkRequest& request) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto slot = std::ranges::find_if(times_, [&](const auto& each) { return each.second == request.dataset; });
+    const Key key(slot == times_.end() ? 0 : slot->first, box);
+    if (slot != times_.end() && kept_.Find(key) == nullptr) {
+      std::vector<ChunkRequest>& asked = asked_[key];
+      asked.push_back(request);
+      if (asked.size() == 1) order_.push_back(key);
+      return changed_.notify_all();
+    }
+    answers_.push_back({request, SamplesOf(box, request)});
+  }
+  answered_();
+}
+
+std::vector<BoxMaker::Answer> BoxMaker::TakeAnswers() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(answers_, {});
+}
+
+bool BoxMaker::is_making() const {
+  const std::lock_guard lock(mutex_);
+  return !order_.empty();
+}
+
+// With the mutex, so that nothing is dropped meanwhile.
+Result<Bytes> BoxMaker::SamplesOf(std::size_t box, const ChunkRequest& request) const {
+  const bool any = !request.in_place;
+  const Box part = any ? request.box : Box{request.box.begin, request.box.begin + Uniform(1)};
+  std::vector<std::byte> samples(std::size_t(part.voxel_count()) * BytesPerSample(own_->layout().samples));
+  const Status read = own_->Read(box, part, request.dataset, BoxRoom::Dense(part, samples.data(), true));
+  if (!read.ok()) return read;
+  return any ? Bytes(std::move(samples)) : Bytes();
+}
+
+void BoxMaker::Run() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return ends_ || !order_.empty(); });
+    if (ends_) return;
+    const Key key = order_.front();
+    const auto [slot, box] = key;
+    const std::uint64_t time = times_[slot];
+    lock.unlock();
+    Result<MadeBox> made = Guarded("a box that was asked for", [&, box = box] { return make_(box, time); });
+    lock.lock();
+    // It may have taken so long that the slot has another time.
+    if (made.ok() && time != 0 && times_[slot] == time) {
+      memory_->Make(slot, box, made->get());
+      const HeldBox& held = own_->layout().boxes[box];
+      kept_.Put(key, *made, std::uint64_t(held.held.voxel_count()) * BytesPerSample(own_->layout().samples));
+    }
+    for (const ChunkRequest& request : asked_.extract(key).mapped()) {
+      answers_.push_back({request, made.ok() ? SamplesOf(box, request) : Result<Bytes>(made.status())});
+    }
+    order_.pop_front();
+    Drop(kept_.DropBeyond(most_bytes_), lock);
+    answered_();
+    lock.lock();
+  }
+}
+
+}  // namespace slabstream
