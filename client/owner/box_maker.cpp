@@ -73,7 +73,7 @@ Result<Bytes> BoxMaker::SamplesOf(std::size_t box, const ChunkRequest& request) 
   const bool any = !request.in_place;
   const Box part = any ? request.box : Box{request.box.begin, request.box.begin + Uniform(1)};
   std::vector<std::byte> samples(std::size_t(part.voxel_count()) * BytesPerSample(own_->layout().samples));
-  const Status read = own_->Read(box, part, request.dataset, BoxRoom::Dense(part, samples.data(), true));
+  const Status read = own_->Read(box, part, 0, request.dataset, BoxRoom::Dense(part, samples.data(), true));
   if (!read.ok()) return read;
   return any ? Bytes(std::move(samples)) : Bytes();
 }

@@ -19,6 +19,7 @@
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 #include "data/owned/owned_source.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -139,14 +140,16 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
   const Box& box = request.box;
   const std::size_t sample_bytes = BytesPerSample(layout.samples);
   const auto of = std::ranges::find_if(layout.boxes, [&](const HeldBox& each) { return !box.empty() && each.box.Contains(box); });
-  const bool fits = std::size_t(box.voxel_count()) <= kMostAskedBytes / sample_bytes || (maker != nullptr && request.in_place);
-  if (of == layout.boxes.end() || request.chunk != 0 || !fits) {
+  const int level = int(request.level);
+  const Box points = {{}, PointsAlong(box.size(), level)};
+  const bool fits = std::size_t(points.voxel_count()) <= kMostAskedBytes / sample_bytes || (maker != nullptr && request.in_place);
+  if (of == layout.boxes.end() || request.chunk != 0 || !fits || (maker != nullptr && level != 0)) {
     return Answer(request, Status::InvalidArgument("no box of this owner has these voxels"));
   }
   const auto number = std::size_t(of - layout.boxes.begin());
   if (maker != nullptr) return maker->Ask(number, request);
-  std::vector<std::byte> samples(std::size_t(box.voxel_count()) * sample_bytes);
-  const Status read = own->Read(number, box, request.dataset, BoxRoom::Dense(box, samples.data(), true));
+  std::vector<std::byte> samples(std::size_t(points.voxel_count()) * sample_bytes);
+  const Status read = own->Read(number, box, level, request.dataset, BoxRoom::Dense(points, samples.data(), true));
   Answer(request, read.ok() ? Result(Bytes(std::move(samples))) : read);
 }
 

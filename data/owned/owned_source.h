@@ -1,6 +1,7 @@
 // A volume whose voxels stay with the processes that own them (owners), at one time. Those of owners on this host are read in their memory
 // (owner_memory.h); those of others by a function of whoever can ask them: the coordinator. It also asks owners for boxes that they make
-// on demand.
+// on demand. Level n of it is every 2^n-th voxel along each axis (voxel_lattice.h). There are so many levels that the coarsest one takes at
+// most kCoarsestBytes; a rectilinear grid has one, and so has what is made on demand.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +20,7 @@
 namespace slabstream {
 
 inline constexpr std::uint32_t kMostAskedBytes = 1U << 20;  // of samples that an owner is asked for at a time
+inline constexpr std::int64_t kCoarsestBytes = 8 << 20;     // what the survey of such a source reads (kFarSurvey)
 
 // All owners of a volume at a time. Its text is StoredAt::source.
 struct OwnedField {
@@ -33,9 +35,14 @@ struct OwnedField {
   friend bool operator==(const OwnedField&, const OwnedField&) = default;
 };
 
-// Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest; or, `in_place`, to make the box, whatever its
-// size: then there are no bytes. Calls `done` once, on any thread, which it must not hold up.
-using AskOwner = std::function<void(std::uint32_t owner, const Box& box, bool in_place, std::function<void(Result<Bytes>)> done)>;
+struct AskedVoxels {
+  Box box;
+  int level = 0;          // every 2^level-th voxel of the box along each axis, from its first one on
+  bool in_place = false;  // the box is to be made, and its samples need not come
+};
+// Asks an owner for samples as it holds them, x fastest, at most kMostAskedBytes; none: in place. Calls `done` once, on any thread, which
+// it must not hold up.
+using AskOwner = std::function<void(std::uint32_t owner, const AskedVoxels& voxels, std::function<void(Result<Bytes>)> done)>;
 
 // What the coordinator knows of a field.
 struct OwnedVolume {

@@ -139,8 +139,8 @@ class VolumeSource {
   // Null: it must be opened for itself, since its format has metadata of each; or there is no such.
   virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
 
-  // Whether Read gets the voxels of this box of level 0. If not, of what others hold (data/owned): another process must be asked.
-  virtual Reach Reaches(const Box& /*box*/) const { return Reach::kNow; }
+  // Whether Read gets the voxels of this box. If not, of what others hold (data/owned): another process must be asked.
+  virtual Reach Reaches(int /*level*/, const Box& /*box*/) const { return Reach::kNow; }
 
   using ReadDone = std::function<void(Status)>;
   // Of a source that is made on demand: has all voxels of the box made, each where it is held. Some may be dropped again before the others

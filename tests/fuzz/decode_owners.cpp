@@ -42,13 +42,13 @@ bool DecodeMemory(std::size_t pages, std::span<const std::byte> begin) {
     Box part = layout.boxes[box].held;
     for (const Axis axis : kAxes) part.begin[axis] = std::max(part.begin[axis], part.end[axis] - 8);
     std::vector<std::byte> samples(std::size_t(part.voxel_count()) * BytesPerSample(layout.samples));
-    read = (*owner)->Read(box, part, 1, BoxRoom::Dense(part, samples.data(), true)).ok() || read;
+    read = (*owner)->Read(box, part, 0, 1, BoxRoom::Dense(part, samples.data(), true)).ok() || read;
   }
   std::fill_n(memory.data(), memory.size(), std::byte{0xFE});
   for (std::size_t box = 0; box < layout.boxes.size(); ++box) {
     const Index3 last = layout.boxes[box].held.end - Uniform(1);
     std::array<std::byte, 8> sample;
-    (void)(*owner)->Read(box, {last, last + Uniform(1)}, 0xFEFEFEFEFEFEFEFE,
+    (void)(*owner)->Read(box, {last, last + Uniform(1)}, 0, 0xFEFEFEFEFEFEFEFE,
                          BoxRoom::Dense({last, last + Uniform(1)}, sample.data(), true));
   }
   return read;

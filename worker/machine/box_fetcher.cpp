@@ -198,7 +198,7 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         const auto failed = padded.failures.find(chunk);
         const bool in_place = padded.stored_at != nullptr && (failed == padded.failures.end() || failed->second < kMostInPlace);
         actions.push_back(
-            SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk, in_place}, padded.stored_at});
+            SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk, 0, in_place}, padded.stored_at});
       }
     }
   }

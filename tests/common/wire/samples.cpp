@@ -361,7 +361,7 @@ std::vector<OwnerSteered> SamplesOf() {
 template <>
 std::vector<ChunkRequest> SamplesOf() {
   return {{1, 2, 3, kOneVoxel, 0},
-          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1, true},
+          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1, 16, true},
           {1, 2, 3, kOneVoxel, kFirstCellChunk}};
 }
 
