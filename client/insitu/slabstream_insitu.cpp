@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "client/service/service_state.h"
 #include "common/base/printable.h"
 #include "common/base/version.h"
+#include "common/text/split.h"
 #include "common/threads/guarded.h"
 #include "data/sources/copy_samples.h"
 
@@ -142,6 +144,10 @@ int slabstream_insitu_open(slabstream_insitu** handle, const slabstream_insitu_f
     options.dataset = field->dataset == nullptr ? "" : field->dataset;
     options.owner = field->owner;
     options.owners = std::max(field->owners, 1U);
+    if (const std::string_view fields = field->fields == nullptr ? "" : field->fields; !fields.empty()) {
+      for (const std::string_view name : Split(fields, ',')) options.fields.emplace_back(name);
+    }
+    options.field = field->field;
     VolumeGeometry& geometry = options.description.geometry;
     geometry.size = IndexOf(field->size);
     if (const Vec3 spacing = VectorOf(field->spacing); spacing != Vec3{}) geometry.spacing = spacing;
@@ -214,7 +220,7 @@ int slabstream_insitu_start(slabstream_insitu* handle) {
     VolumeOwnerOptions options = handle->options;
     options.endpoint = service->endpoint;
     options.service_file = service->file;
-    if (options.owner != 0) options.parameters.clear();  // those of owner 0 are used
+    if (options.owner != 0 || options.field != 0) options.parameters.clear();
     Result<std::unique_ptr<VolumeOwner>> owner = VolumeOwner::Start(handle->context, std::move(options));
     if (!owner.ok()) return owner.status();
     handle->owner = *std::move(owner);

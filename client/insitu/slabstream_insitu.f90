@@ -27,7 +27,8 @@ module slabstream_insitu
     integer(c_int32_t) :: size(3)
     real(c_double) :: spacing(3), origin(3)
     integer(c_int32_t) :: owner, owners, slots
-    type(c_ptr) :: service
+    type(c_ptr) :: service, fields
+    integer(c_int32_t) :: field
   end type
 
   type :: insitu_owner
@@ -127,34 +128,39 @@ contains
     end if
   end subroutine
 
-  ! owner: from 0, as MPI counts ranks
-  subroutine owner_open(this, dataset, samples, size, owner, owners, spacing, origin, slots, service, code)
+  ! owner: from 0, as MPI counts ranks. fields: names of all fields of the dataset, "u,v"; field: which of them this is, from 0
+  subroutine owner_open(this, dataset, samples, size, owner, owners, spacing, origin, slots, service, fields, field, code)
     class(insitu_owner), intent(inout) :: this
     character(*), intent(in) :: dataset, samples
     integer, intent(in) :: size(3)
-    integer, intent(in), optional :: owner, owners, slots
+    integer, intent(in), optional :: owner, owners, slots, field
     real(c_double), intent(in), optional :: spacing(3), origin(3)
-    character(*), intent(in), optional :: service
+    character(*), intent(in), optional :: service, fields
     integer, intent(out), optional :: code
-    character(:), allocatable, target :: dataset_text, samples_text, service_text
-    type(c_field) :: field
+    character(:), allocatable, target :: dataset_text, samples_text, service_text, fields_text
+    type(c_field) :: as
     dataset_text = trim(dataset) // c_null_char
     samples_text = trim(samples) // c_null_char
-    field = c_field(c_loc(dataset_text), c_loc(samples_text), size, 0, 0, 0, 0, 0, c_null_ptr)
-    if (present(owner)) field%owner = owner
-    if (present(owners)) field%owners = owners
-    if (present(slots)) field%slots = slots
-    if (present(spacing)) field%spacing = spacing
-    if (present(origin)) field%origin = origin
+    as = c_field(c_loc(dataset_text), c_loc(samples_text), size, 0, 0, 0, 0, 0, c_null_ptr, c_null_ptr, 0)
+    if (present(owner)) as%owner = owner
+    if (present(owners)) as%owners = owners
+    if (present(slots)) as%slots = slots
+    if (present(field)) as%field = field
+    if (present(spacing)) as%spacing = spacing
+    if (present(origin)) as%origin = origin
     if (present(service)) then
       service_text = trim(service) // c_null_char
-      field%service = c_loc(service_text)
+      as%service = c_loc(service_text)
+    end if
+    if (present(fields)) then
+      fields_text = trim(fields) // c_null_char
+      as%fields = c_loc(fields_text)
     end if
     this%parameters = 0
     this%first = reshape([integer ::], [3, 0])
     this%last = this%first
     this%arrays = [c_ptr ::]
-    call tell(c_open(this%handle, field), code)
+    call tell(c_open(this%handle, as), code)
   end subroutine
 
   ! The first and the last voxel that it owns, by axis, and those of its array, which may have ghosts.

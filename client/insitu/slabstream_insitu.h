@@ -54,6 +54,9 @@ typedef struct {
   /* owner.json of a service with keys, or the endpoint of a service for its workers, "tcp://HOST:PORT". Default: what
    * $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host, else tcp://127.0.0.1:7421. */
   const char* service;
+  const char* fields; /* names of all fields of the dataset, on this grid and of these samples, at most 64, commas between them: "u,v".
+                       * Default: it has one without a name. Each field has `owners` owners of its own, at most 4096 in all. */
+  uint32_t field;     /* which of them this is, from 0 */
 } slabstream_insitu_field;
 
 typedef struct slabstream_insitu slabstream_insitu;
@@ -69,7 +72,8 @@ SLABSTREAM_INSITU_API int slabstream_insitu_add_box(slabstream_insitu* handle, c
                                                     const int32_t array_begin[3], const int32_t array_end[3], const int64_t strides[3]);
 
 /* Before start: declares a number that clients may change within [least, most]; its first value is `value`. The name has up to 64 letters,
- * digits and '_'. At most 64 of them. Those of owner 0 are used; others may declare them, too. */
+ * digits and '_'. At most 64 of them. Those of owner 0 of field 0 are used; others may declare them,
+ * too. */
 SLABSTREAM_INSITU_API int slabstream_insitu_parameter(slabstream_insitu* handle, const char* name, double least, double most, double value);
 
 /* How boxes are made on demand. make: sets `samples` to the first sample of the array of the box (its number in the order of add_box) at a

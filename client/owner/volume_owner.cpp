@@ -239,7 +239,9 @@ Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, Volume
                    .description = options.description,
                    .samples = std::string(ToString(layout.samples)),
                    .steered = std::move(options.parameters),
-                   .on_demand = options.make != nullptr};
+                   .on_demand = options.make != nullptr,
+                   .fields = std::move(options.fields),
+                   .field = options.field};
   layout.on_demand = as.on_demand;
   if (layout.on_demand) layout.slot_bytes = 0;
   for (HeldBox& each : layout.boxes) {

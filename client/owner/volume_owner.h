@@ -36,11 +36,15 @@ struct VolumeOwnerOptions {
   std::string dataset;            // common/frame/dataset_name.h
   std::uint32_t owner = 0;        // below `owners`, each once
   std::uint32_t owners = 1;       // that hold the field together, [1, 4096]
+  // Of all fields of the dataset, on one grid and of one type: at most 64 names of at most 64 characters; none: it has one without a name.
+  std::vector<std::string> fields = {};
+  std::uint32_t field = 0;  // which of them this owner holds boxes of
   // Of the whole volume. The mapping is that of layout.samples; the type is filled in.
   VolumeDescription description;
   OwnerLayout layout;        // its size is filled in; 2 ... kMostOwnerSlots slots
   bool share_memory = true;  // else voxels travel
-  // What whoever watches may change, of owner 0 alone: at most 64, no name twice; names are identifiers of at most 64 characters.
+  // What whoever watches may change, of owner 0 of field 0 alone: at most 64, no name twice; names are identifiers of at most 64
+  // characters.
   std::vector<SteeredParameter> parameters = {};
   // Not null: boxes are made on demand, as in all other owners of the field, and at most `made_bytes` of them are kept, and the last one.
   MakeBox make = nullptr;

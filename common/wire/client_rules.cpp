@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/printable.h"
 #include "common/frame/dataset_name.h"
 #include "common/renderers/registry.h"
 #include "common/wire/rules.h"
@@ -121,9 +122,17 @@ void Rules(const SteeredParameter& m, Checker& check) {
 void Rules(const RegisterOwner& m, Checker& check) {
   check.That(!IsOfLabels(m.description.type), "description.type", "one of labels");
   check.That(m.owner < m.owners, "owner", "not below owners");
-  check.That(m.owner == 0 || m.steered.empty(), "steered", "of another owner than 0");
+  check.That((m.owner == 0 && m.field == 0) || m.steered.empty(), "steered", "of another owner than 0");
   std::set<std::string_view> names;
   for (const SteeredParameter& each : m.steered) check.That(names.insert(each.name).second, "steered", "two of one name");
+  names.clear();
+  for (const std::string& each : m.fields) {
+    check.That(!each.empty() && each.size() <= 64 && Printable(each) == each, "fields", "a name that is none, or has more than 64 bytes");
+    check.That(names.insert(each).second, "fields", "two of one name");
+  }
+  const std::size_t fields = std::max<std::size_t>(m.fields.size(), 1);
+  check.That(m.field < fields, "field", "not the number of one");
+  check.That(fields * m.owners <= 4096, "fields", "more than 4096 owners of all");
 }
 
 void Rules(const VolumeCredit& m, Checker& check) {

@@ -55,7 +55,10 @@ struct Place {
 bool Has(const Place& place) { return place.owner && place.owner->latest != 0; }  // voxels
 
 struct Field {
-  std::vector<Place> places;
+  std::vector<Place> places;        // of each field of the dataset all owners, one field after the other
+  std::vector<std::string> fields;  // their names; none: it has one without a name
+
+  std::size_t owners() const { return places.size() / std::max<std::size_t>(fields.size(), 1); }  // of a field
   std::uint64_t set = 0;    // another number when an owner comes or goes
   std::uint64_t whole = 0;  // time, of the owners that have any; 0: none has, or not all have come since it had owners
   std::uint64_t shown = 0;  // the last whole time that all were known to hold, and hold; 0: none
@@ -92,7 +95,15 @@ bool Tile(const Box& bounds, const std::vector<Box>& boxes) {
 }
 
 bool OfOneField(const RegisterOwner& a, const RegisterOwner& b) {
-  return a.owners == b.owners && a.description == b.description && a.samples == b.samples && a.on_demand == b.on_demand;
+  return a.owners == b.owners && a.description == b.description && a.samples == b.samples && a.on_demand == b.on_demand &&
+         a.fields == b.fields;
+}
+
+std::uint32_t PlaceOf(const RegisterOwner& m) { return m.field * m.owners + m.owner; }
+
+// Owner 2 of 4, or owner 2 of 4 of field "u".
+std::string OwnerText(std::size_t owner, std::size_t owners, std::span<const std::string> fields, std::size_t field) {
+  return fmt::format("owner {} of {}{}", owner, owners, fields.empty() ? "" : fmt::format(" of field \"{}\"", fields[field]));
 }
 
 }  // namespace
@@ -132,7 +143,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     return found == peers.end() ? nullptr : &*fields.at(found->second.first).places[found->second.second].owner;
   }
   static std::string Named(const std::string& name, const Field& field, std::size_t owner) {
-    return fmt::format("\"{}\": owner {} of {}", name, owner, field.places.size());
+    const std::size_t owners = field.owners();
+    return fmt::format("\"{}\": {}", name, OwnerText(owner % owners, owners, field.fields, owner / owners));
   }
 
   Status Check(const RegisterOwner& m, const Field* field) {
@@ -157,11 +169,12 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     if (field == nullptr) return CheckTiled(m, {});
     for (const Place& place : field->places) {
       if (place.owner && !OfOneField(place.owner->registered, m)) {
-        return Wrong(StatusCode::kUnavailable, m,
-                     fmt::format("owners, description, samples or on_demand differ from those of owner {}", place.owner->registered.owner));
+        return Wrong(
+            StatusCode::kUnavailable, m,
+            fmt::format("owners, description, samples, on_demand or fields differ from those of owner {}", place.owner->registered.owner));
       }
     }
-    const std::optional<Owner>& taken = field->places[m.owner].owner;
+    const std::optional<Owner>& taken = field->places[PlaceOf(m)].owner;
     if (taken && taken->registered.incarnation != m.incarnation) {
       return Wrong(StatusCode::kUnavailable, m, "another process is this owner");
     }
@@ -170,7 +183,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
 
   // Unavailable: because of other owners, who may leave.
   static Status Wrong(StatusCode code, const RegisterOwner& m, const std::string& what) {
-    return {code, fmt::format("\"{}\": owner {} of {}: {}", m.dataset, m.owner, m.owners, what)};
+    return {code, fmt::format("\"{}\": {}: {}", m.dataset, OwnerText(m.owner, m.owners, m.fields, m.field), what)};
   }
 
   // With the last owner of a field.
@@ -178,7 +191,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     std::vector<Box> boxes = m.boxes;
     std::size_t there = 1;
     for (const Place& place : places) {
-      if (!place.owner || place.owner->registered.owner == m.owner) continue;
+      if (!place.owner || place.owner->registered.field != m.field || place.owner->registered.owner == m.owner) continue;
       ++there;
       boxes.insert(boxes.end(), place.owner->registered.boxes.begin(), place.owner->registered.boxes.end());
     }
@@ -193,13 +206,14 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     const auto found = fields.find(m.dataset);
     const auto refuse = [&](const Status& why) { news.messages.emplace_back(from, OwnerRefused{m.incarnation, Bounded(why)}); };
     if (Status status = Check(m, found == fields.end() ? nullptr : &found->second); !status.ok()) return refuse(status);
-    if (const auto known = peers.find(from); known != peers.end() && known->second != std::pair(m.dataset, m.owner)) {
+    if (const auto known = peers.find(from); known != peers.end() && known->second != std::pair(m.dataset, PlaceOf(m))) {
       return refuse(Status::InvalidArgument(fmt::format("\"{}\": this connection is that of another owner", m.dataset)));
     }
     Field& field = fields[m.dataset];
-    field.places.resize(m.owners);
+    field.fields = m.fields;
+    field.places.resize(m.owners * std::max<std::size_t>(m.fields.size(), 1));
     const std::string name = m.dataset;
-    const std::uint32_t number = m.owner;
+    const std::uint32_t number = PlaceOf(m);
     std::optional<Owner>& owner = field.places[number].owner;
     if (!owner) owner.emplace().peer = from;
     if (owner->peer != from) {  // another connection: what is out may be lost
@@ -413,7 +427,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     Owner& owner = *Find(from);
     const std::string& name = owner.registered.dataset;
     Answer(owner, m.dataset, m.box, std::nullopt,
-           Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), owner.registered.owner), m.status.message())));
+           Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), PlaceOf(owner.registered)), m.status.message())));
   }
 
   void Hear(PeerToken from, const Chunk& m, const Bytes& payload) {
@@ -431,7 +445,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
         if (now >= owner.heard + kOwnerTimeout) silent.push_back(owner.peer);
         if (owner.out.empty()) owner.answered = now;
         if (now >= owner.answered + kOwnerAnswers) {
-          FailAsked(owner, Status::Unavailable(Named(name, field, owner.registered.owner) + " answers no request for voxels"));
+          FailAsked(owner, Status::Unavailable(Named(name, field, PlaceOf(owner.registered)) + " answers no request for voxels"));
         }
         for (; !owner.waiting.empty() && owner.out.size() < kMostAskedOfOwner; owner.waiting.pop_front()) {
           Request(owner, owner.waiting.front());
@@ -483,6 +497,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
 
   Result<std::shared_ptr<VolumeSource>> Open(const std::string& name, Missing missing);
   OwnedVolume AtShownTime(const std::string& name, const Field& field);
+  OwnedVolume AtShownTime(const std::string& name, const Field& field, std::size_t number, std::vector<Box>& missing);
   std::shared_ptr<const void> Use(const std::string& name, std::uint64_t time);  // with the mutex
   void Ask(const std::string& name, std::uint32_t number, Incarnation incarnation, Asked asked);
 };
@@ -510,12 +525,35 @@ std::shared_ptr<const void> Owners::State::Use(const std::string& name, std::uin
           }};
 }
 
-// Of the owners that have any voxels.
+// Of the owners that have any voxels. What one field lacks shows nothing of the others.
 OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& field) {
+  std::vector<Box> missing;
+  std::vector<OwnedVolume> volumes;
+  for (std::size_t number = 0; number < std::max<std::size_t>(field.fields.size(), 1); ++number) {
+    volumes.push_back(AtShownTime(name, field, number, missing));
+  }
+  for (OwnedVolume& volume : volumes) {
+    volume.of_nobody = missing;
+    for (std::vector<Box>& boxes : volume.boxes) {
+      std::vector<Box> rest;
+      for (const Box& box : boxes) std::ranges::copy(Assemble(box, missing).missing, std::back_inserter(rest));
+      boxes = std::move(rest);
+    }
+  }
+  OwnedVolume volume = volumes.front();
+  if (field.fields.empty()) return volume;
+  for (const std::string& each : field.fields) volume.channels.push_back({.name = each});
+  volume.fields = std::make_shared<const std::vector<OwnedVolume>>(std::move(volumes));
+  return volume;
+}
+
+// `missing`: boxes that do not overlap; what this field lacks is added.
+OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& field, std::size_t number, std::vector<Box>& missing) {
   OwnedVolume volume{.field = {name, field.shown, {}}};
   std::vector<Incarnation> incarnations;
-  std::vector<Box> held;
-  for (const Place& place : field.places) {
+  std::vector<Box> held = missing;
+  const std::span places = std::span(field.places).subspan(number * field.owners(), field.owners());
+  for (const Place& place : places) {
     const RegisterOwner& owner = Has(place) ? place.owner->registered : RegisterOwner();
     volume.field.owners.push_back({owner.memory_scope, owner.pid, owner.file_descriptor, owner.incarnation});
     incarnations.push_back(owner.incarnation);
@@ -530,10 +568,10 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
   for (const Box& box : held) {
     if (any.on_demand && box.begin == Index3{}) volume.field.block = box.size();
   }
-  volume.of_nobody = Assemble(any.description.geometry.bounds(), held).missing;
-  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const AskedVoxels& voxels,
-                                                                                    AskDone done) {
-    state->Ask(name, owner, incarnations[owner], {time, voxels, std::move(done)});
+  std::ranges::copy(Assemble(any.description.geometry.bounds(), held).missing, std::back_inserter(missing));
+  volume.ask = [state = shared_from_this(), name, first = std::uint32_t(places.data() - field.places.data()), time = field.shown,
+                incarnations](std::uint32_t owner, const AskedVoxels& voxels, AskDone done) {
+    state->Ask(name, first + owner, incarnations[owner], {time, voxels, std::move(done)});
   };
   volume.use = Use(name, field.shown);
   return volume;
@@ -582,9 +620,12 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
       }});
   lock.unlock();
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
-  for (const OwnerPlace& place : volume.field.owners) {
-    if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
-  }
+  const auto map = [&](const OwnedVolume& of) {
+    for (const OwnerPlace& place : of.field.owners) {
+      if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
+    }
+  };
+  volume.fields == nullptr ? map(volume) : void(std::ranges::for_each(*volume.fields, map));
   auto source = MakeOwnedSource(std::move(volume), ProcessReadContext());
   lock.lock();
   const auto known = fields.find(name);

@@ -324,7 +324,8 @@ Result<WayToRead> FindWay(const DataSource& data, VolumeSource* beside, std::uin
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
   text->options.describe = true;
-  const auto opened = data.open ? data.open(data.missing) : OpenSource(text->path, text->options, ProcessReadContext(), beside);
+  const bool owned = data.open && beside == nullptr;
+  const auto opened = owned ? data.open(data.missing) : OpenSource(text->path, text->options, ProcessReadContext(), beside);
   if (!opened.ok()) return opened.status();
   std::shared_ptr<VolumeSource> source = *opened;
   std::string place = PlaceOf(data, *text, source->info());

@@ -95,6 +95,8 @@ class OwnedSource final : public VolumeSource {
              .format = "owners",
              .file_type = std::string(ToString(of.exact.type)),
              .exact = of.exact,
+             .channels = of.channels,
+             .channel = of.channel,
              .growth = of.growth,
              .on_demand = of.on_demand};
     info_.owned = of.field.Text();
@@ -129,6 +131,19 @@ class OwnedSource final : public VolumeSource {
   }
 
   const SourceInfo& info() const override { return info_; }
+
+  std::shared_ptr<VolumeSource> At(int time, int channel) override {
+    const OwnedVolume& of = shared_->volume;
+    if (time != info_.time || of.fields == nullptr || std::size_t(channel) >= of.fields->size()) return nullptr;
+    OwnedVolume other = (*of.fields)[std::size_t(channel)];
+    other.fields = of.fields;
+    other.channels = of.channels;
+    other.channel = channel;
+    other.missing = of.missing;
+    other.growth = of.growth;
+    return MakeOwnedSource(std::move(other), shared_->context);
+  }
+
   Counts counts() const override { return {.stored_bytes = shared_->asked_bytes, .chunks = 0}; }
 
   Reach Reaches(int level, const Box& box) const override {

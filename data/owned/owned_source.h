@@ -46,6 +46,10 @@ using AskOwner = std::function<void(std::uint32_t owner, const AskedVoxels& voxe
 
 // What the coordinator knows of a field.
 struct OwnedVolume {
+  // Those of the dataset at this time, in the order of `channels`; null: it has one.
+  std::shared_ptr<const std::vector<OwnedVolume>> fields = {};
+  std::vector<FieldInfo> channels = {};
+  int channel = 0;
   OwnedField field;
   VolumeDescription description = {};        // of kept samples (KeptTypeOf)
   ExactType exact = {};                      // as they are held

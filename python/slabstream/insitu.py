@@ -32,7 +32,7 @@ class _Field(ctypes.Structure):
     _fields_ = [
         ("dataset", ctypes.c_char_p), ("samples", ctypes.c_char_p), ("size", ctypes.c_int32 * 3), ("spacing", ctypes.c_double * 3),
         ("origin", ctypes.c_double * 3), ("owner", ctypes.c_uint32), ("owners", ctypes.c_uint32), ("slots", ctypes.c_uint32),
-        ("service", ctypes.c_char_p),
+        ("service", ctypes.c_char_p), ("fields", ctypes.c_char_p), ("field", ctypes.c_uint32),
     ]  # fmt: skip
 
 
@@ -73,8 +73,10 @@ class Owner:
     that whoever looks may change. `make`: boxes are made on demand, in all owners alike: when a picture needs the box with this number at
     this time, `make(box, time)` returns its array, on a thread of its own. At most `budget` bytes of arrays are kept, those that were asked
     for last, and one in any case; `publish(time)` begins a time. If `make` raises, pictures that need the box fail with its line, and
-    with its class if that is a SlabstreamError, else as InvalidArgument. `service`: owner.json of a service with keys, or the endpoint of a service for workers;
-    None: what $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host.
+    with its class if that is a SlabstreamError, else as InvalidArgument. `service`: owner.json of a service with keys, or the endpoint of
+    a service for workers; None: what $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host.
+    `fields`: the names of all fields of the dataset, if it has several, on one grid and of one type, without commas; `field`: the number of
+    the one that this owner holds boxes of.
 
     The process goes on whether the service is there or not. For one thread at a time.
     """
@@ -83,7 +85,8 @@ class Owner:
                  held: Sequence[Box] | None = None, strides: Sequence[Sequence[int]] | None = None, owner: int = 0, owners: int = 1,
                  spacing: Sequence[float] = (1, 1, 1), origin: Sequence[float] = (0, 0, 0), slots: int = 3,
                  parameters: Mapping[str, tuple[float, float, float]] | None = None,
-                 make: Callable[[int, int], Array] | None = None, budget: int = 0, service: str | None = None):
+                 make: Callable[[int, int], Array] | None = None, budget: int = 0, service: str | None = None,
+                 fields: Sequence[str] = (), field: int = 0):
         self.dtype = numpy.dtype(dtype).newbyteorder("=")
         self.waited = 0.0  # seconds, in the last begin() or publish()
         self._handle, self._process = ctypes.c_void_p(), os.getpid()
@@ -104,7 +107,7 @@ class Owner:
         self._parameters = tuple(parameters or ())
         field = _Field(dataset.encode(), self.dtype.name.encode(), _xyz(ctypes.c_int32, shape, "shape"),
                        _xyz(ctypes.c_double, spacing, "spacing"), _xyz(ctypes.c_double, origin, "origin"), owner, owners, slots,
-                       service.encode() if service else None)
+                       service.encode() if service else None, ",".join(fields).encode() or None, field)
         _call("open", ctypes.byref(self._handle), ctypes.byref(field))
         try:
             for owned, around, steps in zip(boxes, held, self._strides, strict=True):

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "client/client.h"
@@ -96,8 +97,8 @@ class OwnerProcessesTest : public testing::Test {
   }
   // `arrays`: where samples lie, if not in slots. It is not used any more once the next time is begun.
   void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time,
-             std::vector<std::byte>* arrays = nullptr) const {
-    const std::shared_ptr<const Volume> volume = AtTime(time, size_);
+             std::vector<std::byte>* arrays = nullptr, std::uint64_t later = 0) const {
+    const std::shared_ptr<const Volume> volume = AtTime(time + later, size_);
     const Result<VolumeOwner::Slot> slot = owner.Begin(kPatience);
     ASSERT_TRUE(slot.ok()) << slot.status().message();
     std::size_t to = 0;
@@ -206,6 +207,72 @@ TEST_F(OwnerProcessesTest, SmallPicturesOfALargeVolumeReadEverySecondVoxel) {
       const FrameRequest same = AtLevel(request, volume->description.geometry, second.description.geometry);
       EXPECT_LE(LargestDifference(picture->image, RenderDirectly(same, second), request.size), 2 * AllowedRounding(request));
     }
+  }
+}
+
+TEST_F(OwnerProcessesTest, FieldsHaveOwnersOfTheirOwnAndOneTime) {
+  const std::vector<FrameRequest> requests = [] {
+    std::vector<FrameRequest> shown;
+    for (const std::vector<std::string>& channels : {std::vector<std::string>{}, {"near"}, {"far"}, {"far", "near"}}) {
+      for (FrameRequest request : RequestsOfRenderers(kNear)) {
+        request.channels = channels;
+        shown.push_back(std::move(request));
+      }
+    }
+    return shown;
+  }();
+  constexpr std::uint64_t kLater = 5;  // the second field has the values of later times
+  std::vector<Result<Picture>> of_one;
+  for (const auto& [owners, workers, share_memory] : {std::tuple(1U, 1, true), {3U, 2, true}, {2U, 3, false}}) {
+    SCOPED_TRACE(testing::Message() << owners << " owners, " << workers << " workers");
+    owners_.clear();
+    workers_.clear();
+    client_.reset();
+    coordinator_.reset();
+    ASSERT_NO_FATAL_FAILURE(Start({}, workers));
+    const std::array<OwnedBoxes, 2> boxes = {Arrange(OwnerArrangements()[2], kSize, owners),
+                                             Arrange(OwnerArrangements()[1], kSize, owners)};
+    const auto start = [&](std::uint32_t field, std::uint32_t owner) {
+      VolumeOwnerOptions options = OptionsOf(boxes.at(field), owner, owners, share_memory);
+      options.fields = {"near", "far"};
+      options.field = field;
+      return VolumeOwner::Start(context_, options).value();
+    };
+    for (const std::uint32_t field : {0U, 1U}) {
+      for (std::uint32_t owner = 0; owner < owners; ++owner) {
+        EXPECT_TRUE(client_->QueryStatus().value().datasets.empty()) << "they have no time in common";
+        owners_.push_back(start(field, owner));
+        for (const std::uint64_t time : {3U, 12U}) Write(*owners_.back(), boxes.at(field), owner, time, nullptr, kLater * field);
+      }
+    }
+    ASSERT_TRUE(RenderUnless("\"ball\"").ok());
+    SampleQuery query{.dataset = "ball", .points = {{14, 12, 16}, {22, 12, 16}, {30, 24, 34}}, .channels = {"near", "far"}};
+    const auto samples = client_->SampleAt(query).value();
+    for (const VolumeSample& sample : samples) {
+      ASSERT_EQ(sample.fields.size(), 2U);
+      for (const std::size_t field : {0U, 1U}) {
+        const auto volume = AtTime(12 + kLater * field);
+        EXPECT_EQ(sample.fields[field].value, double(volume->block.samples<std::uint8_t>()[volume->block.Offset(sample.voxel)]));
+      }
+    }
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      SCOPED_TRACE(testing::Message() << requests[i].renderer << ", request " << i);
+      const Result<Picture> picture = client_->Render(requests[i], kPatience);
+      ASSERT_TRUE(picture.ok()) << picture.status().message();
+      if (owners == 1) {
+        of_one.push_back(picture);
+      } else {
+        EXPECT_LE(LargestDifference(picture->image, of_one[i]->image, requests[i].size), 2 * AllowedRounding(requests[i]));
+      }
+    }
+    owners_.back().reset();
+    FrameRequest request = Request();
+    Result<Picture> picture = Status::Internal("");
+    for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end;) {
+      picture = client_->Render(request, kPatience);
+      if (!picture.ok()) break;
+    }
+    EXPECT_THAT(picture.status().message(), AnyOf(HasSubstr("of field \"far\" has left"), HasSubstr("owner 0 has left")));
   }
 }
 
