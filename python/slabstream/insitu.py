@@ -73,7 +73,8 @@ class Owner:
     that whoever looks may change. `make`: boxes are made on demand, in all owners alike: when a picture needs the box with this number at
     this time, `make(box, time)` returns its array, on a thread of its own. At most `budget` bytes of arrays are kept, those that were asked
     for last, and one in any case; `publish(time)` begins a time. If `make` raises, pictures that need the box fail with its line, and
-    with its class if that is a SlabstreamError, else as InvalidArgument. `service`: owner.json of a service with keys, or the endpoint of a service for workers;
+    with its class if that is a SlabstreamError, else as InvalidArgument. `service`: owner.json of a service with keys, or the endpoint of
+    a service for workers;
     None: what $SLABSTREAM_OWNER_SERVICE names, else the service that `slabstream up` started last on this host.
 
     The process goes on whether the service is there or not. For one thread at a time.
