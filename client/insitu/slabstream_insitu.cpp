@@ -15,7 +15,6 @@
 
 #include "client/owner/volume_owner.h"
 #include "client/service/service_state.h"
-#include "common/base/printable.h"
 #include "common/base/version.h"
 #include "common/text/split.h"
 #include "common/threads/guarded.h"
@@ -197,7 +196,7 @@ int slabstream_insitu_on_demand(slabstream_insitu* handle, const slabstream_insi
       const int code = maker.make(maker.context, std::uint32_t(box), time, &samples, error.data(), std::uint32_t(error.size()));
       error.back() = '\0';
       if (code < 0 || code >= kStatusCodeCount) return Status::Internal(fmt::format("make returned {}, which is no code", code));
-      if (code != 0) return Status(StatusCode(code), Printable(error.data()));
+      if (code != 0) return Status(StatusCode(code), error.data());
       if (samples == nullptr) return Status::Internal(fmt::format("make gave no samples of box {}", box));
       // What is held of it begins behind ghosts outside the field.
       const std::uint64_t to_held = handle->to_held[box];

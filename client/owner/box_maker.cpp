@@ -1,9 +1,8 @@
 #include "client/owner/box_maker.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
+#include "common/base/printable.h"
 #include "common/threads/guarded.h"
 #include "data/sources/copy_samples.h"
 
@@ -89,17 +88,20 @@ void BoxMaker::Run() {
     lock.unlock();
     Result<MadeBox> made = Guarded("a box that was asked for", [&, box = box] { return make_(box, time); });
     lock.lock();
-    // It may have taken so long that the slot has another time.
-    if (made.ok() && time != 0 && times_[slot] == time) {
-      memory_->Make(slot, box, made->get());
+    LruMap<Key, MadeBox>::Entries dropped;
+    if (made.ok()) {
       const HeldBox& held = own_->layout().boxes[box];
-      kept_.Put(key, *made, std::uint64_t(held.held.voxel_count()) * BytesPerSample(own_->layout().samples));
+      kept_.Put(key, *std::move(made), std::uint64_t(held.held.voxel_count()) * BytesPerSample(own_->layout().samples));
+      // It may have taken so long that the slot has another time.
+      if (time == 0 || times_[slot] != time) dropped = kept_.Drop(key);
+      if (dropped.empty()) memory_->Make(slot, box, kept_.Find(key)->get());
     }
     for (const ChunkRequest& request : asked_.extract(key).mapped()) {
-      answers_.push_back({request, made.ok() ? SamplesOf(box, request) : Result<Bytes>(made.status())});
+      answers_.push_back({request, made.ok() ? SamplesOf(box, request) : Result<Bytes>(Printable(made.status()))});
     }
     order_.pop_front();
-    Drop(kept_.DropBeyond(most_bytes_), lock);
+    dropped.splice(dropped.end(), kept_.DropBeyond(most_bytes_));
+    Drop(std::move(dropped), lock);
     answered_();
     lock.lock();
   }

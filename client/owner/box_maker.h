@@ -26,7 +26,8 @@ namespace slabstream {
 
 // The first sample of what is held of a box, with the layout's strides. It stays until the pointer goes.
 using MadeBox = std::shared_ptr<const std::byte>;
-// Makes the samples of a box at a time. It may take long, but ends soon once the owner ends. An error goes to whoever asks for the box.
+// Makes the samples of a box at a time. It may take long, but ends soon once the owner ends. An error goes to whoever asks for the box, in
+// one line.
 using MakeBox = std::function<Result<MadeBox>(std::size_t box, std::uint64_t time)>;
 
 class BoxMaker {

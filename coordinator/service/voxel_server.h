@@ -103,9 +103,6 @@ class VoxelServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
-  // Of a source that is made on demand: has the voxels made, and then replies or reads them.
-  void MakeFirst(Asked asked);
-  void OnMade(Made made);
   // Reads the next voxels that must be read first; Reply follows when they are there.
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
@@ -127,6 +124,9 @@ class VoxelServer {
     Asked asked;
     Status status;
   };
+  // Of a source that is made on demand: has the voxels made, and then replies or reads them.
+  void MakeFirst(Asked asked);
+  void OnMade(Made made);
   // The cells of a box, which is not empty, as EncodeMesh makes them.
   struct CellsCut {
     std::shared_ptr<const GridCells> of;

@@ -115,10 +115,11 @@ class OwnedSource final : public VolumeSource {
         for (std::size_t i = 0; i < of.boxes[owner].size(); ++i) voxels.elsewhere.Add(of.boxes[owner][i], owner, i);
       }
     }
-    Places owned = voxels.nobodys;
+    Places owned;
     for (std::uint32_t owner = 0; owner < of.boxes.size(); ++owner) {
       for (const Box& box : of.boxes[owner]) owned.Add(box, owner, 0);
     }
+    for (const Box& box : of.of_nobody) owned.Add(box, kNoOwner, 0);
     const VolumeGeometry& geometry = of.description.geometry;
     do {
       const VoxelLattice lattice = VoxelLattice::Of(geometry.size, int(levels_.size()));

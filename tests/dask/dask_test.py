@@ -59,7 +59,8 @@ def in_place(dask_worker):
 
 
 def lazy_chunks(dask_worker):
-    return [owner.chunks for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values() if hasattr(owner, "chunks")]
+    owners = [owner for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values()]
+    return [owner.chunks for owner in owners if hasattr(owner, "chunks")]
 
 
 def computed(dask_worker):
@@ -143,7 +144,8 @@ class DaskTest(unittest.TestCase):
             self.assertLessEqual(max(self.client.run(kept_bytes).values()), 3 * 16**3 * 4)
 
             # Where it is clipped, no chunk behind the cut is needed.
-            for clip_box, expected in (("0:64,0:64,20:28v", {(1, y, x) for y in range(4) for x in range(4)}), ("20:28,36:44,4:12v", {(0, 2, 1)})):
+            layer = {(1, y, x) for y in range(4) for x in range(4)}
+            for clip_box, expected in (("0:64,0:64,20:28v", layer), ("20:28,36:44,4:12v", {(0, 2, 1)})):
                 self.client.run(forget_computed)
                 self.assert_like(sd.render(lazy, clip_box=clip_box, **VIEW), array, clip_box=clip_box)
                 self.assertLessEqual({key[1:] for key in self.computed()}, expected)
