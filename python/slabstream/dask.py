@@ -37,7 +37,7 @@ from .insitu import Owner
 from .options import takes_options_of
 from .programs import Kept, find_program
 from .service import DEADLINE_SECONDS, Service, connect
-from .volumes import at_time, volume_of
+from .volumes import at_time, channels_of, volume_of
 
 _START_SECONDS, _END_SECONDS = 60.0, 20.0
 _COME_SECONDS = 20.0       # that the owners of an array have to come
@@ -110,7 +110,7 @@ class _Beside(WorkerPlugin):
         self.name, self._endpoint, self._files, self._memory = name, endpoint, files, memory
 
     def setup(self, worker: Any) -> None:
-        self.owners: dict[str, Owner] = {}
+        self.owners: dict[str, list[Owner]] = {}  # by dataset: one for each field
         self._lock, self._client = threading.Lock(), None
         memory, of_dask = self._memory, worker.memory_manager.memory_limit
         if memory is None and of_dask:
@@ -129,8 +129,7 @@ class _Beside(WorkerPlugin):
 
     def leave(self, dataset: str) -> None:
         """Waits little: an owner ends once the event loop goes on, perhaps."""
-        owner = self.owners.pop(dataset, None)
-        if owner is not None:
+        for owner in self.owners.pop(dataset, ()):
             closing = threading.Thread(target=owner.close, daemon=True)
             closing.start()
             closing.join(_CLOSE_SECONDS)
@@ -153,14 +152,17 @@ class _Field:
     dtype: str
     spacing: tuple[float, ...]
     origin: tuple[float, ...]
-    chunks: Mapping[str, Sequence[tuple[Any, Box]]]  # by the address of a Dask worker: keys and boxes of its chunks
+    names: tuple[str, ...]  # of all fields of the dataset; none: it has one
+    number: int  # of this one
+    owners: tuple[str, ...]  # addresses of the Dask workers that own chunks of any field
+    chunks: Mapping[str, Sequence[tuple[Any, Box]]]  # of this field, by the address of a Dask worker: keys and boxes
 
     def owner_at(self, dask_worker: Any, kind: Any = Owner, **options: Any) -> Any:
         boxes = [box for _, box in self.chunks[dask_worker.address]]
-        owner = kind(self.dataset, self.shape, self.dtype, boxes, owner=list(self.chunks).index(dask_worker.address),
-                     owners=len(self.chunks), spacing=self.spacing, origin=self.origin,
+        owner = kind(self.dataset, self.shape, self.dtype, boxes, owner=self.owners.index(dask_worker.address),
+                     owners=len(self.owners), spacing=self.spacing, origin=self.origin, fields=self.names, field=self.number,
                      service=dask_worker.plugins[self.plugin].service, **options)
-        dask_worker.plugins[self.plugin].owners[self.dataset] = owner
+        dask_worker.plugins[self.plugin].owners.setdefault(self.dataset, []).append(owner)
         return owner
 
 
@@ -272,6 +274,13 @@ def _told(plugin: str, dask_scheduler: Any) -> Any:
     return coordinator.endpoints, coordinator.files
 
 
+def _is_view(samples: Any) -> bool:
+    """Of a persisted array: numpy makes views of its chunks."""
+    layers = getattr(samples.__dask_graph__(), "layers", {})
+    kept = [name for name, layer in layers.items() if all(isinstance(task, distributed.Future) for task in layer.values())]
+    return bool(kept) and all(name in kept or name.startswith(("getitem-", "transpose-")) for name in layers)
+
+
 def _boxes(chunks: Sequence[Sequence[int]]) -> Any:
     """Those of chunks, in the order of their keys."""
     ends = [list(itertools.accumulate(along)) for along in chunks]
@@ -301,7 +310,7 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
     def __init__(self, client: Any, memory: str | None = None):
         self._client, self._plugin = client, f"slabstream-{client.id}"
         self._lock, self._numbers = threading.RLock(), itertools.count(1)
-        self._held: collections.OrderedDict[str, tuple[_Field, Any]] = collections.OrderedDict()  # by names of arrays; with what keeps the chunks
+        self._held: collections.OrderedDict[str, tuple[str, Any]] = collections.OrderedDict()  # by names of arrays: dataset, what keeps the chunks
         client.register_plugin(_Coordinator(self._plugin, client.id), name=self._plugin)
         try:
             self._start(memory)
@@ -328,44 +337,49 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
             clock.sleep(_ASK_AGAIN_SECONDS)
 
     @takes_options_of("render")
-    def render(self, array: Any, *, spacing: Any = None, origin: Any = None, time: int | None = None, deadline: float = DEADLINE_SECONDS,
-               **options: Any) -> Image:
+    def render(self, array: Any, *, spacing: Any = None, origin: Any = None, time: int | None = None, channel_axis: int | None = None,
+               deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """A picture of a dask.array.Array, or of an xarray.DataArray of one. Axes, `spacing`, `origin` and coordinates are as of
-        slabstream.load(). `time`: a number, of an array with four axes.
+        slabstream.load(). `time`: a number, of an array with four axes. `channel_axis`: the axis of what is left along which the array has
+        channels, which are fields of one picture (`channels`); None: a dimension of the DataArray that is called channel, c, band or
+        variable, with its coordinates as names.
 
         Chunks of a persisted array stay where they are. Of any other array, Dask computes the chunks that pictures need, and drops them
         when others need their memory. The array stays known until nobody has it any more, or until three others have been shown. If chunks
         go meanwhile, the picture comes once Dask has computed them again; it fails if Dask cannot."""
-        volume = volume_of(array if time is None else at_time(array, time), spacing, origin)
-        if not isinstance(volume.samples, dask.array.Array):
+        channels = channels_of(array if time is None else at_time(array, time), channel_axis)
+        volumes = {name: volume_of(channel, spacing, origin) for name, channel in channels.items()}
+        if not all(isinstance(volume.samples, dask.array.Array) for volume in volumes.values()):
             raise InvalidArgument(f"a {type(array).__name__} is not an array of Dask: slabstream.render() takes it")
+        key = " ".join(volume.samples.name for volume in volumes.values())
         for number in range(1, _MOST_TRIES + 1):
             try:
-                return self.service.render(self._dataset_of(volume, array), deadline=deadline, **options)
+                return self.service.render(self._dataset_of(key, volumes, array), deadline=deadline, **options)
             except (NotFound, Unavailable) as error:
-                refused = isinstance(error, NotFound) and self._is_there(volume.samples.name)  # of an option, not of the array
+                refused = isinstance(error, NotFound) and self._is_there(key)  # of an option, not of the array
                 if refused or number == _MOST_TRIES or self._client.status != "running":
                     raise
-                self._forget(volume.samples.name)
+                self._forget(key)
                 clock.sleep(number * _TRY_AGAIN_SECONDS)
         raise AssertionError("unreachable")
 
-    def _dataset_of(self, volume: Any, kept_with: Any) -> str:
+    def _dataset_of(self, name: str, volumes: Mapping[str, Any], kept_with: Any) -> str:
         """The name of the array's dataset, which is there."""
         with self._lock:
-            name = volume.samples.name
             if name not in self._held:
-                self._hold(name, volume)
+                self._hold(name, volumes)
                 # In a thread: nothing may wait where Python collects what is gone.
                 weakref.finalize(kept_with, lambda: threading.Thread(target=self._forget, args=(name,), daemon=True).start()).atexit = False
             self._held.move_to_end(name)
             while len(self._held) > _MOST_ARRAYS:
                 self._forget(next(iter(self._held)))
-            return self._held[name][0].dataset
+            return self._held[name][0]
 
-    def _hold(self, name: str, volume: Any) -> None:
-        """Makes Dask workers owners of the chunks that they hold."""
-        samples, spacing, origin = _upright(volume)
+    def _hold(self, name: str, volumes: Mapping[str, Any]) -> None:
+        """Makes Dask workers owners of the chunks that they hold, or may be asked for."""
+        upright = [_upright(volume) for volume in volumes.values()]
+        samples, spacing, origin = upright[0]
+        all_samples = [each for each, _, _ in upright]
         if not all(length > 0 for along in samples.chunks for length in along):  # or NaN
             raise InvalidArgument("the array has chunks without voxels or of unknown sizes: rechunk() or compute_chunk_sizes() helps")
 
@@ -375,29 +389,37 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
                                       f"at most {_MOST_BOXES}, and {_MOST_BOXES_OF_ONE} at one, can be shown; rechunk() makes larger ones")
 
         check_chunks(samples.npartitions // max(len(self._client.nthreads()), 1))  # at least; before anything is computed
-        keys = list(flatten(samples.__dask_keys__()))
-        futures = {future.key: future for future in distributed.futures_of(samples)}
-        boxes = list(zip(keys, _boxes(samples.chunks)))
-        lazy = not all(key in futures for key in keys)
-        chunks = self._deal(boxes) if lazy else self._find(boxes, futures)
-        check_chunks(max(map(len, chunks.values())))
+        keys = [list(flatten(each.__dask_keys__())) for each in all_samples]
+        futures = {future.key: future for future in distributed.futures_of(all_samples)}
+        lazy = not all(key in futures for key in itertools.chain(*keys))
+        if lazy and all(map(_is_view, all_samples)):
+            futures = {future.key: future for future in distributed.futures_of(self._client.persist(all_samples))}
+            lazy = False
+        boxes = [list(zip(of_one, _boxes(each.chunks))) for of_one, each in zip(keys, all_samples)]
+        chunks = [self._deal(each) if lazy else self._find(each, futures) for each in boxes]
+        check_chunks(max(len(each) for of_one in chunks for each in of_one.values()))
+        owners = tuple(sorted(set().union(*chunks)))
+        chunks = [{owner: of_one.get(owner, []) for owner in owners} for of_one in chunks]
         dtype = "uint8" if samples.dtype == bool else samples.dtype.newbyteorder("=").name
-        field = _Field(self._plugin, f"dask-{os.getpid()}-{next(self._numbers)}", samples.shape, dtype, spacing, origin, chunks)
-        self._held[name] = field, list(futures.values())  # not the array: it may be the caller's, which would never go
+        names = tuple(volumes) if len(volumes) > 1 else ()
+        dataset = f"dask-{os.getpid()}-{next(self._numbers)}"
+        self._held[name] = dataset, list(futures.values())  # not the array: it may be the caller's, which would never go
         try:
-            if lazy:
-                graph = dict(dask.optimize(samples)[0].__dask_graph__())
-                for worker, of_worker in chunks.items():
-                    needed, _ = cull(graph, [key for key, _ in of_worker])
-                    # What is persisted of it stays known to the scheduler by its keys.
-                    needed = {key: task for key, task in needed.items() if not isinstance(task, distributed.Future)}
-                    self._run(_own_lazy, field, needed, workers=[worker])
-            else:
-                self._run(_own, field, workers=list(chunks))
+            for number, (each, of_one) in enumerate(zip(all_samples, chunks)):
+                field = _Field(self._plugin, dataset, each.shape, dtype, spacing, origin, names, number, owners, of_one)
+                self._own_on_demand(field, each) if lazy else self._run(_own, field, workers=owners)
             self._wait_for(name)
         except BaseException:
             self._forget(name)
             raise
+
+    def _own_on_demand(self, field: _Field, samples: Any) -> None:
+        graph = dict(dask.optimize(samples)[0].__dask_graph__())
+        for worker, of_worker in field.chunks.items():
+            needed, _ = cull(graph, [key for key, _ in of_worker])
+            # What is persisted of it stays known to the scheduler by its keys.
+            needed = {key: task for key, task in needed.items() if not isinstance(task, distributed.Future)}
+            self._run(_own_lazy, field, needed, workers=[worker])
 
     def _deal(self, boxes: Sequence[tuple[Any, Box]]) -> dict[str, list[tuple[Any, Box]]]:
         """Chunks that nobody has yet, in contiguous ranges, to all Dask workers."""
@@ -430,8 +452,8 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
 
     def _is_there(self, name: str) -> bool:
         """The coordinator has the dataset of a held array."""
-        field, _ = self._held.get(name, (None, None))
-        return field is not None and any(dataset.name == field.dataset for dataset in self.service.datasets())
+        dataset, _ = self._held.get(name, (None, None))
+        return dataset is not None and any(there.name == dataset for there in self.service.datasets())
 
     def _wait_for(self, name: str) -> None:
         deadline = clock.monotonic() + _COME_SECONDS
@@ -442,9 +464,9 @@ class DaskService(contextlib.AbstractContextManager["DaskService"]):
 
     def _forget(self, name: str) -> None:
         with self._lock:
-            field, _ = self._held.pop(name, (None, None))
-            if field is not None and self._client.status == "running":
-                self._client.run(_leave, self._plugin, field.dataset, on_error="ignore")  # all that there are: those of the field may have gone
+            dataset, _ = self._held.pop(name, (None, None))
+            if dataset is not None and self._client.status == "running":
+                self._client.run(_leave, self._plugin, dataset, on_error="ignore")  # all that there are: its owners may have gone
 
     def close(self) -> None:
         """Ends the service's programs; chunks stay where they are."""

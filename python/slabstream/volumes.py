@@ -125,11 +125,12 @@ _AXIS_NAMES = {
     "y": ("y", "lat", "latitude", "northing", "row"),
     "z": ("z", "depth", "height", "altitude", "elevation", "lev", "level", "plev", "pressure", "slice"),
     "t": ("t", "time", "date", "datetime"),
+    "c": ("c", "channel", "band", "variable"),
 }
 
 
 def _role(array: Any, name: Any) -> str:
-    """x, y, z or t; "": not known."""
+    """x, y, z, t or c; "": not known."""
     attributes = array.coords[name].attrs if name in array.coords else {}
     if str(attributes.get("axis", "")).lower() in _AXIS_NAMES:
         return str(attributes["axis"]).lower()
@@ -141,7 +142,7 @@ def _first_of_others(array: Any) -> Any:
     """A DataArray of three axes: of times, channels and whatever else there is, the first, with a warning that says so."""
     roles = {name: _role(array, name) for name in array.dims}
     others = [name for name in array.dims if array.sizes[name] == 1 and roles[name] not in ("x", "y", "z")]
-    others += [name for name in array.dims if roles[name] in ("t", "") and name not in others]
+    others += [name for name in array.dims if roles[name] in ("t", "c", "") and name not in others]
     for name in others:
         if len(array.dims) <= 3 or not {"x", "y"} <= set(roles.values()):
             break
@@ -161,6 +162,21 @@ def at_time(array: Any, number: int) -> Any:
     if array.ndim != 4:
         raise InvalidArgument(f"time is {number}, but the array has {array.ndim} axes, must have 4: time, z, y, x")
     return array[number]
+
+
+def channels_of(array: Any, axis: int | None) -> dict[str, Any]:
+    """By names. Of an array without channels: itself, without a name. `axis`: as of DaskService.render."""
+    if axis is not None and not (array.ndim == 4 and -4 <= axis < 4):
+        raise InvalidArgument(f"channel_axis is {axis}, but the array has {array.ndim} axes: must have 4, and channel_axis be in [-4, 3]")
+    if _is_xarray(array):
+        dim = next((dim for dim in array.dims if _role(array, dim) == "c"), None) if axis is None else array.dims[axis]
+        if dim is None:
+            return {"": array}
+        names = array.coords[dim].values if dim in array.coords else range(array.sizes[dim])
+        return {str(name).replace(",", " "): array.isel({dim: number}) for number, name in enumerate(names)}
+    if axis is None:
+        return {"": array}
+    return {str(number): array[(slice(None),) * (axis % 4) + (number,)] for number in range(array.shape[axis])}
 
 
 def _from_xarray(array: Any, places: bool) -> Volume:

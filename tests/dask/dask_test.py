@@ -50,17 +50,19 @@ def owners(dask_worker):
     return {dataset for plugin in dask_worker.plugins.values() for dataset in getattr(plugin, "owners", {})}
 
 
+def all_owners(dask_worker):
+    return [owner for plugin in dask_worker.plugins.values() for owners in getattr(plugin, "owners", {}).values() for owner in owners]
+
+
 def in_place(dask_worker):
     """Whether owners show the very memory of Dask's chunks."""
     chunks = [chunk for chunk in dask_worker.data.values() if isinstance(chunk, np.ndarray)]
-    shown = [array for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values()
-             for arrays in owner._kept.values() for array in arrays]
+    shown = [array for owner in all_owners(dask_worker) for arrays in owner._kept.values() for array in arrays]
     return all(any(np.shares_memory(array, chunk) for chunk in chunks) for array in shown)
 
 
 def lazy_chunks(dask_worker):
-    owners = [owner for plugin in dask_worker.plugins.values() for owner in getattr(plugin, "owners", {}).values()]
-    return [owner.chunks for owner in owners if hasattr(owner, "chunks")]
+    return [owner.chunks for owner in all_owners(dask_worker) if hasattr(owner, "chunks")]
 
 
 def computed(dask_worker):
@@ -73,8 +75,7 @@ def forget_computed(dask_worker):
 
 
 def kept_bytes(dask_worker):
-    return max((sum(array.nbytes for array in owner._made.values()) for plugin in dask_worker.plugins.values()
-                for owner in getattr(plugin, "owners", {}).values()), default=0)
+    return max((sum(array.nbytes for array in owner._made.values()) for owner in all_owners(dask_worker)), default=0)
 
 
 def set_kept_part(part):
@@ -121,6 +122,32 @@ class DaskTest(unittest.TestCase):
         for what, turned in (("transposed", chunks.T), ("every second", chunks[::2, :, 1::2]), ("backwards", chunks[::-1, :, ::-1])):
             with self.subTest(what):
                 self.assert_like(sd.render(turned, **VIEW), np.ascontiguousarray(turned.compute()))
+
+    def test_channels_are_fields_of_one_picture(self):
+        first, second = blobs(), blobs()[::-1, ::-1].copy()
+        look = {"0": {"color": "red"}, "1": {"color": "lime"}}
+        swapped = {"0": look["1"], "1": look["0"]}
+        view = {name: VIEW[name] for name in ("azimuth", "elevation", "size")}
+        for persist in (True, False):
+            for chunks in ((1, 30, 30, 30), (2, 60, 20, 70)):  # channels at several Dask workers, and in one chunk
+                with self.subTest(persist=persist, chunks=chunks):
+                    both = da.from_array(np.stack([first, second]), chunks)
+                    both = both.persist() if persist else both * 1
+                    image = np.asarray(sd.render(both, channel_axis=0, channels=look, **view)).astype(int)
+                    self.assertGreater(image[..., 0].max(), 50)
+                    self.assertGreater(image[..., 1].max(), 50)
+                    other = sd.render(both[::-1], channel_axis=0, channels=swapped, **view)
+                    self.assertLessEqual(np.abs(np.asarray(other).astype(int) - image).max(), 1)
+                    if persist:
+                        self.assertTrue(all(self.client.run(in_place).values()), "chunks were copied")
+        cells = xarray.DataArray(da.from_array(np.stack([first, second], axis=-1), 30).persist(), dims=("z", "y", "x", "channel"),
+                                 coords={"channel": ["actin", "nuclei, late"]})
+        named = sd.render(cells, channels={"actin": look["0"], "nuclei  late": look["1"]}, **view)
+        self.assertLessEqual(np.abs(np.asarray(named).astype(int) - image).max(), 1)
+        with self.assertRaisesRegex(ss.NotFound, "no field 'red'.*actin"):
+            sd.render(cells, channels={"red": {}}, **view)
+        with self.assertRaisesRegex(ss.InvalidArgument, "channel_axis is 4, but the array has 4 axes"):
+            sd.render(both, channel_axis=4, **view)
 
     def test_a_lazy_array_is_given_up_with_its_chunks(self):
         lazy = da.from_array(blobs(), 30).map_blocks(lambda block: block * 2)
