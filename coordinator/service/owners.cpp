@@ -469,6 +469,11 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
                                            first - field.places.begin(), latest(*first), kOwnerWaits / std::chrono::seconds(1)));
   }
 
+  struct Shown {
+    OwnedVolume volume;
+    bool lacks = false;  // owners
+  };
+  std::optional<Result<Shown>> Show(const std::string& name, Missing missing, Time since, Time at);  // with the mutex
   Result<std::shared_ptr<VolumeSource>> Open(const std::string& name, Missing missing);
   OwnedVolume AtShownTime(const std::string& name, const Field& field);
   std::shared_ptr<const void> Use(const std::string& name, std::uint64_t time);  // with the mutex
@@ -522,32 +527,27 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
   return volume;
 }
 
-Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& name, Missing missing) {
-  std::unique_lock lock(mutex);
-  Status lacks, fails;
-  changed.wait_until(lock, MonotonicNow() + kOwnerWaits, [&] {
-    const auto found = fields.find(name);
-    const bool there = found != fields.end();
-    lacks = there ? WhoLacks(name, found->second) : Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
-    fails = there && missing != Missing::kFail ? Status::Ok() : lacks;
-    if (!fails.ok() || !wake) return true;
-    Look(found->second, MonotonicNow());
-    return found->second.shown != 0 || (!lacks.ok() && missing == Missing::kLast);
-  });
-  if (!fails.ok()) return fails;
+std::optional<Result<Owners::State::Shown>> Owners::State::Show(const std::string& name, Missing missing, Time since, Time at) {
+  const auto found = fields.find(name);
+  if (found == fields.end()) return Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
+  Field& field = found->second;
+  const Status lacks = WhoLacks(name, field);
+  if (!lacks.ok() && missing == Missing::kFail) return lacks;
   if (!wake) return Status::Unavailable("the coordinator ends");
-  const Field& field = fields.at(name);
-  OwnedVolume volume;
-  const bool is_last = !lacks.ok() && missing == Missing::kLast;
+  Look(field, at);
+  Shown shown{.lacks = !lacks.ok()};
+  OwnedVolume& volume = shown.volume;
+  const bool is_last = shown.lacks && missing == Missing::kLast;
   if (is_last) {
     if (!field.last) return Status::Unavailable(lacks.message() + ", and nobody looked before");
     volume = *field.last;
     volume.missing = lacks.message() + ": this is the last time before";
   } else if (field.shown == 0) {
+    if (at < since + kOwnerWaits) return std::nullopt;
     return NoCommonTime(name, field);
   } else {
     volume = AtShownTime(name, field);
-    if (!lacks.ok()) {
+    if (shown.lacks) {
       volume.missing = lacks.message() + ": its voxels show nothing";
     } else if (field.let_go) {
       const auto late = std::ranges::find(field.places, field.whole, [](const Place& place) { return place.owner->latest; });
@@ -556,22 +556,31 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
     }
   }
   volume.growth = std::make_shared<const FileStamp>(
-      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time at) {
+      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time asked) {
         const std::lock_guard of_state(state->mutex);
         const auto known = state->fields.find(name);
         if (known == state->fields.end()) return true;
-        state->Look(known->second, at);
+        state->Look(known->second, asked);
         return (!is_last && known->second.shown != time) || known->second.set != set;
       }});
+  return shown;
+}
+
+Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& name, Missing missing) {
+  const Time since = MonotonicNow();
+  std::unique_lock lock(mutex);
+  std::optional<Result<Shown>> shown;
+  while (!(shown = Show(name, missing, since, MonotonicNow()))) changed.wait_until(lock, since + kOwnerWaits);
   lock.unlock();
+  if (!shown->ok()) return shown->status();
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
-  for (const OwnerPlace& place : volume.field.owners) {
+  for (const OwnerPlace& place : (*shown)->volume.field.owners) {
     if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
   }
-  auto source = MakeOwnedSource(std::move(volume), ProcessReadContext());
+  auto source = MakeOwnedSource(std::move((*shown)->volume), ProcessReadContext());
   lock.lock();
   const auto known = fields.find(name);
-  if (lacks.ok() && known != fields.end()) known->second.mapped = std::move(mapped);
+  if (!(*shown)->lacks && known != fields.end()) known->second.mapped = std::move(mapped);
   lock.unlock();
   return source;
 }
@@ -630,6 +639,29 @@ void Owners::Describe(std::vector<DatasetStatus>& datasets) const {
   for (DatasetStatus& each : datasets) {
     if (const auto field = state_->fields.find(each.name); field != state_->fields.end()) each.simulation = field->second.simulation();
   }
+}
+
+std::optional<Result<OwnedVolume>> Owners::Open(const std::string& name, Missing missing, Time since, Time now) {
+  const std::lock_guard lock(state_->mutex);
+  auto shown = state_->Show(name, missing, since, now);
+  if (!shown) return std::nullopt;
+  return shown->ok() ? Result(std::move((*shown)->volume)) : shown->status();
+}
+
+OwnerSizes Owners::sizes() const {
+  const std::lock_guard lock(state_->mutex);
+  OwnerSizes sizes{.fields = state_->fields.size(), .owners = state_->peers.size()};
+  for (const auto& [name, field] : state_->fields) {
+    for (const Place& place : field.places) {
+      if (!place.owner) continue;
+      sizes.out = std::max(sizes.out, place.owner->out.size());
+      sizes.waiting += place.owner->waiting.size();
+    }
+  }
+  for (const auto& [name, times] : state_->used) {
+    for (const auto& [time, sources] : times) sizes.uses += sources;
+  }
+  return sizes;
 }
 
 Owners::News Owners::Gone(PeerToken peer, Time now) {
