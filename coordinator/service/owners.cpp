@@ -397,17 +397,19 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     owner.answered = now;
   }
 
-  void Hear(PeerToken from, const ChunkRefused& m) {
-    Owner& owner = *Find(from);
+  void Refuse(Owner& owner, std::uint64_t time, const Box& box, const Status& why) {
     const std::string& name = owner.registered.dataset;
-    Answer(owner, m.dataset, m.box,
-           Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), owner.registered.owner), m.status.message())));
+    Answer(owner, time, box,
+           Status(why.code(), fmt::format("{}: {}", Named(name, fields.at(name), owner.registered.owner), why.message())));
   }
+
+  void Hear(PeerToken from, const ChunkRefused& m) { Refuse(*Find(from), m.dataset, m.box, m.status); }
 
   void Hear(PeerToken from, const Chunk& m, const Bytes& payload) {
     std::vector<std::byte> samples(m.raw_bytes);
     const Status unpacked = UnpackChunk(m, payload.span(), samples);
-    Answer(*Find(from), m.dataset, m.box, unpacked.ok() ? Result(Bytes(std::move(samples))) : unpacked);
+    if (!unpacked.ok()) return Refuse(*Find(from), m.dataset, m.box, unpacked);
+    Answer(*Find(from), m.dataset, m.box, Bytes(std::move(samples)));
   }
 
   void Tend() {

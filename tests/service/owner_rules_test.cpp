@@ -377,7 +377,7 @@ TEST_F(OwnerRulesTest, LiesHurtNobodyElse) {
   done_ = false;
   Read();
   for (const auto& [peer, request] : Of<ChunkRequest>(owners_->Tend(now_))) answer(peer, request, whole(request), 1);
-  EXPECT_THAT(AwaitRead().message(), HasSubstr("digest"));
+  EXPECT_THAT(AwaitRead().message(), MatchesRegex("\"rho\": owner [01] of 2: payload: digest .*"));
 
   done_ = false;
   Read();
