@@ -439,8 +439,10 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
         field.told = pong;
         field.told_at = now;
       }
-      // The machine gives another time up as soon as nobody waits for it.
-      if (field.is_dataset && !pong.used.empty() && pong.used.front() != (field.shown != 0 ? field.shown : field.whole))
+      // The machine gives another time up as soon as nobody waits for it, but for the one that is kept while an owner is gone.
+      const auto oldest =
+          std::ranges::find_if(pong.used, [&](std::uint64_t time) { return !field.last || time != field.last->field.time; });
+      if (field.is_dataset && oldest != pong.used.end() && *oldest != (field.shown != 0 ? field.shown : field.whole))
         news.datasets.push_back({.name = name});
     }
     for (const PeerToken peer : silent) Lose(peer, "is silent");
