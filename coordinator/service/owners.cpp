@@ -292,6 +292,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   // While somebody looks, owners are told to hold what they have. Once all have said that they do, and what was gone before, a whole time
   // can be shown until there is another one.
   void FindShown(Field& field) {
+    // What is kept of an older time would hold up owners with few slots, and the others by them.
+    if (std::ranges::all_of(field.places, Has)) Forget(field);
     if (!IsLookedAt(field) || field.whole == 0) {
       field.hold = field.shown = 0;
       return LetGo(field, false);
@@ -305,7 +307,6 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
       return !Has(place) || (place.owner->hold == field.hold && place.owner->gone < field.whole);
     });
     if (held && std::exchange(field.shown, field.whole) != field.whole) field.since = now;
-    if (held && std::ranges::all_of(field.places, Has)) Forget(field);
     if (now < field.since + kOwnerWaits) return;
     field.hold = 0;
     LetGo(field, true);

@@ -222,6 +222,21 @@ TEST_F(OwnerRulesTest, WithoutAnOwnerThereIsThePictureOfTheOthersOrTheLastOne) {
   EXPECT_TRUE(open_(Missing::kLast).value()->info().notes.empty()) << "all are there";
 }
 
+// It may have two slots, and overwrites neither its latest time nor one that is used.
+TEST_F(OwnerRulesTest, OnceAllAreThereNoOwnerKeepsTheTimeBefore) {
+  Register();
+  opened_ = Open().value();
+  opened_.reset();
+  Hear(2, OwnerLeave{kEpoch});
+  Hear(1, OwnerTime{kEpoch, 6, 0});
+  const auto used = [&] { return Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 1, 0, 0})).at(0).second.used; };
+  EXPECT_THAT(used(), ElementsAre(5, 6));
+  Hear(3, Registration(1, 8));
+  EXPECT_THAT(used(), ElementsAre(5, 6)) << "it has no time yet";
+  Hear(3, OwnerTime{kEpoch, 9, 0});
+  EXPECT_THAT(used(), ElementsAre(6)) << "the other one may have overwritten it, so that there must be another one";
+}
+
 TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
   Register();
   Read();
