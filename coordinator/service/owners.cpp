@@ -107,6 +107,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   std::uint64_t sets = 0, holds = 0;
   std::condition_variable changed;
   Time now;
+  std::optional<Time> tended = {};  // last
   News news;
   std::vector<std::pair<AskDone, Result<Bytes>>> answers;  // given without the mutex
   std::vector<OwnedVolume> closed;                         // the same
@@ -414,11 +415,15 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   }
 
   void Tend() {
+    // If this process stood still, unread messages are no silence of the others.
+    const Duration asleep = std::max(Duration::zero(), now - std::exchange(tended, now).value_or(now) - kOwnerHeartbeat);
     std::vector<PeerToken> silent;
     for (auto& [name, field] : fields) {
       for (Place& place : field.places) {
         if (!place.owner) continue;
         Owner& owner = *place.owner;
+        owner.heard = std::min(now, owner.heard + asleep);
+        owner.answered = std::min(now, owner.answered + asleep);
         if (now >= owner.heard + kOwnerTimeout) silent.push_back(owner.peer);
         if (owner.out.empty()) owner.answered = now;
         if (now >= owner.answered + kOwnerAnswers) {

@@ -69,6 +69,15 @@ class OwnerRulesTest : public testing::Test {
       Hear(peer, OwnerPing{kEpoch, 0, pong.hold, peer == 1 ? gone_0 : gone_1});
     }
   }
+  // Time passes, in which nobody says anything.
+  Owners::News Pass(int times) {
+    Owners::News news;
+    for (int i = 0; i < times; ++i) {
+      now_ += seconds(1);
+      news = owners_->Tend(now_);
+    }
+    return news;
+  }
   // The volume, of this thread; what it is asked for is out after the next Tend.
   void Read() {
     opened_ = opened_ == nullptr ? Open().value() : source_().value();
@@ -115,15 +124,22 @@ TEST_F(OwnerRulesTest, SilenceLosesAnOwnerAndThenTheDataset) {
   Register();
   now_ += seconds(4);
   Hear(1, OwnerPing{kEpoch, 7});
-  now_ += seconds(2);
-  EXPECT_TRUE(owners_->Tend(now_).datasets.empty());
+  EXPECT_TRUE(Pass(2).datasets.empty());
   EXPECT_EQ(source_().status().message(), "\"rho\": owner 1 of 2 is silent");
   EXPECT_EQ(Of<Retire>(Hear(2, OwnerPing{kEpoch, 8})).size(), 1U) << "it registers again";
-  now_ += seconds(6);
-  const Owners::News news = owners_->Tend(now_);
+  const Owners::News news = Pass(3);
   ASSERT_EQ(news.datasets.size(), 1U);
   EXPECT_TRUE(news.datasets[0].left);
   EXPECT_EQ(source_().status().message(), "\"rho\": its owners have left");
+}
+
+TEST_F(OwnerRulesTest, ACoordinatorThatStoodStillBlamesNobody) {
+  Register();
+  owners_->Tend(now_);
+  now_ += std::chrono::minutes(1);
+  EXPECT_TRUE(owners_->Tend(now_).datasets.empty());
+  EXPECT_TRUE(Pass(3).datasets.empty());
+  EXPECT_EQ(Pass(1).datasets.size(), 1U) << "now they are silent";
 }
 
 TEST_F(OwnerRulesTest, TimesOfSourcesAreToldAndGivenUp) {
