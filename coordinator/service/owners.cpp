@@ -202,11 +202,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     const std::uint32_t number = m.owner;
     std::optional<Owner>& owner = field.places[number].owner;
     if (!owner) owner.emplace().peer = from;
-    if (owner->peer != from) {  // another connection: what is out may be lost
-      peers.erase(owner->peer);
-      owner->peer = from;
-      for (const Asked& asked : owner->out) Request(*owner, asked);
-    }
+    if (owner->peer != from) peers.erase(std::exchange(owner->peer, from));  // another connection
     owner->registered = std::move(m);
     owner->heard = now;
     owner->hold = 0;
@@ -216,6 +212,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
     news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
+    for (const Asked& asked : owner->out) Request(*owner, asked);  // it has heard nothing of what came before the welcome
     if (number == 0) TakeParameters(field);
   }
 

@@ -258,8 +258,10 @@ TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
   Read();
   auto asked = Of<ChunkRequest>(owners_->Tend(now_));
   ASSERT_EQ(asked.size(), 8U);
+  EXPECT_EQ(Of<ChunkRequest>(Hear(1, Registration(0, 100))).size(), 4U) << "it has forgotten the coordinator";
   const Owners::News again = Hear(3, Registration(0, 100));  // another connection
   EXPECT_EQ(Of<ChunkRequest>(again).size(), 4U);
+  EXPECT_TRUE(std::holds_alternative<OwnerWelcome>(again.messages.front().second)) << "else it takes requests for those of another epoch";
   for (auto& [peer, request] : asked) {
     if (peer == 1) peer = 3;
     Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
