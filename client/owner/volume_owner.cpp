@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/overloaded.h"
+#include "client/owner/owner_machine.h"
 #include "common/service/service_file.h"
 #include "common/threads/guarded.h"
 #include "common/transport/socket.h"
@@ -26,115 +26,47 @@ namespace slabstream {
 namespace {
 
 constexpr std::uint32_t kMostOwners = 4096;  // as of RegisterOwner
-constexpr Duration kRegisterAgain = std::chrono::seconds(1);
-constexpr Duration kOthersLeave = std::chrono::seconds(10);  // what an owner before this one needs to be lost
 
 }  // namespace
 
 struct VolumeOwner::Impl {
   Impl(RegisterOwner as, OwnerLayout of_layout, std::shared_ptr<OwnerMemory> of_owner, std::shared_ptr<const MappedOwner> mapped,
        MakeBox make, std::uint64_t made_bytes, Socket to_coordinator)
-      : registration(std::move(as)),
-        layout(std::move(of_layout)),
+      : layout(std::move(of_layout)),
         memory(std::move(of_owner)),
         own(std::move(mapped)),
         maker(make == nullptr ? nullptr
                               : std::make_unique<BoxMaker>(memory, own, made_bytes, std::move(make), [this] { wakeup.Notify(); })),
+        machine(std::move(as), layout.slots),
         socket(std::move(to_coordinator)),
         thread([this](const std::stop_token& stop) { Run(stop); }) {}
 
   void Run(const std::stop_token& stop);
-  void Hear(CoordinatorToOwner message, Time now);
   void Answer(const ChunkRequest& request);
   void Answer(const ChunkRequest& request, Result<Bytes> samples);
   void Send(MessageView message, const Bytes& payload = {}) { (void)socket.Send({}, Encode(message), payload); }
-  void Forget();                                  // the coordinator: nobody uses a time any more
-  std::optional<std::uint32_t> FreeSlot() const;  // of the oldest time; with the mutex
-  void Tell(const auto& change) {
+  auto Do(const auto& work) {
     const std::lock_guard lock(mutex);
-    change();
     changed.notify_all();
+    return work();
   }
 
-  RegisterOwner registration;  // steered: the thread changes values, with the mutex
   const OwnerLayout layout;
   const std::shared_ptr<OwnerMemory> memory;
   const std::shared_ptr<const MappedOwner> own;  // the same memory, to be read while it is written
   Wakeup wakeup;
   const std::unique_ptr<BoxMaker> maker;  // null: boxes are not made on demand
 
-  mutable std::mutex mutex;  // guards what follows
+  mutable std::mutex mutex;
   std::condition_variable changed;
-  std::array<std::uint64_t, kMostOwnerSlots> times = {};  // 0: none
-  std::uint64_t latest = 0, gone = 0;                     // gone: the latest time that was overwritten
-  double simulated = 0;
-  std::vector<std::uint64_t> used;  // ascending
-  std::uint64_t hold = 0;           // of the last OwnerPong
-  bool looked_at = false;
-  Status refused;
+  OwnerMachine machine;  // guarded by mutex
 
   std::optional<std::uint32_t> begun;  // of the thread of Begin and Commit
 
   // Of the thread:
   Socket socket;
-  Epoch epoch = 0;  // 0: not known to the coordinator
-  Time heard, next_send = {};
-  Duration heartbeat = kRegisterAgain, timeout = {};
-  std::optional<Time> refused_since;  // with Unavailable, and not taken since
-  std::uint64_t told = 0;             // time
-  std::jthread thread;                // last member: ends first
+  std::jthread thread;  // last member: ends first
 };
-
-void VolumeOwner::Impl::Forget() {
-  epoch = told = 0;
-  next_send = {};
-  Tell([this] {
-    used.clear();
-    hold = 0;
-    looked_at = false;
-  });
-}
-
-void VolumeOwner::Impl::Hear(CoordinatorToOwner message, Time now) {
-  heard = now;
-  std::visit(Overloaded{[&](const OwnerWelcome& m) {
-                          if (m.incarnation != registration.incarnation) return;
-                          epoch = m.epoch;
-                          refused_since.reset();
-                          heartbeat = std::chrono::milliseconds(m.heartbeat_ms);
-                          timeout = std::chrono::milliseconds(m.timeout_ms);
-                          next_send = now;
-                        },
-                        [&](OwnerPong& m) {
-                          if (m.epoch != epoch) return;
-                          std::ranges::sort(m.used);
-                          if (m.hold != hold) next_send = now;
-                          Tell([&] {
-                            used = std::move(m.used);
-                            hold = m.hold;
-                            looked_at = m.looked_at;
-                          });
-                        },
-                        [&](const OwnerSteered& m) {
-                          if (m.epoch != epoch || m.values.size() != registration.steered.size()) return;
-                          Tell([&] {
-                            for (std::size_t i = 0; i < m.values.size(); ++i) registration.steered[i].value = m.values[i];
-                          });
-                        },
-                        [&](const OwnerRefused& m) {
-                          if (m.incarnation != registration.incarnation) return;
-                          if (!refused_since) refused_since = now;
-                          if (m.status.code() == StatusCode::kUnavailable && now < *refused_since + kOthersLeave) return;
-                          Tell([&] { refused = m.status; });
-                        },
-                        [&](const Retire&) {
-                          if (epoch != 0) Forget();
-                        },
-                        [&](const ChunkRequest& m) {
-                          if (m.epoch == epoch) Answer(m);
-                        }},
-             message);
-}
 
 void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
   const Box& box = request.box;
@@ -154,60 +86,47 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
 }
 
 void VolumeOwner::Impl::Answer(const ChunkRequest& request, Result<Bytes> samples) {
-  if (request.epoch != epoch) return;  // it was asked by another coordinator
-  if (!samples.ok()) return Send(ChunkRefused{epoch, request.dataset, request.box, request.chunk, samples.status()});
-  Chunk chunk{.epoch = epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+  if (!samples.ok()) return Send(ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, samples.status()});
+  Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
   const Bytes payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
   Send(chunk, payload);
 }
 
 void VolumeOwner::Impl::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket};
+  Epoch epoch = 0;
+  Duration rest = {};
   bool ended = false;  // it was refused
   while (!stop.stop_requested() && !ended) {
     const Status done = Guarded("an owner of voxels", [&] {
-      Wait(sockets, &wakeup, std::clamp(next_send - MonotonicNow(), Duration::zero(), heartbeat));
+      Wait(sockets, &wakeup, rest);
       while (const std::optional<Incoming> incoming = socket.TryReceive()) {
         Result<CoordinatorToOwner> message = Decode<CoordinatorToOwner>(incoming->header(), incoming->payload().size());
-        if (message.ok()) Hear(*std::move(message), MonotonicNow());
+        if (!message.ok()) continue;
+        epoch = Do([&] {
+          machine.Hear(*message, MonotonicNow());
+          return machine.epoch();
+        });
+        if (const auto* request = std::get_if<ChunkRequest>(&*message); request != nullptr && request->epoch == epoch) Answer(*request);
       }
       for (BoxMaker::Answer& each : maker == nullptr ? std::vector<BoxMaker::Answer>() : maker->TakeAnswers()) {
-        Answer(each.request, std::move(each.samples));
+        if (each.request.epoch == epoch) Answer(each.request, std::move(each.samples));  // else another coordinator has asked
       }
-      if (socket.refused()) Tell([this] { refused = Status::Unavailable("the coordinator refuses the key of this owner"); });
-      const Time now = MonotonicNow();
-      if (epoch != 0 && now >= heard + timeout) Forget();
-      OwnerTime time{.epoch = epoch};
-      OwnerPing ping{.epoch = epoch, .making = maker != nullptr && maker->is_making()};
-      {
-        const std::lock_guard lock(mutex);
-        ended = !refused.ok();
-        if (ended) return;
-        time.time = latest;
-        time.simulated = simulated;
-        ping.hold = hold;
-        ping.gone = gone;
-      }
-      if (epoch != 0 && time.time > std::exchange(told, time.time)) Send(time);
-      if (now < next_send) return;
-      next_send = now + heartbeat;
-      epoch != 0 ? Send(ping) : Send(registration);
+      if (socket.refused()) Do([this] { machine.Refuse(Status::Unavailable("the coordinator refuses the key of this owner")); });
+      const bool making = maker != nullptr && maker->is_making();
+      const std::vector<OwnerToCoordinator> said = Do([&] {
+        const Time now = MonotonicNow();
+        std::vector<OwnerToCoordinator> words = machine.Say(now, making);
+        epoch = machine.epoch();
+        rest = std::clamp(machine.NextWake() - now, Duration::zero(), machine.heartbeat());
+        ended = !machine.refused().ok();
+        return words;
+      });
+      for (const OwnerToCoordinator& message : said) std::visit([this](const auto& each) { Send(each); }, message);
     });
-    if (!done.ok()) Tell([&] { refused = done; });
+    if (!done.ok()) Do([&] { machine.Refuse(done); });
   }
   if (epoch != 0) Send(OwnerLeave{epoch});
-}
-
-std::optional<std::uint32_t> VolumeOwner::Impl::FreeSlot() const {
-  std::optional<std::uint32_t> oldest;
-  for (std::uint32_t slot = 0; slot < layout.slots; ++slot) {
-    const std::uint64_t time = times.at(slot);
-    const bool in_use = std::ranges::binary_search(used, time) || (hold != 0 && !used.empty() && time > used.back());
-    // Not the latest one: the simulation may compute the next time from it.
-    if (time != 0 && (time == latest || in_use)) continue;
-    if (!oldest || time < times.at(*oldest)) oldest = slot;
-  }
-  return oldest;
 }
 
 Result<std::unique_ptr<VolumeOwner>> VolumeOwner::Start(Context& context, VolumeOwnerOptions options) {
@@ -276,31 +195,32 @@ VolumeOwner::~VolumeOwner() {
 Result<VolumeOwner::Slot> VolumeOwner::Begin(Duration timeout) {
   const Time since = MonotonicNow();
   std::unique_lock lock(impl_->mutex);
+  OwnerMachine& machine = impl_->machine;
   std::optional<std::uint32_t> slot;
-  impl_->changed.wait_until(lock, since + timeout, [&] { return !impl_->refused.ok() || (slot = impl_->FreeSlot()).has_value(); });
-  if (!impl_->refused.ok()) return impl_->refused;
-  if (!slot)
-    return Status::Unavailable(fmt::format("\"{}\": the times of all {} slots are used", impl_->registration.dataset, impl_->layout.slots));
+  impl_->changed.wait_until(lock, since + timeout, [&] { return !machine.refused().ok() || (slot = machine.FreeSlot()).has_value(); });
+  if (!machine.refused().ok()) return machine.refused();
+  if (!slot) {
+    return Status::Unavailable(
+        fmt::format("\"{}\": the times of all {} slots are used", machine.registration().dataset, impl_->layout.slots));
+  }
   impl_->begun = slot;
-  const std::uint64_t freed = std::exchange(impl_->times.at(*slot), 0);
-  impl_->gone = std::max(impl_->gone, freed);
+  const std::uint64_t freed = machine.Begin(*slot);
   if (impl_->maker != nullptr) impl_->maker->SetTime(*slot, 0);
   return Slot{impl_->memory->Begin(*slot), MonotonicNow() - since, freed};
 }
 
 Status VolumeOwner::Commit(std::uint64_t time, double simulated, std::span<const std::byte* const> arrays) {
   if (!impl_->begun) return Status::InvalidArgument("Commit without Begin");
-  if (time <= impl_->latest) return Status::InvalidArgument(fmt::format("time {} is not above {}, the last one", time, impl_->latest));
+  if (const std::uint64_t latest = impl_->machine.latest(); time <= latest) {  // no other thread commits
+    return Status::InvalidArgument(fmt::format("time {} is not above {}, the last one", time, latest));
+  }
   if (const std::size_t boxes = impl_->layout.boxes.size(); !arrays.empty() && arrays.size() != boxes) {
     return Status::InvalidArgument(fmt::format("arrays of {} boxes, must be of {}", arrays.size(), boxes));
   }
   if (impl_->maker != nullptr && !arrays.empty()) return Status::InvalidArgument("arrays of boxes that are made on demand");
   impl_->memory->Commit(*impl_->begun, time, simulated, arrays);
   if (impl_->maker != nullptr) impl_->maker->SetTime(*impl_->begun, time);
-  impl_->Tell([&] {
-    impl_->times.at(*impl_->begun) = impl_->latest = time;
-    impl_->simulated = simulated;
-  });
+  impl_->Do([&] { impl_->machine.Commit(*impl_->begun, time, simulated); });
   impl_->begun.reset();
   impl_->wakeup.Notify();
   return Status::Ok();
@@ -309,13 +229,13 @@ Status VolumeOwner::Commit(std::uint64_t time, double simulated, std::span<const
 std::vector<double> VolumeOwner::parameters() const {
   const std::lock_guard lock(impl_->mutex);
   std::vector<double> values;
-  for (const SteeredParameter& each : impl_->registration.steered) values.push_back(each.value);
+  for (const SteeredParameter& each : impl_->machine.registration().steered) values.push_back(each.value);
   return values;
 }
 
 bool VolumeOwner::looked_at() const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->looked_at;
+  return impl_->machine.looked_at();
 }
 
 }  // namespace slabstream

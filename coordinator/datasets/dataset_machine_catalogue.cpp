@@ -94,8 +94,8 @@ void DatasetMachine::State::On(const OwnedData& event) {
   const DatasetTable::Entry* const entry = datasets.Find(event.name);
   if (entry == nullptr || !entry->source.open) return;  // an admin has removed it
   if (event.left) return RemoveData(event.name, "its owners have left");
-  const auto of_it = [&](const std::string& awaited) { return DatasetOfPart(awaited) == event.name; };
-  if (entry->state == DatasetState::kReady && !IsAwaited(of_it)) datasets.Reset(event.name, now);
+  datasets.Release(
+      event.name, [this](const std::string& wanted) { return IsWanted(wanted); }, now);
 }
 
 void DatasetMachine::State::StopWatching(const std::string& folder) {

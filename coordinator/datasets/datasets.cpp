@@ -113,6 +113,18 @@ bool DatasetTable::ClosePart(const std::function<bool(const std::string&)>& is_w
   return true;
 }
 
+void DatasetTable::Release(const std::string& name, const std::function<bool(const std::string&)>& is_wanted, Time now) {
+  std::erase_if(parts_, [&](const auto& part) {
+    if (DatasetOfPart(part.first) != name || part.second.state != DatasetState::kReady || is_wanted(part.first)) return false;
+    Retire(part.second);
+    return true;
+  });
+  Entry& entry = *Find(name);
+  if (entry.state != DatasetState::kReady || is_wanted(name)) return;
+  Retire(entry);
+  entry = Forgotten(entry, now);
+}
+
 LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   Entry& entry = *Find(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;

@@ -119,6 +119,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   std::uint64_t sets = 0, holds = 0;
   std::condition_variable changed;
   Time now;
+  std::optional<Time> tended = {};  // last
   News news;
   std::vector<std::pair<AskDone, Result<Bytes>>> answers;  // given without the mutex
   std::vector<OwnedVolume> closed;                         // the same
@@ -216,11 +217,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     const std::uint32_t number = PlaceOf(m);
     std::optional<Owner>& owner = field.places[number].owner;
     if (!owner) owner.emplace().peer = from;
-    if (owner->peer != from) {  // another connection: what is out may be lost
-      peers.erase(owner->peer);
-      owner->peer = from;
-      for (const Asked& asked : owner->out) Request(*owner, asked);
-    }
+    if (owner->peer != from) peers.erase(std::exchange(owner->peer, from));  // another connection
     owner->registered = std::move(m);
     owner->heard = now;
     owner->hold = 0;
@@ -230,6 +227,7 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     const auto in_ms = [](Duration time) { return std::uint32_t(time / std::chrono::milliseconds(1)); };
     news.messages.emplace_back(from, OwnerWelcome{epoch, owner->registered.incarnation, in_ms(kOwnerHeartbeat), in_ms(kOwnerTimeout)});
     news.messages.emplace_back(from, Pong(name, field));
+    for (const Asked& asked : owner->out) Request(*owner, asked);  // it has heard nothing of what came before the welcome
     if (number == 0) TakeParameters(field);
   }
 
@@ -308,6 +306,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   // While somebody looks, owners are told to hold what they have. Once all have said that they do, and what was gone before, a whole time
   // can be shown until there is another one.
   void FindShown(Field& field) {
+    // What is kept of an older time would hold up owners with few slots, and the others by them.
+    if (std::ranges::all_of(field.places, Has)) Forget(field);
     if (!IsLookedAt(field) || field.whole == 0) {
       field.hold = field.shown = 0;
       return LetGo(field, false);
@@ -321,7 +321,6 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
       return !Has(place) || (place.owner->hold == field.hold && place.owner->gone < field.whole);
     });
     if (held && std::exchange(field.shown, field.whole) != field.whole) field.since = now;
-    if (held && std::ranges::all_of(field.places, Has)) Forget(field);
     if (now < field.since + kOwnerWaits) return;
     field.hold = 0;
     LetGo(field, true);
@@ -423,25 +422,31 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     owner.answered = now;
   }
 
-  void Hear(PeerToken from, const ChunkRefused& m) {
-    Owner& owner = *Find(from);
+  void Refuse(Owner& owner, std::uint64_t time, const Box& box, const Status& why) {
     const std::string& name = owner.registered.dataset;
-    Answer(owner, m.dataset, m.box, std::nullopt,
-           Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), PlaceOf(owner.registered)), m.status.message())));
+    Answer(owner, time, box, std::nullopt,
+           Status(why.code(), fmt::format("{}: {}", Named(name, fields.at(name), PlaceOf(owner.registered)), why.message())));
   }
+
+  void Hear(PeerToken from, const ChunkRefused& m) { Refuse(*Find(from), m.dataset, m.box, m.status); }
 
   void Hear(PeerToken from, const Chunk& m, const Bytes& payload) {
     std::vector<std::byte> samples(m.raw_bytes);
     const Status unpacked = UnpackChunk(m, payload.span(), samples);
-    Answer(*Find(from), m.dataset, m.box, m.raw_bytes, unpacked.ok() ? Result(Bytes(std::move(samples))) : unpacked);
+    if (!unpacked.ok()) return Refuse(*Find(from), m.dataset, m.box, unpacked);
+    Answer(*Find(from), m.dataset, m.box, m.raw_bytes, Bytes(std::move(samples)));
   }
 
   void Tend() {
+    // If this process stood still, unread messages are no silence of the others.
+    const Duration asleep = std::max(Duration::zero(), now - std::exchange(tended, now).value_or(now) - kOwnerHeartbeat);
     std::vector<PeerToken> silent;
     for (auto& [name, field] : fields) {
       for (Place& place : field.places) {
         if (!place.owner) continue;
         Owner& owner = *place.owner;
+        owner.heard = std::min(now, owner.heard + asleep);
+        owner.answered = std::min(now, owner.answered + asleep);
         if (now >= owner.heard + kOwnerTimeout) silent.push_back(owner.peer);
         if (owner.out.empty()) owner.answered = now;
         if (now >= owner.answered + kOwnerAnswers) {
@@ -463,8 +468,10 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
         field.told = pong;
         field.told_at = now;
       }
-      // The machine gives another time up as soon as nobody waits for it.
-      if (field.is_dataset && !pong.used.empty() && pong.used.front() != (field.shown != 0 ? field.shown : field.whole))
+      // The machine gives another time up as soon as nobody waits for it, but for the one that is kept while an owner is gone.
+      const auto oldest =
+          std::ranges::find_if(pong.used, [&](std::uint64_t time) { return !field.last || time != field.last->field.time; });
+      if (field.is_dataset && oldest != pong.used.end() && *oldest != (field.shown != 0 ? field.shown : field.whole))
         news.datasets.push_back({.name = name});
     }
     for (const PeerToken peer : silent) Lose(peer, "is silent");
@@ -495,6 +502,11 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
                                            first - field.places.begin(), latest(*first), kOwnerWaits / std::chrono::seconds(1)));
   }
 
+  struct Shown {
+    OwnedVolume volume;
+    bool lacks = false;  // owners
+  };
+  std::optional<Result<Shown>> Show(const std::string& name, Missing missing, Time since, Time at);  // with the mutex
   Result<std::shared_ptr<VolumeSource>> Open(const std::string& name, Missing missing);
   OwnedVolume AtShownTime(const std::string& name, const Field& field);
   OwnedVolume AtShownTime(const std::string& name, const Field& field, std::size_t number, std::vector<Box>& missing);
@@ -577,32 +589,27 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
   return volume;
 }
 
-Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& name, Missing missing) {
-  std::unique_lock lock(mutex);
-  Status lacks, fails;
-  changed.wait_until(lock, MonotonicNow() + kOwnerWaits, [&] {
-    const auto found = fields.find(name);
-    const bool there = found != fields.end();
-    lacks = there ? WhoLacks(name, found->second) : Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
-    fails = there && missing != Missing::kFail ? Status::Ok() : lacks;
-    if (!fails.ok() || !wake) return true;
-    Look(found->second, MonotonicNow());
-    return found->second.shown != 0 || (!lacks.ok() && missing == Missing::kLast);
-  });
-  if (!fails.ok()) return fails;
+std::optional<Result<Owners::State::Shown>> Owners::State::Show(const std::string& name, Missing missing, Time since, Time at) {
+  const auto found = fields.find(name);
+  if (found == fields.end()) return Status::Unavailable(fmt::format("\"{}\": its owners have left", name));
+  Field& field = found->second;
+  const Status lacks = WhoLacks(name, field);
+  if (!lacks.ok() && missing == Missing::kFail) return lacks;
   if (!wake) return Status::Unavailable("the coordinator ends");
-  const Field& field = fields.at(name);
-  OwnedVolume volume;
-  const bool is_last = !lacks.ok() && missing == Missing::kLast;
+  Look(field, at);
+  Shown shown{.lacks = !lacks.ok()};
+  OwnedVolume& volume = shown.volume;
+  const bool is_last = shown.lacks && missing == Missing::kLast;
   if (is_last) {
     if (!field.last) return Status::Unavailable(lacks.message() + ", and nobody looked before");
     volume = *field.last;
     volume.missing = lacks.message() + ": this is the last time before";
   } else if (field.shown == 0) {
+    if (at < since + kOwnerWaits) return std::nullopt;
     return NoCommonTime(name, field);
   } else {
     volume = AtShownTime(name, field);
-    if (!lacks.ok()) {
+    if (shown.lacks) {
       volume.missing = lacks.message() + ": its voxels show nothing";
     } else if (field.let_go) {
       const auto late = std::ranges::find(field.places, field.whole, [](const Place& place) { return place.owner->latest; });
@@ -611,15 +618,25 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
     }
   }
   volume.growth = std::make_shared<const FileStamp>(
-      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time at) {
+      FileStamp{.ask = [state = shared_from_this(), name, is_last, time = field.shown, set = field.set](Time asked) {
         const std::lock_guard of_state(state->mutex);
         const auto known = state->fields.find(name);
         if (known == state->fields.end()) return true;
-        state->Look(known->second, at);
+        state->Look(known->second, asked);
         return (!is_last && known->second.shown != time) || known->second.set != set;
       }});
+  return shown;
+}
+
+Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& name, Missing missing) {
+  const Time since = MonotonicNow();
+  std::unique_lock lock(mutex);
+  std::optional<Result<Shown>> shown;
+  while (!(shown = Show(name, missing, since, MonotonicNow()))) changed.wait_until(lock, since + kOwnerWaits);
   lock.unlock();
+  if (!shown->ok()) return shown->status();
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
+  OwnedVolume& volume = (*shown)->volume;
   const auto map = [&](const OwnedVolume& of) {
     for (const OwnerPlace& place : of.field.owners) {
       if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
@@ -629,7 +646,7 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
   auto source = MakeOwnedSource(std::move(volume), ProcessReadContext());
   lock.lock();
   const auto known = fields.find(name);
-  if (lacks.ok() && known != fields.end()) known->second.mapped = std::move(mapped);
+  if (!(*shown)->lacks && known != fields.end()) known->second.mapped = std::move(mapped);
   lock.unlock();
   return source;
 }
@@ -688,6 +705,29 @@ void Owners::Describe(std::vector<DatasetStatus>& datasets) const {
   for (DatasetStatus& each : datasets) {
     if (const auto field = state_->fields.find(each.name); field != state_->fields.end()) each.simulation = field->second.simulation();
   }
+}
+
+std::optional<Result<OwnedVolume>> Owners::Open(const std::string& name, Missing missing, Time since, Time now) {
+  const std::lock_guard lock(state_->mutex);
+  auto shown = state_->Show(name, missing, since, now);
+  if (!shown) return std::nullopt;
+  return shown->ok() ? Result(std::move((*shown)->volume)) : shown->status();
+}
+
+OwnerSizes Owners::sizes() const {
+  const std::lock_guard lock(state_->mutex);
+  OwnerSizes sizes{.fields = state_->fields.size(), .owners = state_->peers.size()};
+  for (const auto& [name, field] : state_->fields) {
+    for (const Place& place : field.places) {
+      if (!place.owner) continue;
+      sizes.out = std::max(sizes.out, place.owner->out.size());
+      sizes.waiting += place.owner->waiting.size();
+    }
+  }
+  for (const auto& [name, times] : state_->used) {
+    for (const auto& [time, sources] : times) sizes.uses += sources;
+  }
+  return sizes;
 }
 
 Owners::News Owners::Gone(PeerToken peer, Time now) {

@@ -16,6 +16,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,7 @@
 #include "common/wire/any_message.h"
 #include "coordinator/datasets/dataset_machine.h"
 #include "coordinator/peer_token.h"
+#include "data/owned/owned_source.h"
 
 namespace slabstream {
 
@@ -34,6 +36,14 @@ inline constexpr Duration kOwnerAnswers = std::chrono::seconds(10);  // without 
 inline constexpr std::size_t kMostAskedOfOwner = 16;                 // requests that are out; others wait
 inline constexpr std::size_t kMostFieldBoxes = 65536;                // of all owners of a field
 inline constexpr std::size_t kMostFields = 64;
+
+// At rest, with no source open, the last three are 0.
+struct OwnerSizes {
+  std::size_t fields = 0, owners = 0;
+  std::size_t out = 0;      // requests to the owner that has most
+  std::size_t waiting = 0;  // to all owners
+  std::size_t uses = 0;     // sources that live, and what is kept of times before an owner left
+};
 
 class Owners {
  public:
@@ -52,11 +62,16 @@ class Owners {
   // What time has brought, and other threads: at least every second, after each event, and when `wake` was called.
   News Tend(Time now);
 
+  // What is shown of a field to somebody who asked for it at `since`. Nothing: it may be there when something has happened, and at the
+  // latest at `since` + kOwnerWaits there is an error. DataSource::open waits for that. Unavailable: why it is not shown.
+  std::optional<Result<OwnedVolume>> Open(const std::string& name, Missing missing, Time since, Time now);
+
   // Changes parameters, all or none; what to tell the owner comes with the next Tend. NotFound, InvalidArgument: there is nothing to steer,
   // no such parameter, or a value beyond its limits.
   Result<SimulationStatus> Steer(const SteerDataset& order);
   // Fills in what each dataset's simulation is at.
   void Describe(std::vector<DatasetStatus>& datasets) const;
+  OwnerSizes sizes() const;
 
  private:
   struct State;

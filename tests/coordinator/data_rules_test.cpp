@@ -122,6 +122,26 @@ TEST_F(OwnedDataRules, WhoeverWantsThatSeesWhatIsThereWhileOwnersAreGone) {
   EXPECT_EQ(script.machine.sizes().uses, 1U) << "the frame that has begun";
 }
 
+// Else owners with few slots, which may not overwrite that time, could give no other one.
+TEST_F(OwnedDataRules, WhatWasThereIsGivenUpWhileSomebodyWaitsForAll) {
+  DataSource source("2 owners", "");
+  source.open = [](Missing) { return Result<std::shared_ptr<VolumeSource>>(Status::Unavailable("nobody asks")); };
+  script.Step(OwnedData{"block", source});
+  SubmitFrame skips = Frame(1, 1);
+  skips.frame.missing = Missing::kSkip;
+  script.Client(kClient, skips);
+  const LoadDataset all = script.loads.back();
+  script.Step(DatasetFailed{all.name, all.load, Status::Unavailable("an owner has left")});
+  const LoadDataset part = script.loads.back();
+  script.Step(DatasetLoaded{part.name, part.load, 7, BlockSummary(), 0, std::make_shared<const FileStamp>()});
+  script.Client(kClient, CancelFrame{1});
+  EXPECT_THAT(Of<UnloadDataset>(script.Client(kOther, Frame(2, 1))), SizeIs(0));
+  const auto unloaded = Of<UnloadDataset>(script.Step(OwnedData{"block"}));
+  ASSERT_THAT(unloaded, SizeIs(1));
+  EXPECT_EQ(unloaded[0].dataset, 7U);
+  EXPECT_EQ(StateOf("block"), DatasetState::kLoading) << "it is waited for";
+}
+
 // ---------------------------------------------------------------- files
 
 TEST_F(DataRules, AFrameWaitsForALookThatBeganAfterItsRequest) {

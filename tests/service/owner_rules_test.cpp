@@ -70,6 +70,15 @@ class OwnerRulesTest : public testing::Test {
       Hear(peer, OwnerPing{kEpoch, 0, pong.hold, peer == 1 ? gone_0 : gone_1});
     }
   }
+  // Time passes, in which nobody says anything.
+  Owners::News Pass(int times) {
+    Owners::News news;
+    for (int i = 0; i < times; ++i) {
+      now_ += seconds(1);
+      news = owners_->Tend(now_);
+    }
+    return news;
+  }
   // The volume, of this thread; what it is asked for is out after the next Tend.
   void Read() {
     opened_ = opened_ == nullptr ? Open().value() : source_().value();
@@ -116,15 +125,22 @@ TEST_F(OwnerRulesTest, SilenceLosesAnOwnerAndThenTheDataset) {
   Register();
   now_ += seconds(4);
   Hear(1, OwnerPing{kEpoch, 7});
-  now_ += seconds(2);
-  EXPECT_TRUE(owners_->Tend(now_).datasets.empty());
+  EXPECT_TRUE(Pass(2).datasets.empty());
   EXPECT_EQ(source_().status().message(), "\"rho\": owner 1 of 2 is silent");
   EXPECT_EQ(Of<Retire>(Hear(2, OwnerPing{kEpoch, 8})).size(), 1U) << "it registers again";
-  now_ += seconds(6);
-  const Owners::News news = owners_->Tend(now_);
+  const Owners::News news = Pass(3);
   ASSERT_EQ(news.datasets.size(), 1U);
   EXPECT_TRUE(news.datasets[0].left);
   EXPECT_EQ(source_().status().message(), "\"rho\": its owners have left");
+}
+
+TEST_F(OwnerRulesTest, ACoordinatorThatStoodStillBlamesNobody) {
+  Register();
+  owners_->Tend(now_);
+  now_ += std::chrono::minutes(1);
+  EXPECT_TRUE(owners_->Tend(now_).datasets.empty());
+  EXPECT_TRUE(Pass(3).datasets.empty());
+  EXPECT_EQ(Pass(1).datasets.size(), 1U) << "now they are silent";
 }
 
 TEST_F(OwnerRulesTest, TimesOfSourcesAreToldAndGivenUp) {
@@ -223,13 +239,30 @@ TEST_F(OwnerRulesTest, WithoutAnOwnerThereIsThePictureOfTheOthersOrTheLastOne) {
   EXPECT_TRUE(open_(Missing::kLast).value()->info().notes.empty()) << "all are there";
 }
 
+// It may have two slots, and overwrites neither its latest time nor one that is used.
+TEST_F(OwnerRulesTest, OnceAllAreThereNoOwnerKeepsTheTimeBefore) {
+  Register();
+  opened_ = Open().value();
+  opened_.reset();
+  Hear(2, OwnerLeave{kEpoch});
+  Hear(1, OwnerTime{kEpoch, 6, 0});
+  const auto used = [&] { return Of<OwnerPong>(Hear(1, OwnerPing{kEpoch, 1, 0, 0})).at(0).second.used; };
+  EXPECT_THAT(used(), ElementsAre(5, 6));
+  Hear(3, Registration(1, 8));
+  EXPECT_THAT(used(), ElementsAre(5, 6)) << "it has no time yet";
+  Hear(3, OwnerTime{kEpoch, 9, 0});
+  EXPECT_THAT(used(), ElementsAre(6)) << "the other one may have overwritten it, so that there must be another one";
+}
+
 TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
   Register();
   Read();
   auto asked = Of<ChunkRequest>(owners_->Tend(now_));
   ASSERT_EQ(asked.size(), 8U);
+  EXPECT_EQ(Of<ChunkRequest>(Hear(1, Registration(0, 100))).size(), 4U) << "it has forgotten the coordinator";
   const Owners::News again = Hear(3, Registration(0, 100));  // another connection
   EXPECT_EQ(Of<ChunkRequest>(again).size(), 4U);
+  EXPECT_TRUE(std::holds_alternative<OwnerWelcome>(again.messages.front().second)) << "else it takes requests for those of another epoch";
   for (auto& [peer, request] : asked) {
     if (peer == 1) peer = 3;
     Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
@@ -416,7 +449,7 @@ TEST_F(OwnerRulesTest, LiesHurtNobodyElse) {
   done_ = false;
   Read();
   for (const auto& [peer, request] : Of<ChunkRequest>(owners_->Tend(now_))) answer(peer, request, whole(request), 1);
-  EXPECT_THAT(AwaitRead().message(), HasSubstr("digest"));
+  EXPECT_THAT(AwaitRead().message(), MatchesRegex("\"rho\": owner [01] of 2: payload: digest .*"));
 
   done_ = false;
   Read();

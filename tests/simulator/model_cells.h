@@ -15,10 +15,11 @@ namespace slabstream {
 
 class ModelCells {
  public:
-  explicit ModelCells(std::uint64_t seed) : seed_(seed) {}
+  // `may_be`: the dataset may be a grid.
+  ModelCells(std::uint64_t seed, bool may_be) : seed_(seed), may_be_(may_be) {}
 
-  // The dataset is a grid in every fourth world.
-  bool present() const { return Draw({}) % 4 == 0; }
+  // In every fourth world where it may be.
+  bool present() const { return may_be_ && Draw({}) % 4 == 0; }
   // 1 to 3 chunks; always the same of a box of a dataset.
   std::uint64_t BytesOf(DatasetId dataset, const Box& box) const {
     return 1 + Draw({dataset, Of(box.begin.x), Of(box.begin.y), Of(box.begin.z), Of(box.end.x), Of(box.end.y), Of(box.end.z)}) %
@@ -33,6 +34,7 @@ class ModelCells {
   }
 
   const std::uint64_t seed_;
+  const bool may_be_;
 };
 
 }  // namespace slabstream

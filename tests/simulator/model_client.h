@@ -32,6 +32,10 @@ class ModelClient {
   bool idle() const { return vanished_ || open_.empty(); }
   bool vanished() const { return vanished_; }
   std::size_t submitted() const { return submitted_; }
+  const SubmitFrame* Find(RequestId request) const {  // null: it is not open
+    const auto open = open_.find(request);
+    return open == open_.end() ? nullptr : &open->second.submit;
+  }
   const std::map<RequestId, Ended>& ended() const { return ended_; }
   const std::set<RequestId>& cancelled() const { return cancelled_; }
 

@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 // 8 MiB: a padded box has 1 to 8 chunks. Voxels of four bytes, since plans cost time by voxel.
-constexpr Index3 kVolumeSize{256, 64, 128};
+constexpr Index3 kVolumeSize{256, 64, 128}, kOwnedSize{64, 32, 32};
 
 // Values up to 50 show nothing.
 TransferFunction StepTransfer() {
@@ -35,10 +35,11 @@ TransferFunction StepTransfer() {
 // before anything is drawn.
 void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) {
   auto summary = std::make_shared<VolumeSummary>();
-  summary->description.geometry.size = kVolumeSize;
+  const Index3 size = world.owned ? kOwnedSize : kVolumeSize;  // voxels of owners are real
+  summary->description.geometry.size = size;
   summary->description.type = kVoxelType;
   summary->range = {0, 255};
-  summary->brick_counts = {kVolumeSize.x / kBrick, kVolumeSize.y / kBrick, kVolumeSize.z / kBrick};
+  summary->brick_counts = {size.x / kBrick, size.y / kBrick, size.z / kBrick};
   const double empty = random.Chance(0.05) ? 1 : random.Real(0, 0.8);
   std::vector<ValueRange> layers;
   const double solid = random.Chance(0.3) ? random.Real(0, 1) : 0;
@@ -56,8 +57,8 @@ void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) 
 
 }  // namespace
 
-SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells) {
-  SimulatedWorld world;
+SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells, bool owned) {
+  SimulatedWorld world{.owned = owned};
   MakeVolume(random, cells, world);
   world.speed.render = random.Chance(0.1) ? 0.3 : random.Real(0.001, 0.04);
   // A box takes less time than a frame may be without progress, also if all clients have one.
@@ -70,7 +71,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   world.worker_config.chunk_attempts = 6;
   world.worker_config.credit_bytes = std::uint64_t{kChunkBytes} * random.Integer<std::uint64_t>(1, 4);
   if (!faults.none() && random.Chance(0.3)) world.worker_config.cache_bytes = std::uint64_t{4} << 20;
-  world.in_parts = !cells.present() && random.Chance(faults.only_stores() ? 1 : 0.25);
+  world.in_parts = !cells.present() && !owned && random.Chance(faults.only_stores() ? 1 : 0.25);
   world.policy.groups = random.Integer(1, 6);
   world.policy.axis = AxisChoice(random.Integer(0, 4));
   const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };
@@ -82,11 +83,11 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   }
   if (FindNamed(Assignments(), world.policy.assignment)->by_owner) {
     auto summary = std::make_shared<VolumeSummary>(*world.summary);
-    auto owned = std::make_shared<OwnedBoxes>();
+    auto boxes = std::make_shared<OwnedBoxes>();
     const Partition partition = RandomPartition(random, summary->description.geometry.bounds(), random.Integer(1, 30));
     const std::uint32_t owners = random.Integer(1U, 8U);
-    for (const Box& box : partition.boxes()) owned->push_back({box, random.Integer(0U, owners - 1)});
-    summary->owned = std::move(owned);
+    for (const Box& box : partition.boxes()) boxes->push_back({box, random.Integer(0U, owners - 1)});
+    summary->owned = std::move(boxes);
     world.summary = std::move(summary);
     world.policy.balance = Policy().balance;  // boxes stay where they are
   }

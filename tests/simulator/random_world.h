@@ -20,13 +20,14 @@ struct SimulatedWorld {
   std::shared_ptr<const VolumeSummary> summary;
   std::shared_ptr<const OccupancyGrid> occupied;
   bool in_parts = false;  // nobody holds the volume
+  bool owned = false;     // processes own it (ModelOwners)
   WorkerConfig worker_config;
   WorkerSpeed speed;
   Policy policy;
 };
 
-// `cells`: whether the volume is a grid's.
-SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells);
+// `cells`: whether the volume is a grid's. `owned`: it lies with owners.
+SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCells& cells, bool owned);
 
 // A request for the world's volume, "volume".
 SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, std::uint32_t deadline_ms);

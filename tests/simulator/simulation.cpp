@@ -19,6 +19,7 @@ using std::chrono::seconds;
 constexpr std::uint32_t kDeadlineMs = 120000;
 constexpr Duration kBound = milliseconds(kDeadlineMs) + seconds(30);  // until every request has ended, from the last one on
 constexpr Duration kTroubled = seconds(5);                            // requests are made and things break in this time
+constexpr Duration kOwnersTroubled = seconds(25);                     // the same where owners wait for each other, and for the silent
 constexpr Duration kLongestBacklog = std::chrono::minutes(10);
 constexpr RequestId kRequestAfterHealing = 1000;
 constexpr Duration kSettle = seconds(14);  // long enough for every time-out of the machines below
@@ -27,18 +28,22 @@ constexpr Index3 kBlock = {32, 32, 32};  // of a volume that is read in parts
 
 }  // namespace
 
-Simulation::Simulation(std::uint64_t seed, Tally& tally)
+Simulation::Simulation(std::uint64_t seed, bool owned, Tally& tally)
     : random_(seed),
       tally_(tally),
       faults_(RandomFaults(random_)),
       current_(faults_),
       network_(random_, faults_, std::chrono::microseconds(random_.Integer(50, 5000)), tally),
       encode_messages_(random_.Chance(0.02)),
-      cells_(seed),
-      world_(RandomWorld(random_, faults_, cells_)),
-      witness_(faults_.none(), tally),
+      cells_(seed, !owned),
+      world_(RandomWorld(random_, faults_, cells_, owned)),
+      witness_(faults_.none() && !owned, tally),
       service_(machine_, *this),
-      words_(random_) {}
+      words_(random_) {
+  if (!owned) return;
+  owners_.emplace(service_, random_, current_, network_, *world_.summary, tally,
+                  [this](const DatasetEvent& event) { StepDatasets(event); });
+}
 
 // ---------------------------------------------------------------- the world
 
@@ -83,14 +88,23 @@ void Simulation::StartCoordinator() {
   planner_.emplace();
   witness_.OnRestart();
   datasets_wake_ = {};
-  datasets_.emplace(DatasetConfig{.datasets = {{"volume", DataSource(kFile, "")}}, .folders = {"/data"}});
+  datasets_of_frames_.clear();
+  DatasetConfig of_datasets{.folders = {"/data"}};
+  if (!owners_) of_datasets.datasets = {{"volume", DataSource(kFile, "")}};
+  datasets_.emplace(std::move(of_datasets));
   service_.StartCoordinator(std::move(config));
+  if (owners_) owners_->StartCoordinator(epoch_, [this](const std::string& name) { return datasets_->NameIsFree(name); });
   StepDatasets(DatasetTick{});
 }
 
 void Simulation::Submit(ModelClient& client, RequestId request) {
   ++requests_made_;
   SubmitFrame submit = RandomRequest(random_, world_.policy, request, kDeadlineMs);
+  if (owners_ && request != kRequestAfterHealing) submit.frame.missing = Missing(random_.Integer(1, 3));
+  if (submit.frame.missing == Missing::kSkip) {
+    submit.frame.policy.assignment = "owner";
+    submit.frame.policy.balance = Policy().balance;
+  }
   if (cells_.present() && random_.Chance(0.5)) submit.frame.renderer = DefaultRenderer(false).name();  // else the cells are drawn
   client.Submit(submit);
 }
@@ -128,13 +142,14 @@ void Simulation::Run() {
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
   const int clients = random_.Integer(1, 3);
   for (int i = 0; i < clients; ++i) AddClient();
-  // Without faults nobody asks before all workers are there: slots, and so padded boxes, then stay as they are.
-  const Duration first = faults_.none() ? Duration(milliseconds(500)) : Duration{};
+  // Without faults nobody asks before all workers are there: slots, and so padded boxes, then stay as they are. Nor before the voxels are.
+  const Duration first = owners_ ? Duration(seconds(2)) : faults_.none() ? Duration(milliseconds(500)) : Duration{};
+  const Duration troubled = owners_ ? kOwnersTroubled : kTroubled;
   for (const auto& client : clients_) {
-    const int requests = random_.Integer(1, 4);
+    const int requests = random_.Integer(1, owners_ ? 8 : 4);
     for (int r = 1; r <= requests; ++r) {
       ++requests_planned_;
-      const Duration when = first + Duration(random_.Integer<std::int64_t>(0, Duration(kTroubled).count() / 2));
+      const Duration when = first + Duration(random_.Integer<std::int64_t>(0, troubled.count() / 2));
       service_.queue().After(when, [this, c = client.get(), r] {
         Submit(*c, RequestId(r));
         if (random_.Chance(faults_.cancel)) {
@@ -144,12 +159,13 @@ void Simulation::Run() {
     }
   }
   PlanTroubles(kTroubled);
+  if (owners_) owners_->PlanTroubles(troubled);
 
-  RunUntil(kTroubled + kBound, true);
+  RunUntil(troubled + kBound, true);
   tally_.Add(Count::kRequests, requests_planned_);
   CheckOutcome();
   Heal();
-  RunUntil(kTroubled + kSettle, false);
+  RunUntil(troubled + kSettle, false);
   // A slow worker may have hundreds of tasks that wait, each as slow as it was when they came up.
   for (Duration waited{}; Working() && waited < kLongestBacklog; waited += seconds(1)) RunUntil(seconds(1), false);
   CheckRecovery();
@@ -179,7 +195,9 @@ void Simulation::CheckOutcome() {
         continue;
       }
       const bool of_store = ended.status.message().find(kFile) != std::string::npos;
-      tally_.Add(of_store                                 ? Count::kErrorsOfStores
+      const bool of_owners = owners_ && ended.status.message().find("volume") != std::string::npos;
+      tally_.Add(of_owners                                ? Count::kErrorsOfOwners
+                 : of_store                               ? Count::kErrorsOfStores
                  : ended.given_up                         ? Count::kGivenUp
                  : code == StatusCode::kCancelled         ? Count::kCancelled
                  : code == StatusCode::kDeadlineExceeded  ? Count::kErrorsOfDeadline
@@ -194,12 +212,13 @@ void Simulation::CheckOutcome() {
       // Reads may take long, and the word that they fail may be lost.
       const bool stalled = ended.status.message().find("no progress") != std::string::npos;
       const bool replaced = (of_store || (stalled && world_.in_parts)) && faults_.file_changes > 0;
-      const bool excused = !faults_.harmless() || replaced || workerless_ || out_of_time || stood_still || died_alike ||
-                           client->cancelled().count(request) > 0;
+      const bool excused = !faults_.harmless() || (owners_ && !owners_->calm()) || replaced || workerless_ || out_of_time || stood_still ||
+                           died_alike || client->cancelled().count(request) > 0;
       EXPECT_TRUE(excused) << "a frame failed although there was a worker all the time: " << ended.status.message();
       EXPECT_FALSE(ended.status.message().empty());
       if (faults_.only_stores()) {
-        EXPECT_TRUE(of_store || stalled) << ended.status.message();
+        const bool never_opened = owners_ && ended.status.message().find("still being loaded") != std::string::npos;
+        EXPECT_TRUE(of_store || of_owners || stalled || never_opened) << ended.status.message();
       }
       EXPECT_TRUE(code != StatusCode::kInternal && code != StatusCode::kInvalidArgument) << ended.status.message();
       if (code == StatusCode::kCancelled) {
@@ -227,15 +246,30 @@ void Simulation::CheckRecovery() {
     if (client->vanished()) continue;
     const auto ended = client->ended().find(kRequestAfterHealing);
     ASSERT_TRUE(ended != client->ended().end()) << "no picture after the world has healed";
+    // The owners were so slow that the service expects too much of the next frames.
+    if (owners_ && ended->second.status.message().find("too much to do") != std::string::npos) continue;
     EXPECT_TRUE(ended->second.status.ok()) << "after the world has healed: " << ended->second.status.message();
     EXPECT_EQ(ended->second.statistics.attempts, ended->second.status.ok() ? 1U : 0U);
+    EXPECT_EQ(ended->second.statistics.missing, "");
   }
+  if (owners_) owners_->CheckRecovered();
+}
+
+// Once all owners have left, or are silent, the dataset is gone, and nothing is left of them.
+void Simulation::CheckOwnersLeft() {
+  owners_->LeaveAll();
+  RunUntil(kOwnerTimeout + seconds(3), false);
+  const OwnerSizes sizes = owners_->sizes();
+  EXPECT_EQ(sizes.fields + sizes.owners + sizes.out + sizes.waiting + sizes.uses, 0U);
+  EXPECT_TRUE(datasets_->NameIsFree("volume").ok()) << "a dataset without owners";
+  EXPECT_EQ(published_.size(), 0U);
 }
 
 // After a while without work and faults, nothing is left of any frame; then the service goes down.
 void Simulation::CheckRest() {
   ASSERT_TRUE(service_.coordinator_runs());
   CheckTables();
+  if (owners_) CheckOwnersLeft();
   const PeerToken monitor = TokenOfClient(clients_.size());
   service_.StepCoordinator(FromClient{monitor, StatusQuery{1}});
   ASSERT_TRUE(status_.has_value());
@@ -309,6 +343,7 @@ void Simulation::Perform(ToClient& action) {
     const auto* from_worker = std::get_if<FromWorker>(cause_);
     const auto* image = from_worker == nullptr ? nullptr : std::get_if<FrameImage>(&from_worker->message);
     if (image != nullptr) witness_.OnPicture(*image, action.payload, *reply);
+    if (image != nullptr && owners_) CheckOwned(*reply, image->frame, action.to);
   }
   if (const auto* status = std::get_if<StatusReply>(&action.message)) status_ = *status;
   if (const auto* credit = std::get_if<VolumeCredit>(&action.message); credit != nullptr && action.to == Admin()) {
@@ -323,15 +358,29 @@ void Simulation::Perform(ToClient& action) {
   }
 }
 
+void Simulation::CheckOwned(const FrameReply& reply, FrameId frame, PeerToken to) {
+  if (reply.groups_done != reply.group_count) return;  // a preview
+  for (std::size_t client = 0; client < clients_.size(); ++client) {
+    const SubmitFrame* const asked = to == TokenOfClient(client) ? clients_[client]->Find(reply.request) : nullptr;
+    if (asked != nullptr) owners_->CheckPicture(datasets_of_frames_.at(frame), asked->frame.missing, reply.statistics.missing);
+  }
+}
+
 WorkerEvent Simulation::Answer(Job& job) {
   const auto* render = std::get_if<StartRender>(&job.action);
-  if (render != nullptr && faults_.gentle() && !hurried_) {
+  if (render != nullptr && faults_.gentle() && !hurried_ && (!owners_ || owners_->calm())) {
     EXPECT_TRUE(rendered_.emplace(render->key.frame, render->placement.id).second) << "a box is rendered twice";
   }
   return workers_[job.node].Answer(job);
 }
 
+void Simulation::Perform(const UnloadDataset& action) {
+  published_.erase(action.dataset);
+  if (owners_) owners_->Unload(action.dataset);
+}
+
 void Simulation::Perform(const LoadDataset& action) {
+  if (owners_ && action.source.open) return owners_->Load(action);
   const double when = service_.now() + random_.Real(0.001, 0.3);
   if (random_.Chance(current_.fail_load)) {
     return TellDatasets(when, DatasetFailed{action.name, action.load, Status::NotFound("the file of the volume is gone")});
@@ -344,6 +393,12 @@ void Simulation::Perform(const LoadDataset& action) {
 }
 
 void Simulation::Perform(const CheckDatasetFiles& action) {
+  if (owners_ && action.stamp->ask) {
+    const double when = service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1);
+    return service_.queue().At(when, [this, epoch = epoch_, action] {
+      if (epoch == epoch_) StepDatasets(DatasetSeen{action.name, action.load, HaveChanged(*action.stamp, service_.coordinator_time())});
+    });
+  }
   DatasetSeen seen{action.name, action.load, action.stamp->digest != voxels_};
   if (random_.Chance(current_.fail_load / 5)) seen.changed = Status::NotFound("the file of the volume is gone");
   TellDatasets(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), seen);
@@ -444,7 +499,8 @@ Arrivals Simulation::ToWorker(Node to, CoordinatorToWorker& message, double sent
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) {
     witness_.OnAssignment(*assignment, workers_.size(), most_teams_);
     EXPECT_TRUE(published_.contains(assignment->setup.dataset)) << "a group of voxels that are not there any more";
-    if (assignment->setup.dataset != voxels_) tally_.Add(Count::kFramesOfRetiredVoxels);
+    if (owners_) datasets_of_frames_[assignment->key.frame] = assignment->setup.dataset;
+    if (assignment->setup.dataset != voxels_ && !owners_) tally_.Add(Count::kFramesOfRetiredVoxels);
   }
   if (const auto* ping = std::get_if<Ping>(&message)) witness_.OnPing(*ping);
   if (std::holds_alternative<Retire>(message)) tally_.Add(Count::kRetired);
@@ -481,7 +537,7 @@ Arrivals Simulation::ToPeer(Node to, Job& sends) {
 
 void Simulation::Perform(Node node, SendChunkRequest& action) {
   workers_[node].OnRequest(action.request);
-  if (action.stored != nullptr && ReadsItself(node, *action.stored)) {
+  if (action.stored != nullptr && !owners_ && ReadsItself(node, *action.stored)) {
     tally_.Add(Count::kOwnReads);
     const std::optional<double> seconds = SecondsToRead();
     if (!seconds) return;
@@ -497,12 +553,17 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
     if (!seconds) continue;
     service_.queue().At(asked.times[i] + *seconds, [this, node, request] {
       if (!service_.coordinator_runs() || request.epoch != epoch_) return;
-      const auto answer = Widen<MessageToWorker>(OnTheWay(AnswerOf(request)));
-      const Arrivals answered = network_.Send({kVoxelServerEnd, int(node)}, service_.now());
-      for (int j = 0; j < answered.count; ++j) {
-        service_.queue().At(answered.times[j], [this, node, answer] { service_.StepWorker(node, MessageReceived{answer, {}}); });
-      }
+      if (!owners_ || !published_.contains(request.dataset)) return SendVoxels(node, AnswerOf(request));
+      owners_->Read(request, [this, node](const VoxelsToWorker& answer) { SendVoxels(node, answer); });
     });
+  }
+}
+
+void Simulation::SendVoxels(Node node, const VoxelsToWorker& voxels) {
+  const auto answer = Widen<MessageToWorker>(OnTheWay(voxels));
+  const Arrivals answered = network_.Send({kVoxelServerEnd, int(node)}, service_.now());
+  for (int i = 0; i < answered.count; ++i) {
+    service_.queue().At(answered.times[i], [this, node, answer] { service_.StepWorker(node, MessageReceived{answer, {}}); });
   }
 }
 

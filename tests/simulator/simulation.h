@@ -13,6 +13,7 @@
 //     finished, as long as a worker is there all the time
 //   where everybody stops at once, or the coordinator's clock jumps, and nothing else: no frame needs a second attempt
 //   where workers only leave with notice, and have the time for it: no box of a frame is rendered twice
+//   where processes own the voxels: what model_owners.h says; a picture that lacks something says so; once all have left, nothing is left
 //   without faults: no frame fails, none needs a second attempt, and voxels that a worker has had do not travel again
 //   after the world has healed: every client gets a picture, at the first attempt; then the tables of all machines are as at rest
 //
@@ -37,6 +38,7 @@
 #include "tests/simulator/hostile_words.h"
 #include "tests/simulator/model_cells.h"
 #include "tests/simulator/model_client.h"
+#include "tests/simulator/model_owners.h"
 #include "tests/simulator/model_worker.h"
 #include "tests/simulator/network.h"
 #include "tests/simulator/random_world.h"
@@ -51,7 +53,8 @@ inline constexpr int kCoordinatorEnd = -1, kVoxelServerEnd = -2;
 
 class Simulation : private Conditions {
  public:
-  Simulation(std::uint64_t seed, Tally& tally);
+  // `owned`: processes own the voxels of the dataset.
+  Simulation(std::uint64_t seed, bool owned, Tally& tally);
   void Run();
 
  private:
@@ -100,6 +103,8 @@ class Simulation : private Conditions {
   void CheckRecovery();
   void CheckRest();
   void CheckTables();
+  void CheckOwnersLeft();
+  void CheckOwned(const FrameReply& reply, FrameId frame, PeerToken to);
   PeerToken TokenOfClient(std::size_t client) const;
   // In any variant of messages: what the other end would decode.
   template <class Messages>
@@ -107,6 +112,7 @@ class Simulation : private Conditions {
   void FromClientNode(std::size_t client, const ClientToFrames& message);
   void AskDatasets(PeerToken client, const ClientToDatasets& message, const Bytes& payload = {});
   VoxelsToWorker AnswerOf(const ChunkRequest& request);
+  void SendVoxels(Node node, const VoxelsToWorker& voxels);
   bool ReadsItself(Node node, const StoredAt& stored);
   std::optional<double> SecondsToRead();  // none: the read never ends
   VoxelsToWorker ReadOf(const ChunkRequest& request);
@@ -139,7 +145,7 @@ class Simulation : private Conditions {
   void Perform(const DatasetNews& action) { service_.StepCoordinator(action); }
   void Perform(const Note&) {}
   void Perform(const LoadDataset& action);
-  void Perform(const UnloadDataset& action) { published_.erase(action.dataset); }
+  void Perform(const UnloadDataset& action);
   void Perform(const CheckDatasetFiles& action);
   void Perform(const CheckWatchedFolders& action);
   void Perform(const FindDatasets& action);
@@ -187,6 +193,8 @@ class Simulation : private Conditions {
   };
   std::map<UploadId, Stored> stored_;
   std::set<DatasetId> published_;  // by the voxel server
+  std::optional<ModelOwners> owners_;
+  std::map<FrameId, DatasetId> datasets_of_frames_;  // of this epoch, with owners
   // Where a volume that is read in parts is open: who sees which version of its file there, and since when.
   std::map<std::pair<Node, std::uint64_t>, std::optional<double>> places_;
 };

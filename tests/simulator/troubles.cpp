@@ -61,6 +61,7 @@ void Simulation::PlanTroubles(Duration span) {
 void Simulation::Heal() {
   current_ = {};
   network_.CalmDown();
+  if (owners_) owners_->Heal();
   for (ModelWorker& worker : workers_) worker.Heal();
 }
 
@@ -120,6 +121,7 @@ void Simulation::Preempt() {
 void Simulation::RestartCoordinator() {
   if (!service_.coordinator_runs()) return;
   service_.StopCoordinator();
+  if (owners_) owners_->StopCoordinator();
   tally_.Add(Count::kCoordinatorRestarts);
   service_.queue().After(milliseconds(random_.Integer(1, 6000)), [this] { StartCoordinator(); });
 }
@@ -159,7 +161,7 @@ void Simulation::OrderData() {
 
 // Another one may be on its way: it ends that.
 void Simulation::SendVolume() {
-  AddVolume order{.nonce = sending_.nonce + 1, .name = random_.Chance(0.9) ? "sent" : "volume"};
+  AddVolume order{.nonce = sending_.nonce + 1, .name = owners_ || random_.Chance(0.9) ? "sent" : "volume"};
   order.description.geometry.size = {512, 512, random_.Integer(1, 60)};
   sending_ = {.nonce = order.nonce, .sent = 0, .bytes = BytesToSend(order)};
   AskDatasets(Admin(), order);

@@ -107,6 +107,14 @@ class Worlds(unittest.TestCase):
         lines = (self.folder / "out" / "worlds.jsonl").read_text().splitlines()
         self.assertEqual(len({json.loads(line)["program"] for line in lines}), 2)
 
+    def test_worlds_of_owners_are_others(self) -> None:
+        program = self.stand_in(failing="4, 99")
+        status, output = self.run_worlds(program, "--worlds", "10", "--owners")
+        self.assertEqual(status, 1)
+        self.assertIn(f"SLABSTREAM_SEED=4 {program} '--gtest_filter=*ProcessesOwn'", output)
+        status, output = self.run_worlds(program, "--worlds", "10")
+        self.assertIn(f"SLABSTREAM_SEED=4 {program} '--gtest_filter=-*ProcessesOwn'", output)
+
     def test_wrong_words_end_in_one_line(self) -> None:
         for words, why in (
             (["none", "out"], "PROGRAM none is not a program"),
