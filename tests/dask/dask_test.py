@@ -207,9 +207,9 @@ class ServiceTest(unittest.TestCase):
         self.assertEqual([picture.shape[0] for picture in shown], [320, 320, 200, 200, 200, 320, 320])
         for picture in shown:
             self.assertGreater((picture[..., 3] > 50).mean(), 0.01)  # of the pixels
-        array, slope, first, second, third, channel, later = shown
+        array, lazy, first, second, third, channel, later = shown
         self.assertLessEqual(np.abs(later - array).max(), 1)
-        for one, other in ((array, slope), (first, second), (second, third), (array, channel)):
+        for one, other in ((array, lazy), (array, channel), (first, second), (second, third)):
             self.assertGreater(np.abs(one - other).max(), 50)
 
 
