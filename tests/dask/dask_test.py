@@ -165,7 +165,7 @@ class DaskTest(unittest.TestCase):
             pids = self.client.run(os.getpid)
             os.kill(next(iter(pids.values())), signal.SIGKILL)
             self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth + 10}), array, azimuth=azimuth + 10)
-            self.client.wait_for_workers(len(pids))
+            self.client.wait_for_workers(len(pids), timeout=PATIENCE)
 
 
 class ServiceTest(unittest.TestCase):
