@@ -19,6 +19,7 @@
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 #include "data/owned/owned_source.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -137,9 +138,11 @@ void VolumeOwner::Impl::Answer(const ChunkRequest& request) {
   const auto of = std::ranges::find_if(layout.boxes, [&](const HeldBox& each) { return !box.empty() && each.box.Contains(box); });
   std::vector<std::byte> samples;
   Status status = Status::InvalidArgument("no box of this owner has these voxels");
-  if (of != layout.boxes.end() && request.chunk == 0 && std::size_t(box.voxel_count()) <= kMostAskedBytes / sample_bytes) {
-    samples.resize(std::size_t(box.voxel_count()) * sample_bytes);
-    status = own->Read(std::size_t(of - layout.boxes.begin()), box, request.dataset, BoxRoom::Dense(box, samples.data(), true));
+  const int level = int(request.level);
+  const Box points = {{}, PointsAlong(box.size(), level)};
+  if (of != layout.boxes.end() && request.chunk == 0 && std::size_t(points.voxel_count()) <= kMostAskedBytes / sample_bytes) {
+    samples.resize(std::size_t(points.voxel_count()) * sample_bytes);
+    status = own->Read(std::size_t(of - layout.boxes.begin()), box, level, request.dataset, BoxRoom::Dense(points, samples.data(), true));
   }
   if (!status.ok()) return Send(ChunkRefused{epoch, request.dataset, box, request.chunk, status});
   Chunk chunk{.epoch = epoch, .dataset = request.dataset, .box = box, .chunk = request.chunk};

@@ -243,8 +243,8 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     const double width = setup->unit * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera);
     return LevelMap{.levels = {CoarsestFor(detail * width, levels, count)}};
   };
-  const bool mixes = (camera.projection == Projection::kPerspective || !levels.refined.empty()) && setup->renderer->Can(Ability::kLevels) &&
-                     setup->transfer.isosurfaces.empty();
+  const bool mixes = !levels.owned && (camera.projection == Projection::kPerspective || !levels.refined.empty()) &&
+                     setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();
   if (!mixes) return whole();
 
   const double least = LeastWidth(finest, *setup);

@@ -24,6 +24,7 @@ struct VolumeLevels {
   // Of an adaptive mesh: where each level has voxels of its own, those of the next coarser level tell the others. Null: everywhere. Empty:
   // it is none.
   std::vector<std::shared_ptr<const std::vector<Box>>> refined = {};
+  bool owned = false;  // boxes are those of owners, which have no order by which levels could meet: pictures have one level
   // The summary of the level that statistics are taken from: its range and histogram are those of the dataset, at every
   // level.
   std::shared_ptr<const VolumeSummary> overview;

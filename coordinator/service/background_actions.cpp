@@ -176,7 +176,7 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
   const std::shared_ptr<const DatasetFields> fields = FieldsOf(action.source, info);
   const bool one_of_several = action.source.statistics != nullptr || (fields != nullptr && fields->times.count > 1);
   std::vector<DataSource> sources;
-  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
+  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.owned = !info.owned.empty(), .overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
     described->levels.push_back(levels[level].description);
     if (levels.front().refined != nullptr) described->refined.push_back(levels[level].refined);

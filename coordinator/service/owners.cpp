@@ -22,6 +22,7 @@
 #include "common/wire/payload.h"
 #include "data/open/open_source.h"
 #include "data/owned/owned_source.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/copy_samples.h"
 #include "data/volume_io/sample_type.h"
 
@@ -33,6 +34,7 @@ using AskDone = std::function<void(Result<Bytes>)>;
 struct Asked {
   std::uint64_t time = 0;
   Box box;
+  int level = 0;  // as of AskOwner
   AskDone done;
 };
 
@@ -379,7 +381,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
 
   // ---- what owners are asked for
   void Request(const Owner& owner, const Asked& asked) {
-    news.messages.emplace_back(owner.peer, ChunkRequest{.epoch = epoch, .dataset = asked.time, .box = asked.box});
+    news.messages.emplace_back(owner.peer,
+                               ChunkRequest{.epoch = epoch, .dataset = asked.time, .box = asked.box, .level = std::uint32_t(asked.level)});
   }
 
   void FailAsked(Owner& owner, const Status& why) {
@@ -389,8 +392,13 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     owner.waiting.clear();
   }
 
-  void Answer(Owner& owner, std::uint64_t time, const Box& box, Result<Bytes> answer) {
-    const auto asked = std::ranges::find_if(owner.out, [&](const Asked& each) { return each.time == time && each.box == box; });
+  // `bytes`: of the samples, which tell what was asked for of the same voxels at several levels.
+  void Answer(Owner& owner, std::uint64_t time, const Box& box, std::optional<std::uint32_t> bytes, Result<Bytes> answer) {
+    const auto meant = [&](const Asked& each) { return each.time == time && each.box == box; };
+    const std::size_t of_one = BytesPerSample(*SampleTypeNamed(owner.registered.samples));
+    auto asked = std::ranges::find_if(
+        owner.out, [&](const Asked& each) { return meant(each) && bytes == CountIn(PointsAlong(box.size(), each.level)) * of_one; });
+    if (asked == owner.out.end()) asked = std::ranges::find_if(owner.out, meant);
     if (asked == owner.out.end()) return;  // nobody waits for it any more
     answers.emplace_back(std::move(asked->done), std::move(answer));
     owner.out.erase(asked);
@@ -400,14 +408,14 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
   void Hear(PeerToken from, const ChunkRefused& m) {
     Owner& owner = *Find(from);
     const std::string& name = owner.registered.dataset;
-    Answer(owner, m.dataset, m.box,
+    Answer(owner, m.dataset, m.box, std::nullopt,
            Status(m.status.code(), fmt::format("{}: {}", Named(name, fields.at(name), owner.registered.owner), m.status.message())));
   }
 
   void Hear(PeerToken from, const Chunk& m, const Bytes& payload) {
     std::vector<std::byte> samples(m.raw_bytes);
     const Status unpacked = UnpackChunk(m, payload.span(), samples);
-    Answer(*Find(from), m.dataset, m.box, unpacked.ok() ? Result(Bytes(std::move(samples))) : unpacked);
+    Answer(*Find(from), m.dataset, m.box, m.raw_bytes, unpacked.ok() ? Result(Bytes(std::move(samples))) : unpacked);
   }
 
   void Tend() {
@@ -515,8 +523,9 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
   volume.exact = {*SampleTypeNamed(any.samples), any.description.mapping};
   volume.description.mapping.offset = any.description.mapping.FromStored(KeptTypeOf(volume.exact.type).shift);
   volume.of_nobody = Assemble(any.description.geometry.bounds(), held).missing;
-  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, AskDone done) {
-    state->Ask(name, owner, incarnations[owner], {time, box, std::move(done)});
+  volume.ask = [state = shared_from_this(), name, time = field.shown, incarnations](std::uint32_t owner, const Box& box, int level,
+                                                                                    AskDone done) {
+    state->Ask(name, owner, incarnations[owner], {time, box, level, std::move(done)});
   };
   volume.use = Use(name, field.shown);
   return volume;

@@ -13,6 +13,7 @@
 #include "common/volume/box_assembly.h"
 #include "common/volume/missing.h"
 #include "common/volume/stored_at.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/box_reading.h"
 #include "data/sources/copy_samples.h"
 
@@ -44,9 +45,21 @@ struct Places {
   std::vector<Box> boxes;
   std::vector<Of> of;
 
+  std::shared_ptr<const OwnedBoxes> Owned() const {
+    auto owned = std::make_shared<OwnedBoxes>();
+    for (std::size_t i = 0; i < boxes.size(); ++i) owned->push_back({boxes[i], of[i].owner});
+    return owned;
+  }
   void Add(const Box& box, std::uint32_t owner, std::size_t number) {
     boxes.push_back(box);
     of.push_back({owner, number});
+  }
+  Places At(const VoxelLattice& lattice) const {
+    Places points;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      if (const Box box = lattice.PointsIn(boxes[i]); !box.empty()) points.Add(box, of[i].owner, of[i].box);
+    }
+    return points;
   }
   // Cuts what these boxes have out of `wanted`.
   void Take(std::vector<Box>& wanted, const auto& take) const {
@@ -76,74 +89,82 @@ class OwnedSource final : public VolumeSource {
   OwnedSource(OwnedVolume volume, std::vector<std::shared_ptr<const MappedOwner>> mapped, SourceContext context)
       : shared_(std::make_shared<Shared>(std::move(volume), std::move(mapped), std::move(context))) {
     const OwnedVolume& of = shared_->volume;
-    info_ = {.levels = {{of.description, Uniform(kBrick)}},
-             .format = "owners",
-             .file_type = std::string(ToString(of.exact.type)),
-             .exact = of.exact,
-             .growth = of.growth};
+    info_ = {.levels = {}, .format = "owners", .file_type = std::string(ToString(of.exact.type)), .exact = of.exact, .growth = of.growth};
     info_.owned = of.field.Text();
     if (!of.missing.empty()) info_.notes = {of.missing};
-    if (!of.boxes.empty()) {
-      OwnedBoxes owned;
-      for (std::uint32_t owner = 0; owner < of.boxes.size(); ++owner) {
-        for (const Box& box : of.boxes[owner]) owned.push_back({box, owner});
-      }
-      for (const Box& box : of.of_nobody) owned.push_back({box, kNoOwner});
-      info_.levels.front().owned = std::make_shared<const OwnedBoxes>(std::move(owned));
-    }
     info_.version = XXH3_64bits(info_.owned.data(), info_.owned.size());
-    for (const Box& box : of.of_nobody) nobodys_.Add(box, 0, 0);
+    Level voxels;
+    for (const Box& box : of.of_nobody) voxels.nobodys.Add(box, kNoOwner, 0);
     for (std::uint32_t owner = 0; owner < of.field.owners.size(); ++owner) {
       if (const auto& memory = shared_->mapped[owner]; memory != nullptr) {
         const std::vector<HeldBox>& boxes = memory->layout().boxes;
         for (std::size_t i = 0; i < boxes.size(); ++i) {
-          here_.Add(boxes[i].box, owner, i);
-          ghosts_.Add(boxes[i].held, owner, i);
+          voxels.here.Add(boxes[i].box, owner, i);
+          voxels.ghosts.Add(boxes[i].held, owner, i);
         }
       } else if (of.ask) {
-        for (std::size_t i = 0; i < of.boxes[owner].size(); ++i) elsewhere_.Add(of.boxes[owner][i], owner, i);
+        for (std::size_t i = 0; i < of.boxes[owner].size(); ++i) voxels.elsewhere.Add(of.boxes[owner][i], owner, i);
       }
     }
+    Places owned;
+    for (std::uint32_t owner = 0; owner < of.boxes.size(); ++owner) {
+      for (const Box& box : of.boxes[owner]) owned.Add(box, owner, 0);
+    }
+    for (const Box& box : of.of_nobody) owned.Add(box, kNoOwner, 0);
+    const VolumeGeometry& geometry = of.description.geometry;
+    do {
+      const VoxelLattice lattice = VoxelLattice::Of(geometry.size, int(levels_.size()));
+      levels_.push_back(
+          {lattice, voxels.nobodys.At(lattice), voxels.here.At(lattice), voxels.ghosts.At(lattice), voxels.elsewhere.At(lattice)});
+      SourceLevel& level = info_.levels.emplace_back(of.description, Uniform(kBrick));
+      if (!geometry.rectilinear()) level.description.geometry = lattice.In(geometry);
+      if (!of.boxes.empty()) level.owned = owned.At(lattice).Owned();
+    } while (info_.levels.back().description.voxel_bytes() > kCoarsestBytes && !geometry.rectilinear());
   }
 
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return {.stored_bytes = shared_->asked_bytes, .chunks = 0}; }
 
-  bool Reaches(const Box& box) const override {
+  bool Reaches(int level, const Box& box) const override {
+    const Level& of = levels_.at(std::size_t(level));
     std::vector<Box> missing = {box};
-    for (const Places* places : {&here_, &ghosts_, &nobodys_, &elsewhere_}) places->Take(missing, [](const Places::Of&, const Box&) {});
+    for (const Places* places : {&of.here, &of.ghosts, &of.nobodys, &of.elsewhere}) {
+      places->Take(missing, [](const Places::Of&, const Box&) {});
+    }
     return missing.empty();
   }
 
   using VolumeSource::Read;
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
-    CHECK(level == 0 && !box.empty() && info_.finest().geometry.bounds().Contains(box)) << "a box outside the volume";
+    const Level& of = levels_.at(std::size_t(level));
+    CHECK(!box.empty() && Box({}, of.lattice.size).Contains(box)) << "a box outside the volume";
     const auto reading = std::make_shared<BoxReading>(box, out, std::move(stop), std::move(done));
     std::vector<Box> missing = {box};
     std::vector<std::pair<Places::Of, Box>> copied;
-    for (const Places* places : {&here_, &ghosts_}) {
+    for (const Places* places : {&of.here, &of.ghosts}) {
       places->Take(missing, [&](const Places::Of& from, const Box& part) { copied.emplace_back(from, part); });
     }
-    nobodys_.Take(missing, [&](const Places::Of&, const Box& part) {
+    of.nobodys.Take(missing, [&](const Places::Of&, const Box& part) {
       constexpr std::array<std::byte, 8> kZero = {};
       CopySamples(info_.exact.type, kZero.data(), {0, 0, 0}, part.size(), shared_->RoomOf(*reading, part));
     });
     if (!copied.empty()) {
       reading->BeginPart();
-      shared_->context->PostDecode([shared = shared_, reading, copied = std::move(copied)] {
+      shared_->context->PostDecode([shared = shared_, reading, lattice = of.lattice, copied = std::move(copied)] {
         for (const auto& [from, part] : copied) {
           if (!reading->goes_on()) break;
-          const Status read = shared->mapped[from.owner]->Read(from.box, part, shared->volume.field.time, shared->RoomOf(*reading, part));
+          const Status read = shared->mapped[from.owner]->Read(from.box, lattice.VoxelsOf(part), lattice.level, shared->volume.field.time,
+                                                               shared->RoomOf(*reading, part));
           if (!read.ok()) reading->Fail(shared->Named(read));
         }
         if (reading->stop().stop_requested()) reading->GiveUp();
         reading->EndPart();
       });
     }
-    elsewhere_.Take(missing, [&](const Places::Of& from, const Box& part) {
+    of.elsewhere.Take(missing, [&](const Places::Of& from, const Box& part) {
       ForEachAsked(part, BytesPerSample(info_.exact.type), [&](const Box& asked) {
         if (reading->stop().stop_requested()) reading->GiveUp();
-        if (reading->goes_on()) shared_->Ask(shared_, reading, from.owner, asked);
+        if (reading->goes_on()) shared_->Ask(shared_, reading, from.owner, of.lattice, asked);
       });
     });
     if (!missing.empty()) reading->Fail(shared_->Named(Status::Unavailable("its owners are on other hosts")));
@@ -165,9 +186,10 @@ class OwnedSource final : public VolumeSource {
     }
     Status Named(const Status& status) const { return {status.code(), fmt::format("\"{}\": {}", volume.field.dataset, status.message())}; }
 
-    void Ask(const std::shared_ptr<Shared>& self, const std::shared_ptr<BoxReading>& reading, std::uint32_t owner, const Box& box) {
+    void Ask(const std::shared_ptr<Shared>& self, const std::shared_ptr<BoxReading>& reading, std::uint32_t owner,
+             const VoxelLattice& lattice, const Box& box) {
       reading->BeginPart();
-      volume.ask(owner, box, [self, reading, box](Result<Bytes> samples) {
+      volume.ask(owner, lattice.VoxelsOf(box), lattice.level, [self, reading, box](Result<Bytes> samples) {
         self->context->PostDecode([self, reading, box, samples = std::move(samples)] {
           const SampleType type = self->volume.exact.type;
           const Index3 size = box.size();
@@ -191,7 +213,12 @@ class OwnedSource final : public VolumeSource {
   };
   const std::shared_ptr<Shared> shared_;
   SourceInfo info_;
-  Places nobodys_, here_, ghosts_, elsewhere_;  // what owners on this host own, and what they hold beside; and what other owners own
+  struct Level {
+    VoxelLattice lattice = {};
+    // What nobody owns, what owners on this host own, what they hold beside, and what other owners own.
+    Places nobodys = {}, here = {}, ghosts = {}, elsewhere = {};
+  };
+  std::vector<Level> levels_;
 };
 
 std::vector<std::shared_ptr<const MappedOwner>> MapOwners(const OwnedField& field, const std::optional<OwnerLayout>& as) {

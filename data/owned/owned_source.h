@@ -1,5 +1,6 @@
 // A volume whose voxels stay with the processes that own them (owners), at one time. Those of owners on this host are read in their memory
-// (owner_memory.h); those of others by a function of whoever can ask them: the coordinator.
+// (owner_memory.h); those of others by a function of whoever can ask them: the coordinator. Level n of it is every 2^n-th voxel along each
+// axis (voxel_lattice.h). There are so many levels that the coarsest one takes at most kCoarsestBytes; a rectilinear grid has one.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +19,7 @@
 namespace slabstream {
 
 inline constexpr std::uint32_t kMostAskedBytes = 1U << 20;  // of samples that an owner is asked for at a time
+inline constexpr std::int64_t kCoarsestBytes = 8 << 20;     // what the survey of such a source reads (kFarSurvey)
 
 // All owners of a volume at a time. Its text is StoredAt::source.
 struct OwnedField {
@@ -31,9 +33,9 @@ struct OwnedField {
   friend bool operator==(const OwnedField&, const OwnedField&) = default;
 };
 
-// Asks an owner for samples of a box, at most kMostAskedBytes, as it holds them, x fastest. Calls `done` once, on any thread, which it must
-// not hold up.
-using AskOwner = std::function<void(std::uint32_t owner, const Box& box, std::function<void(Result<Bytes>)> done)>;
+// Asks an owner for the samples of every 2^level-th voxel of a box along each axis, from its first one on: at most kMostAskedBytes, as it
+// holds them, x fastest. Calls `done` once, on any thread, which it must not hold up.
+using AskOwner = std::function<void(std::uint32_t owner, const Box& box, int level, std::function<void(Result<Bytes>)> done)>;
 
 // What the coordinator knows of a field.
 struct OwnedVolume {

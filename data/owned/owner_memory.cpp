@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "data/owned/process_memory.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -195,7 +196,7 @@ bool MappedOwner::Reaches(std::uint64_t time) const {
   return true;
 }
 
-Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const {
+Status MappedOwner::Read(std::size_t box, const Box& part, int level, std::uint64_t time, const BoxRoom& out) const {
   const HeldBox& from = layout_.boxes.at(box);
   CHECK(from.held.Contains(part)) << "voxels that the owner does not hold";
   const auto& header = *reinterpret_cast<const OwnerHeader*>(memory_.data());
@@ -203,18 +204,21 @@ Status MappedOwner::Read(std::size_t box, const Box& part, std::uint64_t time, c
   const std::uint64_t sample = std::uint64_t(at.x) * std::uint64_t(from.strides[0]) + std::uint64_t(at.y) * std::uint64_t(from.strides[1]) +
                                std::uint64_t(at.z) * std::uint64_t(from.strides[2]);
   const std::uint64_t skipped = sample * BytesPerSample(layout_.samples);
+  const Index3 count = PointsAlong(part.size(), level);
+  std::array<std::int64_t, 3> strides = from.strides;
+  for (std::int64_t& stride : strides) stride <<= level;
   Status copied;
   for (std::uint32_t slot = 0; slot < layout_.slots; ++slot) {
     const OwnerSlot& of = header.of_slots.at(slot);
     const std::uint64_t generation = of.generation.load(std::memory_order_acquire);
     if (generation % 2 != 0 || of.time != time) continue;
     if (const std::uint64_t array = ArraysOf(memory_, layout_, slot)[box]; array != 0) {
-      copied = CopyProcessSamples(place_.pid, layout_.samples, array + skipped, from.strides, part.size(), out);
+      copied = CopyProcessSamples(place_.pid, layout_.samples, array + skipped, strides, count, out);
       // Afterwards: a process that is still there was there all the time, so that no other one had its id.
       if (copied.ok()) copied = CheckProcess();
     } else {
       const std::byte* const begin = memory_.data() + BeginOfSlot(layout_, slot);
-      CopySamples(layout_.samples, begin + from.offset + skipped, from.strides, part.size(), out);
+      CopySamples(layout_.samples, begin + from.offset + skipped, strides, count, out);
     }
     std::atomic_thread_fence(std::memory_order_acquire);
     if (of.generation.load(std::memory_order_relaxed) == generation) return copied;

@@ -95,8 +95,9 @@ class MappedOwner {
   const OwnerLayout& layout() const { return layout_; }
   // False: this time is in arrays of the owner, and the system does not let this process read them.
   bool Reaches(std::uint64_t time) const;
-  // The samples of `part` of what box number `box` holds. Unavailable: no slot has this time any more, or as of ReadProcessMemory.
-  Status Read(std::size_t box, const Box& part, std::uint64_t time, const BoxRoom& out) const;
+  // The samples of every 2^level-th voxel along each axis of `part` of what box number `box` holds, from its first voxel on. Unavailable:
+  // no slot has this time any more, or as of ReadProcessMemory.
+  Status Read(std::size_t box, const Box& part, int level, std::uint64_t time, const BoxRoom& out) const;
 
  private:
   MappedOwner(const OwnerPlace& place, SealedMemory memory, OwnerLayout layout)

@@ -135,8 +135,8 @@ class VolumeSource {
   // Null: it must be opened for itself, since its format has metadata of each; or there is no such.
   virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
 
-  // Whether Read gets the voxels of this box of level 0. False, of what others hold (data/owned): another process must be asked.
-  virtual bool Reaches(const Box& /*box*/) const { return true; }
+  // Whether Read gets the voxels of this box. False, of what others hold (data/owned): another process must be asked.
+  virtual bool Reaches(int /*level*/, const Box& /*box*/) const { return true; }
 
   using ReadDone = std::function<void(Status)>;
   // Fills `out` with the samples of `box`, of the level's type or, if out.exact, as they are stored, and writes nothing between its rows.

@@ -13,9 +13,11 @@
 
 #include "client/client.h"
 #include "client/owner/volume_owner.h"
+#include "common/planning/levels.h"
 #include "common/service/service_file.h"
 #include "common/wire/any_message.h"
 #include "coordinator/service/service.h"
+#include "data/owned/voxel_lattice.h"
 #include "laboratory/experiments/owner_arrangements.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
@@ -35,12 +37,12 @@ constexpr double kNear = 35;  // the whole volume must be in front of the eye
 constexpr Duration kPatience = seconds(60);
 
 // Another array at each time.
-std::shared_ptr<const Volume> AtTime(std::uint64_t time) {
+std::shared_ptr<const Volume> AtTime(std::uint64_t time, const Index3& size = kSize) {
   const auto value = [&](const Index3& v) {
-    const auto distance = [&](const Vec3& center) { return Length(ToVec3(v) - center); };
+    const auto distance = [&](const Vec3& center) { return Length(double(kSize.x) / size.x * ToVec3(v) - center); };
     return std::max({0.0, 250 - 12 * distance({12 + double(time % 20), 10, 14}), 250 - 10 * distance({30, 22, 36})});
   };
-  return std::make_shared<const Volume>(MakeTestVolume(kSize, ScalarType::kUint8, value));
+  return std::make_shared<const Volume>(MakeTestVolume(size, ScalarType::kUint8, value));
 }
 
 FrameRequest Request(double azimuth = 30) {
@@ -76,7 +78,7 @@ class OwnerProcessesTest : public testing::Test {
 
   VolumeOwnerOptions OptionsOf(const OwnedBoxes& boxes, std::uint32_t owner, std::uint32_t owners, bool share_memory) const {
     VolumeOwnerOptions options{.endpoint = coordinator_->worker_endpoint(), .dataset = "ball", .owner = owner, .owners = owners};
-    options.description.geometry.size = kSize;
+    options.description.geometry.size = size_;
     options.share_memory = share_memory;
     options.layout.samples = SampleType::kUint8;
     for (const OwnedBox& each : boxes) {
@@ -87,15 +89,15 @@ class OwnerProcessesTest : public testing::Test {
   }
   void StartOwners(const OwnerArrangement& arrangement, std::uint32_t owners, bool share_memory) {
     owners_.clear();
-    boxes_ = Arrange(arrangement, kSize, owners);
+    boxes_ = Arrange(arrangement, size_, owners);
     for (std::uint32_t owner = 0; owner < owners; ++owner) {
       owners_.push_back(VolumeOwner::Start(context_, OptionsOf(boxes_, owner, owners, share_memory)).value());
     }
   }
   // `arrays`: where samples lie, if not in slots. It is not used any more once the next time is begun.
-  static void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time,
-                    std::vector<std::byte>* arrays = nullptr) {
-    const std::shared_ptr<const Volume> volume = AtTime(time);
+  void Write(VolumeOwner& owner, const OwnedBoxes& boxes, std::uint32_t number, std::uint64_t time,
+             std::vector<std::byte>* arrays = nullptr) const {
+    const std::shared_ptr<const Volume> volume = AtTime(time, size_);
     const Result<VolumeOwner::Slot> slot = owner.Begin(kPatience);
     ASSERT_TRUE(slot.ok()) << slot.status().message();
     std::size_t to = 0;
@@ -138,6 +140,7 @@ class OwnerProcessesTest : public testing::Test {
   std::vector<std::vector<std::byte>> arrays_;  // of owners
   std::vector<std::unique_ptr<VolumeOwner>> owners_;
   OwnedBoxes boxes_;
+  Index3 size_ = kSize;
   std::optional<Client> client_;
 };
 
@@ -169,6 +172,39 @@ TEST_F(OwnerProcessesTest, PicturesAreThoseOfOneArray) {
         for (const RankReport& report : picture->statistics.reports) asked += report.stored_bytes;
       }
       EXPECT_EQ(asked > 0, !share_memory) << asked << " bytes";
+    }
+  }
+}
+
+TEST_F(OwnerProcessesTest, SmallPicturesOfALargeVolumeReadEverySecondVoxel) {
+  size_ = 6 * kSize;  // 17 MiB; rays are longer, so sums round more
+  ASSERT_NO_FATAL_FAILURE(Start());
+  const std::shared_ptr<const Volume> volume = AtTime(1, size_);
+  const VoxelLattice lattice = VoxelLattice::Of(size_, 1);
+  Volume second;
+  second.description = volume->description;
+  second.description.geometry = lattice.In(volume->description.geometry);
+  second.block = MakeVoxelBlock(second.description.geometry.bounds(), ScalarType::kUint8);
+  for (std::size_t i = 0; i < second.block.bytes.size(); ++i) {
+    const Index3 voxel = lattice.first + PlaceIn(lattice.size, i) * Uniform(2);
+    second.block.bytes[i] = volume->block.bytes[std::size_t(volume->block.Offset(voxel))];
+  }
+  for (const bool share_memory : {true, false}) {
+    StartOwners(OwnerArrangements()[2], 3, share_memory);
+    WriteAll(1);
+    ASSERT_TRUE(RenderUnless("\"ball\"").ok());
+    for (const FrameRequest& request : RequestsOfRenderers(6 * kNear)) {
+      SCOPED_TRACE(testing::Message() << request.renderer << ", projection " << int(request.view.projection));
+      const Result<Picture> picture = client_->Render(request, kPatience);
+      ASSERT_TRUE(picture.ok()) << picture.status().message();
+      ASSERT_EQ(picture->statistics.levels.size(), 1U);
+      if (picture->statistics.levels[0].level == 0) {
+        EXPECT_EQ(request.view.projection, Projection::kPerspective) << "from near";
+        EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume), request.size), 2 * AllowedRounding(request));
+        continue;
+      }
+      const FrameRequest same = AtLevel(request, volume->description.geometry, second.description.geometry);
+      EXPECT_LE(LargestDifference(picture->image, RenderDirectly(same, second), request.size), 2 * AllowedRounding(request));
     }
   }
 }

@@ -131,7 +131,7 @@ bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<St
   {
     const std::lock_guard lock(shared_->mutex);
     source = shared_->SourceAt(stored, now, shared_);
-    if (source == nullptr || !source->Reaches(request.box)) return false;
+    if (source == nullptr || !source->Reaches(stored.level, request.box)) return false;
     if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
   const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };

@@ -27,6 +27,7 @@
 #include "common/volume/stored_at.h"
 #include "data/owned/owned_source.h"
 #include "data/owned/process_memory.h"
+#include "data/owned/voxel_lattice.h"
 #include "data/sources/copy_samples.h"
 #include "tests/support/random_box.h"
 
@@ -55,8 +56,10 @@ void Cut(Random& random, const Box& box, int count, std::vector<Box>& boxes) {
 // of a slot.
 class OwnedVolumeOf {
  public:
-  OwnedVolumeOf(Random& random, int owners, bool arrays = false)
-      : arrays_(arrays), size_{random.Integer(4, 40), random.Integer(4, 40), random.Integer(4, 40)}, array_(CountIn(size_)) {
+  OwnedVolumeOf(Random& random, int owners, bool arrays = false, std::int32_t least_side = 4)
+      : arrays_(arrays),
+        size_{least_side + random.Integer(0, 36), least_side + random.Integer(0, 36), least_side + random.Integer(0, 36)},
+        array_(CountIn(size_)) {
     std::iota(array_.begin(), array_.end(), 1.0F);
     std::vector<Box> boxes;
     Cut(random, Bounds(), 2 * owners, boxes);
@@ -85,20 +88,20 @@ class OwnedVolumeOf {
     volume.field.dataset = "rho";
     volume.description = {{.size = size_}, ScalarType::kFloat32, {}};
     volume.exact = {SampleType::kFloat32, {}};
-    volume.ask = [this](std::uint32_t, const Box& box, const std::function<void(Result<Bytes>)>& done) {
+    volume.ask = [this](std::uint32_t, const Box& box, int level, const std::function<void(Result<Bytes>)>& done) {
       ++asked;
-      const std::vector<float> samples = Of(box, volume.field.time);
+      const std::vector<float> samples = Of(box, volume.field.time, 1 << level);
       const auto bytes = std::as_bytes(std::span(samples));
       done(Bytes(std::vector<std::byte>(bytes.begin(), bytes.end())));
     };
   }
 
   // Of the array at a time, whose samples are those of time 0 plus a million each.
-  std::vector<float> Of(const Box& box, std::uint64_t time) const {
+  std::vector<float> Of(const Box& box, std::uint64_t time, int step = 1) const {
     std::vector<float> samples;
-    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
-      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
-        for (std::int32_t x = box.begin.x; x < box.end.x; ++x) samples.push_back(At({x, y, z}, time));
+    for (std::int32_t z = box.begin.z; z < box.end.z; z += step) {
+      for (std::int32_t y = box.begin.y; y < box.end.y; y += step) {
+        for (std::int32_t x = box.begin.x; x < box.end.x; x += step) samples.push_back(At({x, y, z}, time));
       }
     }
     return samples;
@@ -151,9 +154,9 @@ class OwnedVolumeOf {
   std::map<std::pair<std::size_t, std::uint32_t>, std::vector<std::vector<float>>> elsewhere_;  // of an owner's slot
 };
 
-std::vector<float> ReadBox(VolumeSource& source, const Box& box) {
+std::vector<float> ReadBox(VolumeSource& source, const Box& box, int level = 0) {
   std::vector<float> samples(std::size_t(box.voxel_count()));
-  const Status read = source.ReadNow(0, box, std::as_writable_bytes(std::span(samples)));
+  const Status read = source.ReadNow(level, box, std::as_writable_bytes(std::span(samples)));
   EXPECT_TRUE(read.ok()) << read.message();
   return samples;
 }
@@ -175,18 +178,90 @@ TEST(OwnedSource, BoxesAreThoseOfOneArrayHereAndAsked) {
       const std::vector<float> expected = of.Of(box, 2);
       EXPECT_EQ(ReadBox(*here, box), expected);
       EXPECT_EQ(of.asked, 0);
-      EXPECT_TRUE(mixed->Reaches(box));
+      EXPECT_TRUE(mixed->Reaches(0, box));
       EXPECT_EQ(ReadBox(*mixed, box), expected);
-      if (opened.ok() && (*opened)->Reaches(box)) {
+      if (opened.ok() && (*opened)->Reaches(0, box)) {
         EXPECT_EQ(ReadBox(**opened, box), expected);
       }
       of.asked = 0;
     }
     EXPECT_EQ(opened.ok(), std::abs(owners) > 1) << "every second owner is on this host";
     if (opened.ok()) {
-      EXPECT_FALSE((*opened)->Reaches(of.Bounds()));
+      EXPECT_FALSE((*opened)->Reaches(0, of.Bounds()));
     }
     EXPECT_EQ(OpenOwned(of.volume.field.Text(), Here()).value()->info().version, here->info().version);
+  }
+}
+
+TEST(VoxelLattice, PointsOfBoxesThatTileAVolumeTileThePoints) {
+  Random random(17);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 300; ++i) {
+    const Index3 size = {random.Integer(1, 70), random.Integer(1, 70), random.Integer(1, 70)};
+    std::vector<Box> boxes;
+    Cut(random, {{0, 0, 0}, size}, random.Integer(1, 20), boxes);
+    for (int level = 0; level < 8; ++level) {
+      const VoxelLattice lattice = VoxelLattice::Of(size, level);
+      const Box all = {{0, 0, 0}, lattice.size};
+      const Box voxels = lattice.VoxelsOf(all);
+      EXPECT_TRUE(Box({0, 0, 0}, size).Contains(voxels));
+      for (const Axis axis : kAxes) {
+        EXPECT_LE(std::abs(voxels.begin[axis] - (size[axis] - voxels.end[axis])), 1) << "they are in the middle";
+        EXPECT_LT(size[axis] - voxels.size()[axis], 1 << level) << "there is no room for another one";
+      }
+      std::int64_t points = 0;
+      for (const Box& box : boxes) {
+        const Box in = lattice.PointsIn(box);
+        points += in.voxel_count();
+        EXPECT_TRUE(all.Contains(in));
+        EXPECT_TRUE(in.empty() || box.Contains(lattice.VoxelsOf(in)));
+        if (!in.empty()) {
+          EXPECT_EQ(PointsAlong(lattice.VoxelsOf(in).size(), level), in.size());
+        }
+      }
+      EXPECT_EQ(points, all.voxel_count());
+    }
+  }
+}
+
+TEST(OwnedSource, CoarserLevelsAreEverySecondVoxelHereAndAsked) {
+  Random random(19);
+  SCOPED_TRACE(random.trace());
+  for (const bool arrays : {false, true}) {
+    OwnedVolumeOf of(random, 3, arrays, 180);  // 23 MiB and more
+    of.WriteAll(1);
+    const auto here = MakeOwnedSource(of.volume, Here());
+    OwnedVolume far = of.volume;
+    far.field.owners[1].scope = 1;
+    far.of_nobody.push_back(far.boxes[2].back());
+    far.boxes[2].pop_back();
+    const auto mixed = MakeOwnedSource(far, Here());
+    const auto& levels = here->info().levels;
+    ASSERT_EQ(levels.size(), 2U);
+    EXPECT_EQ(OpenOwned(of.volume.field.Text(), Here()).value()->info().levels[1].description.geometry.size,
+              levels[1].description.geometry.size);
+    const VoxelLattice lattice = VoxelLattice::Of(of.Bounds().end, 1);
+    const VolumeGeometry& geometry = levels[1].description.geometry;
+    const Index3 point = {3, 20, 8};
+    EXPECT_EQ(geometry.ToWorld(ToVec3(point)), levels[0].description.geometry.ToWorld(ToVec3(lattice.first + point * Uniform(2))));
+    std::int64_t owned = 0;
+    for (const OwnedBox& each : *mixed->info().levels[1].owned) owned += each.box.voxel_count();
+    EXPECT_EQ(owned, geometry.bounds().voxel_count());
+    for (int i = 0; i < 20; ++i) {
+      const Box box = RandomBox(random, geometry.bounds());
+      const std::vector<float> expected = of.Of(lattice.VoxelsOf(box), 1, 2);
+      EXPECT_EQ(ReadBox(*here, box, 1), expected);
+      EXPECT_EQ(of.asked, 0);
+      ASSERT_TRUE(mixed->Reaches(1, box));
+      const std::vector<float> read = ReadBox(*mixed, box, 1);
+      const Box lost = lattice.PointsIn(far.of_nobody.back());
+      for (std::size_t at = 0; at < read.size(); ++at) {
+        const Index3 place = box.begin + PlaceIn(box.size(), at);
+        const bool is_lost = lost.Contains({place, place + Uniform(1)});
+        ASSERT_TRUE(read[at] == expected[at] || (is_lost && read[at] == 0)) << read[at] << " instead of " << expected[at];
+      }
+      of.asked = 0;
+    }
   }
 }
 
@@ -255,7 +330,7 @@ struct OwnerOfArray {
 
 Status ReadWhole(const MappedOwner& owner, std::vector<float>& samples) {
   samples.assign(OwnerOfArray::kBytes / sizeof(float), 0);
-  return owner.Read(0, OwnerOfArray::kBox, 1, BoxRoom::Dense(OwnerOfArray::kBox, reinterpret_cast<std::byte*>(samples.data())));
+  return owner.Read(0, OwnerOfArray::kBox, 0, 1, BoxRoom::Dense(OwnerOfArray::kBox, reinterpret_cast<std::byte*>(samples.data())));
 }
 
 // As CopySamples in this process, whatever lies between samples: parts near each other are copied with what is between them, and a large
