@@ -68,11 +68,9 @@ def linear_attenuation(preset, pieces=16):
     return {**preset, "Points": [number for value, alpha in curve for number in (value, alpha, 0.5, 0)]}
 
 
-def make_property(vtk, scene, directory, smallest_spacing):
+def make_property(vtk, scene, preset, smallest_spacing):
     """Colours, opacities (of a distance, as ours are of voxel lengths) and lighting: two-sided Phong with a light at infinity, as ours.
     Grids are drawn without lights, by us and by VTK."""
-    with open(os.path.join(directory, scene["transfer"]), encoding="utf-8") as stream:
-        preset = json.load(stream)[0]
     color, opacity = vtk.vtkColorTransferFunction(), vtk.vtkPiecewiseFunction()
     color.SetAllowDuplicateScalars(1)
     opacity.SetAllowDuplicateScalars(1)
@@ -86,11 +84,13 @@ def make_property(vtk, scene, directory, smallest_spacing):
     prop.SetScalarOpacity(opacity)
     prop.SetScalarOpacityUnitDistance(scene["opacity_distance"] * smallest_spacing)
     prop.SetInterpolationTypeToLinear()
-    prop.SetShade(0 if "grid" in scene else 1)
-    prop.SetAmbient(scene["shading"]["ambient"])
-    prop.SetDiffuse(scene["shading"]["diffuse"])
-    prop.SetSpecular(scene["shading"]["specular"])
-    prop.SetSpecularPower(scene["shading"]["shininess"])
+    lit = "grid" not in scene and scene["shading"] is not None
+    prop.SetShade(int(lit))
+    if lit:
+        prop.SetAmbient(scene["shading"]["ambient"])
+        prop.SetDiffuse(scene["shading"]["diffuse"])
+        prop.SetSpecular(scene["shading"]["specular"])
+        prop.SetSpecularPower(scene["shading"]["shininess"])
     return prop
 
 
@@ -130,8 +130,7 @@ def make_grid_mapper(vtk, kind, threads):
 class Stage:
     """The window with the volume in it, and the turntable's camera: Slabstream's views (common/view/camera.h), in VTK's terms."""
 
-    def __init__(self, vtk, scene, directory, mapper_kind, threads, jpeg=0):
-        image = read_volume(vtk, os.path.join(directory, scene["volume"]))
+    def __init__(self, vtk, scene, image, preset, mapper_kind, threads, jpeg=0):
         dims, spacing = image.GetDimensions(), image.GetSpacing()
         self.views, self.size = scene["views"], scene["size"]
         self.rays_at_corners = "grid" in scene  # of pixels: where VTK's mappers of grids have them; ours, and its others, at their centres
@@ -147,7 +146,7 @@ class Stage:
             mapper.SetInputData(image)
         volume = vtk.vtkVolume()
         volume.SetMapper(mapper)
-        volume.SetProperty(make_property(vtk, scene, directory, min(spacing)))
+        volume.SetProperty(make_property(vtk, scene, preset, min(spacing)))
         self.renderer = vtk.vtkRenderer()
         self.renderer.SetBackground(0, 0, 0)
         self.renderer.AddVolume(volume)
@@ -230,7 +229,11 @@ def main():
     kinds = GRID_MAPPERS if "grid" in scene else ["fixedpoint", "gpu"]
     if a.mapper and a.mapper not in kinds:
         p.error(f"--mapper {a.mapper} does not draw this scene, but: {', '.join(kinds)}")
-    stage = Stage(vtk, scene, os.path.dirname(a.scene), a.mapper or next(iter(kinds)), a.threads, a.jpeg)
+    directory = os.path.dirname(a.scene)
+    with open(os.path.join(directory, scene["transfer"]), encoding="utf-8") as stream:
+        preset = json.load(stream)[0]
+    image = read_volume(vtk, os.path.join(directory, scene["volume"]))
+    stage = Stage(vtk, scene, image, preset, a.mapper or next(iter(kinds)), a.threads, a.jpeg)
     projections = [a.projection] if a.projection else scene["views"]["projections"]
     warm_up = [stage.frame_ms(projection, 0) for projection in projections if a.views != 0]
     times = {projection: [] for projection in projections}

@@ -113,14 +113,29 @@ bool DatasetTable::ClosePart(const std::function<bool(const std::string&)>& is_w
   return true;
 }
 
+namespace {
+// What is of one time: a dataset, or what is shown of it while owners are gone; with fields and levels.
+std::string OfOneTime(const std::string& entry) {
+  for (const Missing missing : {Missing::kSkip, Missing::kLast}) {
+    const std::string part = PartWithout(DatasetOfPart(entry), missing);
+    if (entry == part || entry.starts_with(part + '\n')) return part;
+  }
+  return DatasetOfPart(entry);
+}
+}  // namespace
+
 void DatasetTable::Release(const std::string& name, const std::function<bool(const std::string&)>& is_wanted, Time now) {
+  std::set<std::string> wanted;
+  VisitAll(*this, [&](const std::string& of, const Entry& entry) {
+    if (DatasetOfPart(of) == name && (entry.state == DatasetState::kLoading || is_wanted(of))) wanted.insert(OfOneTime(of));
+  });
   std::erase_if(parts_, [&](const auto& part) {
-    if (DatasetOfPart(part.first) != name || part.second.state != DatasetState::kReady || is_wanted(part.first)) return false;
+    if (DatasetOfPart(part.first) != name || wanted.contains(OfOneTime(part.first))) return false;
     Retire(part.second);
     return true;
   });
   Entry& entry = *Find(name);
-  if (entry.state != DatasetState::kReady || is_wanted(name)) return;
+  if (entry.state != DatasetState::kReady || wanted.contains(name)) return;
   Retire(entry);
   entry = Forgotten(entry, now);
 }

@@ -108,7 +108,7 @@ class DatasetTable {
   // Forgets the field at a time that was used least recently, with its levels, if there are more than kMostParts parts. False: there are
   // not, or all are wanted.
   bool ClosePart(const std::function<bool(const std::string& name)>& is_wanted);
-  // Retires what is ready of a dataset and its parts and is not wanted, as if it had never been loaded.
+  // Retires what of a dataset is not wanted, as if it had never been loaded. What is of one time goes together, with fields and levels.
   void Release(const std::string& name, const std::function<bool(const std::string& entry)>& is_wanted, Time now);
   void Remove(const std::string& name);  // retires its voxels
   std::set<std::string> folders;         // folders that are watched

@@ -330,7 +330,8 @@ def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: A
         found = dataclasses.replace(found, samples=numpy.asanyarray(found.samples)[numpy.newaxis])
         shape = (1, *shape)
     if len(shape) != 3:
-        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x, or 2 of a slice: y, x")
+        choose = "; array[0] has its first time or channel" if len(shape) == 4 else ""
+        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x, or 2 of a slice: y, x{choose}")
     if not all(1 <= side <= _MOST_SIDE for side in shape):
         raise InvalidArgument(f"the array has the shape {shape}, each side must be in [1, {_MOST_SIDE}]")
     found = dataclasses.replace(found, masked=_is_masked(found.samples))

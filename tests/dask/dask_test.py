@@ -2,6 +2,7 @@
 """Pictures of Dask's arrays are those of the same arrays in numpy, wherever chunks lie, and while workers come and go (deploy/check dask)."""
 from __future__ import annotations
 
+import base64
 import contextlib
 import gc
 import ipaddress
@@ -16,16 +17,19 @@ import unittest
 
 import dask.array as da
 import distributed
+import nbclient
+import nbformat
 import numpy as np
 import xarray
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 for name, value in (("PYTHONPATH", ROOT / "python"), ("SLABSTREAM_PROGRAMS", ROOT / "build" / "bin")):
     os.environ.setdefault(name, str(value))  # for Dask's workers, too
-sys.path.insert(0, str(ROOT / "python"))
+sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests" / "python")]
 
 import slabstream as ss  # noqa: E402
 import slabstream.dask as sd  # noqa: E402
+from client_support import read_png  # noqa: E402
 
 PATIENCE = 60
 VIEW = {"azimuth": 25, "elevation": 15, "size": 160, "transfer": "viridis"}
@@ -238,7 +242,8 @@ class DaskTest(unittest.TestCase):
     def test_what_cannot_be_shown_is_refused_in_one_line(self):
         array = da.from_array(blobs(), 30)
         for wrong, why in ((blobs(), "is not an array of Dask"), (array[array > 5][:, None, None], "nan"),
-                           (array.astype(complex), "complex128"), (da.ones((9000, 2, 2), chunks=1), "and 4096 at one")):
+                           (array.astype(complex), "complex128"), (da.ones((9000, 2, 2), chunks=1), "and 4096 at one"),
+                           (da.stack([array, array]), r"shape \(2, 60, 50, 70\), .*; array\[0\] has its first time or channel")):
             with self.assertRaisesRegex(ss.InvalidArgument, why) as raised:
                 sd.render(wrong, **VIEW)
             self.assertNotIn("\n", str(raised.exception))
@@ -264,7 +269,7 @@ class DaskTest(unittest.TestCase):
             pids = self.client.run(os.getpid)
             os.kill(next(iter(pids.values())), signal.SIGKILL)
             self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth + 10}), array, azimuth=azimuth + 10)
-            self.client.wait_for_workers(len(pids))
+            self.client.wait_for_workers(len(pids), timeout=PATIENCE)
 
 
 class ServiceTest(unittest.TestCase):
@@ -294,6 +299,22 @@ class ServiceTest(unittest.TestCase):
             done = subprocess.run([sys.executable, "-B", example, f"{folder}/a.png"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertTrue(pathlib.Path(folder, "a.png").exists())
+
+    def test_the_notebook(self):
+        notebook = nbformat.read(ROOT / "docs" / "dask.ipynb", nbformat.NO_CONVERT)
+        self.assertFalse(any(cell.get("outputs") for cell in notebook.cells), "it is kept without outputs")
+        with tempfile.TemporaryDirectory() as folder:
+            private = {name: folder for name in ("HOME", "IPYTHONDIR")}
+            nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute(env=os.environ | private)
+        outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+        shown = [read_png(base64.b64decode(output.data["image/png"])).astype(int) for output in outputs if "image/png" in output.get("data", {})]
+        self.assertEqual([picture.shape[0] for picture in shown], [320, 320, 200, 200, 200, 320, 320])
+        for picture in shown:
+            self.assertGreater((picture[..., 3] > 50).mean(), 0.01)  # of the pixels
+        array, lazy, first, second, third, channel, later = shown
+        self.assertLessEqual(np.abs(later - array).max(), 1)
+        for one, other in ((array, lazy), (array, channel), (first, second), (second, third)):
+            self.assertGreater(np.abs(one - other).max(), 50)
 
 
 if __name__ == "__main__":
