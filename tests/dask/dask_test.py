@@ -266,10 +266,11 @@ class DaskTest(unittest.TestCase):
         chunks = da.from_array(array, 20).persist(workers=next(iter(self.client.nthreads())), allow_other_workers=True)
         for azimuth in range(0, 60, 20):
             self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth}), array, azimuth=azimuth)
-            pids = self.client.run(os.getpid)
-            os.kill(next(iter(pids.values())), signal.SIGKILL)
+            workers = len(self.client.nthreads())
+            holder = next(iter(self.client.who_has(chunks).values()))[0]
+            os.kill(self.client.run(os.getpid, workers=[holder])[holder], signal.SIGKILL)
             self.assert_like(sd.render(chunks, **VIEW | {"azimuth": azimuth + 10}), array, azimuth=azimuth + 10)
-            self.client.wait_for_workers(len(pids), timeout=PATIENCE)
+            self.client.wait_for_workers(workers, timeout=PATIENCE)
 
 
 class ServiceTest(unittest.TestCase):
