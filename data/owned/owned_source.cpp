@@ -147,7 +147,7 @@ class OwnedSource final : public VolumeSource {
 
   Counts counts() const override { return {.stored_bytes = shared_->asked_bytes, .chunks = 0}; }
 
-  Reach Reaches(int level, const Box& box) const override {
+  VoxelReach Reaches(int level, const Box& box) const override {
     const Level& of = levels_.at(std::size_t(level));
     std::vector<Box> missing = {box};
     bool made = true;
@@ -155,7 +155,7 @@ class OwnedSource final : public VolumeSource {
       places->Take(missing, [&](const Places::Of& from, const Box&) { made = made && shared_->IsMade(from); });
     }
     for (const Places* places : {&of.nobodys, &of.elsewhere}) places->Take(missing, [](const Places::Of&, const Box&) {});
-    return !missing.empty() ? Reach::kNever : made ? Reach::kNow : Reach::kOnceMade;
+    return !missing.empty() ? VoxelReach::kNever : made ? VoxelReach::kNow : VoxelReach::kOnceMade;
   }
 
   void Make(const Box& box, ReadDone done) override {

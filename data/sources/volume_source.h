@@ -124,7 +124,7 @@ struct BoxRoom {
 };
 
 // Whether a process gets voxels of a source that others hold (data/owned).
-enum class Reach : std::uint8_t { kNever, kOnceMade, kNow };
+enum class VoxelReach : std::uint8_t { kNever, kOnceMade, kNow };
 
 class VolumeSource {
  public:
@@ -140,7 +140,7 @@ class VolumeSource {
   virtual std::shared_ptr<VolumeSource> At(int /*time*/, int /*channel*/) { return nullptr; }
 
   // Whether Read gets the voxels of this box. If not, of what others hold (data/owned): another process must be asked.
-  virtual Reach Reaches(int /*level*/, const Box& /*box*/) const { return Reach::kNow; }
+  virtual VoxelReach Reaches(int /*level*/, const Box& /*box*/) const { return VoxelReach::kNow; }
 
   using ReadDone = std::function<void(Status)>;
   // Of a source that is made on demand: has all voxels of the box made, each where it is held. Some may be dropped again before the others

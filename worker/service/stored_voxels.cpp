@@ -138,9 +138,9 @@ bool StoredVoxels::Read(SendChunkRequest& wanted, const std::shared_ptr<StoredBo
   {
     const std::lock_guard lock(shared_->mutex);
     source = shared_->SourceAt(stored, now, shared_);
-    const Reach reach = source == nullptr ? Reach::kNever : source->Reaches(stored.level, request.box);
-    wanted.request.in_place = may_ask && reach == Reach::kOnceMade;
-    if (reach != Reach::kNow) return false;
+    const VoxelReach reach = source == nullptr ? VoxelReach::kNever : source->Reaches(stored.level, request.box);
+    wanted.request.in_place = may_ask && reach == VoxelReach::kOnceMade;
+    if (reach != VoxelReach::kNow) return false;
     if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
   const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };

@@ -183,16 +183,16 @@ TEST(OwnedSource, BoxesAreThoseOfOneArrayHereAndAsked) {
       const std::vector<float> expected = of.Of(box, 2);
       EXPECT_EQ(ReadBox(*here, box), expected);
       EXPECT_EQ(of.asked, 0);
-      EXPECT_EQ(mixed->Reaches(0, box), Reach::kNow);
+      EXPECT_EQ(mixed->Reaches(0, box), VoxelReach::kNow);
       EXPECT_EQ(ReadBox(*mixed, box), expected);
-      if (opened.ok() && (*opened)->Reaches(0, box) == Reach::kNow) {
+      if (opened.ok() && (*opened)->Reaches(0, box) == VoxelReach::kNow) {
         EXPECT_EQ(ReadBox(**opened, box), expected);
       }
       of.asked = 0;
     }
     EXPECT_EQ(opened.ok(), std::abs(owners) > 1) << "every second owner is on this host";
     if (opened.ok()) {
-      EXPECT_EQ((*opened)->Reaches(0, of.Bounds()), Reach::kNever);
+      EXPECT_EQ((*opened)->Reaches(0, of.Bounds()), VoxelReach::kNever);
     }
     EXPECT_EQ(OpenOwned(of.volume.field.Text(), Here()).value()->info().version, here->info().version);
   }
@@ -257,7 +257,7 @@ TEST(OwnedSource, CoarserLevelsAreEverySecondVoxelHereAndAsked) {
       const std::vector<float> expected = of.Of(lattice.VoxelsOf(box), 1, 2);
       EXPECT_EQ(ReadBox(*here, box, 1), expected);
       EXPECT_EQ(of.asked, 0);
-      ASSERT_EQ(mixed->Reaches(1, box), Reach::kNow);
+      ASSERT_EQ(mixed->Reaches(1, box), VoxelReach::kNow);
       const std::vector<float> read = ReadBox(*mixed, box, 1);
       const Box lost = lattice.PointsIn(far.of_nobody.back());
       for (std::size_t at = 0; at < read.size(); ++at) {
@@ -472,7 +472,7 @@ TEST(OwnedSource, BoxesOnDemandAreMadeOnceAndReadInPlace) {
   EXPECT_TRUE(worker->info().on_demand);
   EXPECT_EQ(worker->info().levels[0].block, MakingOwner::kBoxSize);
   const Box two = {{2, 1, 1}, {6, 4, 3}};
-  EXPECT_EQ(worker->Reaches(0, two), Reach::kOnceMade);
+  EXPECT_EQ(worker->Reaches(0, two), VoxelReach::kOnceMade);
   std::vector<float> samples(std::size_t(two.voxel_count()));
   EXPECT_THAT(worker->ReadNow(0, two, std::as_writable_bytes(std::span(samples))).message(), HasSubstr("is not made, or was dropped"));
   EXPECT_EQ(ReadBox(*source, two), MakingOwner::Of(two)) << "samples are asked for";
@@ -480,7 +480,7 @@ TEST(OwnedSource, BoxesOnDemandAreMadeOnceAndReadInPlace) {
   source->Make(two, [&](const Status& status) { made = status; });
   EXPECT_TRUE(made.ok()) << made.message();
   EXPECT_EQ(owner.times_made, 2);
-  EXPECT_EQ(worker->Reaches(0, two), Reach::kNow);
+  EXPECT_EQ(worker->Reaches(0, two), VoxelReach::kNow);
   EXPECT_EQ(ReadBox(*worker, two), MakingOwner::Of(two));
   source->Make(two, [](const Status&) {});
   EXPECT_EQ(owner.times_made, 2);
