@@ -323,6 +323,8 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     if (held && std::exchange(field.shown, field.whole) != field.whole) field.since = now;
     if (now < field.since + kOwnerWaits) return;
     field.hold = 0;
+    // The slowest owner may have two slots, with the shown time and the whole one, and no room for the next.
+    if (field.shown != field.whole) field.shown = 0;
     LetGo(field, true);
   }
 

@@ -209,6 +209,28 @@ TEST_F(OwnerRulesTest, NobodyWaitsForAnotherForLong) {
   EXPECT_THAT(source_().value()->info().owned, HasSubstr(":6:"));
 }
 
+// The second owner has two slots, with times 5 and 6, and the first one has overwritten time 6.
+TEST_F(OwnerRulesTest, ATimeIsNotShownForEverWhileTheSlowestOwnerCannotGoOn) {
+  Register();
+  opened_ = Open().value();
+  Hear(1, OwnerTime{kEpoch, 8, 0});
+  Hear(2, OwnerTime{kEpoch, 6, 0});
+  const auto used_later = [&](int times) {
+    OwnerPong pong;
+    for (int i = 0; i < times; ++i) {
+      Pass(1);
+      (void)opened_->info().growth->ask(now_);  // somebody looks
+      for (const PeerToken peer : {1, 2}) pong = Of<OwnerPong>(Hear(peer, OwnerPing{kEpoch, 0, 1, peer == 1 ? 7U : 0U})).at(0).second;
+    }
+    return pong.used;
+  };
+  EXPECT_THAT(used_later(5), ElementsAre(5, 6));
+  (void)used_later(6);
+  EXPECT_TRUE(opened_->info().growth->ask(now_)) << "it is opened anew";
+  opened_.reset();
+  EXPECT_THAT(Of<OwnerPong>(owners_->Tend(now_)).at(0).second.used, ElementsAre(6));
+}
+
 TEST_F(OwnerRulesTest, WithoutAnOwnerThereIsThePictureOfTheOthersOrTheLastOne) {
   Register();
   opened_ = Open().value();

@@ -46,7 +46,7 @@ ModelOwners::ModelOwners(SimulatedService& service, Random& random, const Faults
       volume_(volume),
       tally_(tally),
       tell_(std::move(tell)),
-      calm_(faults.none() || (random.Chance(0.15) && faults.coordinator_pauses + faults.suspensions == 0)),
+      calm_(faults.none() || (random.Chance(0.15) && faults.coordinator_pauses + faults.suspensions + faults.clock_jumps == 0)),
       orderly_(faults.lose + faults.duplicate == 0 && !faults.reorder),
       count_(random.Integer(1U, 5U)),
       drift_(random.Chance(0.3) ? random.Integer<std::uint64_t>(6, 40) : random.Integer<std::uint64_t>(1, 5)),
