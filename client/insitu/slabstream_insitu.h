@@ -64,15 +64,15 @@ typedef struct slabstream_insitu slabstream_insitu;
 /* Makes a handle, which close ends; NULL if it fails. Texts are copied. */
 SLABSTREAM_INSITU_API int slabstream_insitu_open(slabstream_insitu** handle, const slabstream_insitu_field* field);
 
-/* Before start: this process owns the voxels [begin, end); at most 4096 boxes. The boxes of all owners tile the field. The box's array has
- * the voxels [array_begin, array_end): these, and ghosts. Ghosts inside the field have the values of their owners whenever the array is
- * committed, so that pictures need not fetch them; those outside of it are never read. NULLs: no ghosts. `strides`: samples from a voxel of
- * the library's array to the next one along each axis, at least 1; NULL: x fastest, without gaps. */
+/* Before start: this process owns the voxels [begin, end); at most 4096 boxes, and 65536 of all owners. The boxes of all owners tile the
+ * field. The box's array has the voxels [array_begin, array_end): these, and ghosts. Ghosts inside the field have the values of their
+ * owners whenever the array is committed, so that pictures need not fetch them; those outside of it are never read. NULLs: no ghosts.
+ * `strides`: samples from a voxel of the library's array to the next one along each axis, at least 1; NULL: x fastest, without gaps. */
 SLABSTREAM_INSITU_API int slabstream_insitu_add_box(slabstream_insitu* handle, const int32_t begin[3], const int32_t end[3],
                                                     const int32_t array_begin[3], const int32_t array_end[3], const int64_t strides[3]);
 
 /* Before start: declares a number that clients may change within [least, most]; its first value is `value`. The name has up to 64 letters,
- * digits and '_'. At most 64 of them. Those of owner 0 of field 0 are used; others may declare them,
+ * digits and '_', no digit first. At most 64 of them. Those of owner 0 of field 0 are used; others may declare them,
  * too. */
 SLABSTREAM_INSITU_API int slabstream_insitu_parameter(slabstream_insitu* handle, const char* name, double least, double most, double value);
 

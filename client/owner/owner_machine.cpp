@@ -54,8 +54,11 @@ std::vector<OwnerToCoordinator> OwnerMachine::Say(Time now, bool making) {
   if (epoch_ != 0 && now >= heard_ + timeout_) Forget();
   if (!refused_.ok()) return {};
   std::vector<OwnerToCoordinator> said;
-  if (epoch_ != 0 && latest_ > std::exchange(told_, latest_)) said.emplace_back(OwnerTime{epoch_, latest_, simulated_});
-  if (now < next_send_) return said;
+  const bool beats = now >= next_send_;
+  // Repeated, since a connection that ends may have lost it.
+  if (epoch_ != 0 && latest_ != 0 && (beats || latest_ > told_)) said.emplace_back(OwnerTime{epoch_, latest_, simulated_});
+  told_ = latest_;
+  if (!beats) return said;
   next_send_ = now + heartbeat_;
   if (epoch_ != 0) {
     said.emplace_back(OwnerPing{.epoch = epoch_, .hold = hold_, .gone = gone_, .making = making});
