@@ -96,7 +96,8 @@ void BoxMaker::Run() {
       if (time == 0 || times_[slot] != time) dropped = kept_.Drop(key);
       if (dropped.empty()) memory_->Make(slot, box, kept_.Find(key)->get());
     }
-    for (const ChunkRequest& request : asked_.extract(key).mapped()) {
+    const auto asked = asked_.extract(key);
+    for (const ChunkRequest& request : asked.mapped()) {
       answers_.push_back({request, made.ok() ? SamplesOf(box, request) : Result<Bytes>(Printable(made.status()))});
     }
     order_.pop_front();

@@ -127,11 +127,11 @@ Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::si
 }
 
 Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk) {
-  CHECK(!samples.empty() && samples.size() <= kChunkBytes) << "(" << samples.size() << " bytes)";
+  CHECK(samples.size() <= kChunkBytes) << "(" << samples.size() << " bytes)";
   chunk.raw_bytes = static_cast<std::uint32_t>(samples.size());
   chunk.digest = Digest(samples.span());
   chunk.codec = Codec::kRaw;
-  if (codec == Codec::kZstd) {
+  if (codec == Codec::kZstd && !samples.empty()) {
     if (PooledVector<std::byte> packed = Compress(samples.span()); !packed.empty()) {
       chunk.codec = Codec::kZstd;
       samples = Bytes(std::move(packed));

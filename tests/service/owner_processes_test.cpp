@@ -215,7 +215,9 @@ TEST_F(OwnerProcessesTest, FieldsHaveOwnersOfTheirOwnAndOneTime) {
     std::vector<FrameRequest> shown;
     for (const std::vector<std::string>& channels : {std::vector<std::string>{}, {"near"}, {"far"}, {"far", "near"}}) {
       for (FrameRequest request : RequestsOfRenderers(kNear)) {
+        if (channels.size() != 1 && request.renderer != "raycast" && request.renderer != "mip") continue;
         request.channels = channels;
+        if (channels.size() != 1) request.transfer = {};  // one function means one field
         shown.push_back(std::move(request));
       }
     }
@@ -245,7 +247,8 @@ TEST_F(OwnerProcessesTest, FieldsHaveOwnersOfTheirOwnAndOneTime) {
         for (const std::uint64_t time : {3U, 12U}) Write(*owners_.back(), boxes.at(field), owner, time, nullptr, kLater * field);
       }
     }
-    ASSERT_TRUE(RenderUnless("\"ball\"").ok());
+    const Result<Picture> first = RenderUnless("no dataset", requests[0]);
+    ASSERT_TRUE(first.ok()) << first.status().message();
     SampleQuery query{.dataset = "ball", .points = {{14, 12, 16}, {22, 12, 16}, {30, 24, 34}}, .channels = {"near", "far"}};
     const auto samples = client_->SampleAt(query).value();
     for (const VolumeSample& sample : samples) {
@@ -266,10 +269,9 @@ TEST_F(OwnerProcessesTest, FieldsHaveOwnersOfTheirOwnAndOneTime) {
       }
     }
     owners_.back().reset();
-    FrameRequest request = Request();
     Result<Picture> picture = Status::Internal("");
     for (const Time end = MonotonicNow() + kPatience; MonotonicNow() < end;) {
-      picture = client_->Render(request, kPatience);
+      picture = client_->Render(requests[0], kPatience);
       if (!picture.ok()) break;
     }
     EXPECT_THAT(picture.status().message(), AnyOf(HasSubstr("of field \"far\" has left"), HasSubstr("owner 0 has left")));

@@ -421,7 +421,7 @@ TEST_F(OwnerRulesTest, OthersAreRefused) {
   EXPECT_THAT(refusal(4, other), HasSubstr("overlap, or leave voxels out"));
   other = Registration(1, 8);
   other.description.mapping.scale = 2;
-  EXPECT_THAT(refusal(4, other), HasSubstr("owners, description or samples differ from those of owner 0"));
+  EXPECT_THAT(refusal(4, other), HasSubstr("owners, description, samples, on_demand or fields differ from those of owner 0"));
   EXPECT_EQ(Of<OwnerWelcome>(Hear(4, Registration(1, 8))).size(), 1U);
   RegisterOwner wrong = Registration(0, 3);
   wrong.dataset = "other";

@@ -273,8 +273,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 25)
-      << "reports, levels and fields are in four messages, parameters and labels in three; datasets, keys, isosurfaces, "
+  EXPECT_EQ(seen.size(), limits.size() + 26)
+      << "fields are in five messages, reports and levels in four, parameters and labels in three; datasets, keys, isosurfaces, "
          "gradients, opacities, traffic, colors, entries, paths, channels, labels that show, and values that are steered in two";
 }
 
