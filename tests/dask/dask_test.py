@@ -148,7 +148,7 @@ class DaskTest(unittest.TestCase):
                                  coords={"channel": ["actin", "nuclei, late"]})
         named = sd.render(cells, channels={"actin": look["0"], "nuclei  late": look["1"]}, **view)
         self.assertLessEqual(np.abs(np.asarray(named).astype(int) - image).max(), 1)
-        with self.assertRaisesRegex(ss.NotFound, "no field 'red'.*actin"):
+        with self.assertRaisesRegex(ss.InvalidArgument, "no field .red.: it has 0 .actin"):
             sd.render(cells, channels={"red": {}}, **view)
         with self.assertRaisesRegex(ss.InvalidArgument, "channel_axis is 4, but the array has 4 axes"):
             sd.render(both, channel_axis=4, **view)
@@ -219,7 +219,7 @@ class DaskTest(unittest.TestCase):
     def test_an_array_that_nobody_has_is_given_up(self):
         array = da.from_array(blobs(), 30).persist()
         sd.render(array, **VIEW)
-        name = self.service._held[array.name][0].dataset
+        name = self.service._held[array.name][0]
         self.assertIn(name, {dataset.name for dataset in self.service.service.datasets()})
         del array
         gc.collect()

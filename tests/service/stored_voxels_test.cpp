@@ -37,7 +37,10 @@ class StoredVoxelsTest : public testing::Test {
     while (!Begin(now)) std::this_thread::yield();
     return event.get();
   }
-  bool Begin(Time now) { return voxels_.Read({kPadded, request_, std::make_shared<const StoredAt>(stored_)}, box_, now); }
+  bool Begin(Time now) {
+    SendChunkRequest wanted{kPadded, request_, std::make_shared<const StoredAt>(stored_)};
+    return voxels_.Read(wanted, box_, now);
+  }
   static bool Refused(const WorkerEvent& event) {
     const auto* message = std::get_if<MessageReceived>(&event);
     return message != nullptr && std::holds_alternative<ChunkRefused>(message->message);
