@@ -35,6 +35,8 @@ struct Asked {
   std::uint64_t time = 0;
   AskedVoxels voxels;
   AskDone done;
+  Time since = {};     // it is out
+  bool again = false;  // it was asked for twice
 };
 
 struct Owner {
@@ -245,7 +247,10 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     Owner& owner = *Find(from);
     owner.hold = m.hold;
     owner.gone = m.gone;
-    if (m.making) owner.answered = now;
+    if (m.making) {
+      owner.answered = now;
+      for (Asked& asked : owner.out) asked.since = now;
+    }
     const std::string& name = owner.registered.dataset;
     FindShown(fields.at(name));
     OwnerPong pong = Pong(name, fields.at(name));
@@ -410,6 +415,23 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
     owner.waiting.clear();
   }
 
+  // What is not answered while others are was lost, perhaps.
+  void AskAgain(Owner& owner, Duration asleep) {
+    std::erase_if(owner.out, [&](Asked& asked) {
+      asked.since = std::min(now, asked.since + asleep);
+      if (now < asked.since + kOwnerAnswers) return false;
+      asked.since = now;
+      if (!std::exchange(asked.again, true)) {
+        Request(owner, asked);
+        return false;
+      }
+      const std::string& name = owner.registered.dataset;
+      answers.emplace_back(std::move(asked.done), Status::Unavailable(Named(name, fields.at(name), PlaceOf(owner.registered)) +
+                                                                      " does not answer a request for voxels"));
+      return true;
+    });
+  }
+
   // `bytes`: of the samples, which tell what was asked for of the same voxels at several levels, or in place.
   void Answer(Owner& owner, std::uint64_t time, const Box& box, std::optional<std::uint32_t> bytes, Result<Bytes> answer) {
     const auto meant = [&](const Asked& each) { return each.time == time && each.voxels.box == box; };
@@ -454,9 +476,11 @@ struct Owners::State : std::enable_shared_from_this<Owners::State> {
         if (now >= owner.answered + kOwnerAnswers) {
           FailAsked(owner, Status::Unavailable(Named(name, field, PlaceOf(owner.registered)) + " answers no request for voxels"));
         }
+        AskAgain(owner, asleep);
         for (; !owner.waiting.empty() && owner.out.size() < kMostAskedOfOwner; owner.waiting.pop_front()) {
           Request(owner, owner.waiting.front());
           owner.out.push_back(std::move(owner.waiting.front()));
+          owner.out.back().since = now;
         }
       }
       FindShown(field);

@@ -105,10 +105,10 @@ class Owner:
         self._kept: dict[int, Sequence[Array]] = {}  # by time: arrays that may still be read
         self._made: dict[tuple[int, int], Array] = {}  # by box and time: what make() has returned
         self._parameters = tuple(parameters or ())
-        field = _Field(dataset.encode(), self.dtype.name.encode(), _xyz(ctypes.c_int32, shape, "shape"),
+        about = _Field(dataset.encode(), self.dtype.name.encode(), _xyz(ctypes.c_int32, shape, "shape"),
                        _xyz(ctypes.c_double, spacing, "spacing"), _xyz(ctypes.c_double, origin, "origin"), owner, owners, slots,
                        service.encode() if service else None, ",".join(fields).encode() or None, field)
-        _call("open", ctypes.byref(self._handle), ctypes.byref(field))
+        _call("open", ctypes.byref(self._handle), ctypes.byref(about))
         try:
             for owned, around, steps in zip(boxes, held, self._strides, strict=True):
                 ends = [_xyz(ctypes.c_int32, [pair[i] for pair in box], "box") for box in (owned, around) for i in (0, 1)]
@@ -172,7 +172,9 @@ class Owner:
         `copy=False` shows them where they lie, and keeps them as long as they may be read: they must not change meanwhile, nor differ in
         type or strides from what the owner was made with. If boxes are made on demand, there are no arrays."""
         if self._maker is not None:
-            return self._adopt(time, arrays, simulated, timeout)
+            if len(arrays) > 0:
+                raise InvalidArgument("publish: boxes are made on demand, so there are no arrays")
+            return self._adopt(time, (), simulated, timeout)
         arrays = [arrays] if isinstance(arrays, numpy.ndarray) else arrays
         shapes = [array.shape for array in arrays]
         if shapes != self._held:

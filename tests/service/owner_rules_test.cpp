@@ -276,6 +276,31 @@ TEST_F(OwnerRulesTest, OnceAllAreThereNoOwnerKeepsTheTimeBefore) {
   EXPECT_THAT(used(), ElementsAre(6)) << "the other one may have overwritten it, so that there must be another one";
 }
 
+TEST_F(OwnerRulesTest, ARequestThatIsLostIsAskedAgainAndThenFails) {
+  Register();
+  Read();
+  const auto asked = Of<ChunkRequest>(owners_->Tend(now_));
+  ASSERT_EQ(asked.size(), 8U);
+  const auto answer = [&](const std::pair<PeerToken, ChunkRequest>& each) {
+    const auto& [peer, request] = each;
+    Chunk chunk{.epoch = kEpoch, .dataset = request.dataset, .box = request.box};
+    const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::size_t(request.box.voxel_count()))), Codec::kZstd, chunk);
+    Hear(peer, chunk, payload);
+  };
+  const auto beat = [&] {
+    now_ += seconds(1);
+    for (const PeerToken peer : {1, 2}) Hear(peer, OwnerPing{kEpoch, 0, 0, 0});
+    return Of<ChunkRequest>(owners_->Tend(now_));
+  };
+  std::size_t again = 0;
+  for (int second = 1; second <= 20; ++second) {
+    if (second < 8) answer(asked[std::size_t(second)]);  // the first one is lost
+    again += beat().size();
+    EXPECT_EQ(again, second < 10 ? 0U : 1U);
+  }
+  EXPECT_THAT(AwaitRead().message(), MatchesRegex(".*owner [01] of 2 (does not answer a|answers no) request for voxels"));
+}
+
 TEST_F(OwnerRulesTest, RequestsWaitAreAskedAgainAndAnswered) {
   Register();
   Read();

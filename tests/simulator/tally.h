@@ -197,7 +197,7 @@ inline constexpr std::array<CountRule, std::size_t(Count::kEnd)> kCountRules{{
     {"openings that failed", 500},
     {"changes of parameters", 500},
     {"pictures of owners", 3000},
-    {"pictures that lack something and say so", 300},
+    {"pictures that lack something and say so", 100},
     {"errors of owners", 300},
 }};
 
