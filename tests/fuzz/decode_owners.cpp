@@ -37,7 +37,7 @@ bool DecodeMemory(std::size_t pages, std::span<const std::byte> begin) {
   }
   const OwnerLayout layout = (*owner)->layout();
   CHECK(layout.Check().ok());
-  bool read = layout.boxes.empty();
+  bool read = layout.boxes.empty() || layout.on_demand;  // nothing is made, so nothing can be read
   for (std::size_t box = 0; box < layout.boxes.size(); ++box) {
     Box part = layout.boxes[box].held;
     for (const Axis axis : kAxes) part.begin[axis] = std::max(part.begin[axis], part.end[axis] - 8);
