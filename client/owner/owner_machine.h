@@ -25,7 +25,7 @@ class OwnerMachine {
   void Refuse(Status why) { refused_ = std::move(why); }
   // Nothing more once it is refused. `making`: OwnerPing::making.
   std::vector<OwnerToCoordinator> Say(Time now, bool making = false);
-  Time NextWake() const { return next_send_; }    // or earlier
+  Time NextWake() const { return next_send_; }  // or earlier
 
   // Of the oldest time that nobody uses. Never that of the latest one: the simulation may compute the next time from it.
   std::optional<std::uint32_t> FreeSlot() const;
