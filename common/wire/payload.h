@@ -33,7 +33,8 @@ std::optional<Bytes> PackRuns(std::span<const std::byte> payload, PackedRuns& pa
 // Takes `raw_bytes` of memory, PayloadBytes of the image: the caller has checked that the image fits its frame. DataLoss as above.
 Result<Bytes> UnpackRuns(const PackedRuns& packed, const Bytes& payload, std::size_t raw_bytes);
 
-// Packs the samples of one chunk, at most kChunkBytes bytes; none answers ChunkRequest::in_place. Fills codec, raw_bytes, encoded_bytes and digest of `chunk`.
+// Packs the samples of one chunk, at most kChunkBytes bytes; none answers ChunkRequest::in_place. Fills codec, raw_bytes, encoded_bytes and
+// digest of `chunk`.
 Bytes PackChunk(Bytes samples, Codec codec, Chunk& chunk);
 
 // Unpacks into `samples`, which has room for exactly chunk.raw_bytes. `chunk` has come through Decode. InvalidArgument: `samples` has
