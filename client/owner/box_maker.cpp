@@ -34,7 +34,7 @@ void BoxMaker::SetTime(std::uint32_t slot, std::uint64_t time) {
   if (time == 0) Drop(kept_.DropIf([slot](const auto& entry) { return entry.key.first == slot; }), lock);
 }
 
-// Readers notice before the samples go. These go without the mutex: their owner may do anything then.
+// Readers notice before samples are freed. They are freed without the mutex, since whoever made them may call this class then.
 void BoxMaker::Drop(LruMap<Key, MadeBox>::Entries dropped, std::unique_lock<std::mutex>& lock) {
   for (const auto& each : dropped) memory_->Make(each.key.first, each.key.second, nullptr);
   lock.unlock();
@@ -69,12 +69,12 @@ bool BoxMaker::is_making() const {
 
 // With the mutex, so that nothing is dropped meanwhile.
 Result<Bytes> BoxMaker::SamplesOf(std::size_t box, const ChunkRequest& request) const {
-  const bool any = !request.in_place;
-  const Box part = any ? request.box : Box{request.box.begin, request.box.begin + Uniform(1)};
+  // In place one voxel tells whether the box is there.
+  const Box part = request.in_place ? Box{request.box.begin, request.box.begin + Uniform(1)} : request.box;
   std::vector<std::byte> samples(std::size_t(part.voxel_count()) * BytesPerSample(own_->layout().samples));
   const Status read = own_->Read(box, part, 0, request.dataset, BoxRoom::Dense(part, samples.data(), true));
   if (!read.ok()) return read;
-  return any ? Bytes(std::move(samples)) : Bytes();
+  return request.in_place ? Bytes() : Bytes(std::move(samples));
 }
 
 void BoxMaker::Run() {

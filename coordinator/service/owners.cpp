@@ -579,7 +579,6 @@ OwnedVolume Owners::State::AtShownTime(const std::string& name, const Field& fie
     }
   }
   OwnedVolume volume = volumes.front();
-  if (field.fields.empty()) return volume;
   for (const std::string& each : field.fields) volume.channels.push_back({.name = each});
   volume.fields = std::make_shared<const std::vector<OwnedVolume>>(std::move(volumes));
   return volume;
@@ -662,14 +661,12 @@ Result<std::shared_ptr<VolumeSource>> Owners::State::Open(const std::string& nam
   lock.unlock();
   if (!shown->ok()) return shown->status();
   std::vector<std::shared_ptr<const MappedOwner>> mapped;
-  OwnedVolume& volume = (*shown)->volume;
-  const auto map = [&](const OwnedVolume& of) {
+  for (const OwnedVolume& of : *(*shown)->volume.fields) {
     for (const OwnerPlace& place : of.field.owners) {
       if (const auto owner = MappedOwner::Open(place); owner.ok()) mapped.push_back(*owner);
     }
-  };
-  volume.fields == nullptr ? map(volume) : void(std::ranges::for_each(*volume.fields, map));
-  auto source = MakeOwnedSource(std::move(volume), ProcessReadContext());
+  }
+  auto source = MakeOwnedSource(std::move((*shown)->volume), ProcessReadContext());
   lock.lock();
   const auto known = fields.find(name);
   if (!(*shown)->lacks && known != fields.end()) known->second.mapped = std::move(mapped);

@@ -46,9 +46,9 @@ using AskOwner = std::function<void(std::uint32_t owner, const AskedVoxels& voxe
 
 // What the coordinator knows of a field.
 struct OwnedVolume {
-  // Those of the dataset at this time, in the order of `channels`; null: it has one.
+  // All fields of the dataset at this time; null: not known, and At gives none.
   std::shared_ptr<const std::vector<OwnedVolume>> fields = {};
-  std::vector<FieldInfo> channels = {};
+  std::vector<FieldInfo> channels = {};  // of `fields`, in their order; empty: there is one, which has no name
   int channel = 0;
   OwnedField field;
   VolumeDescription description = {};        // of kept samples (KeptTypeOf)
