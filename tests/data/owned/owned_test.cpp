@@ -504,7 +504,7 @@ TEST(OwnedSource, WhatIsDroppedUnderAReaderIsNeverWrong) {
     });
   }
   int right = 0;
-  while (right < 500 && tries < 1'000'000 && !HasFailure()) {
+  while (right < 5000 && tries < 1'000'000 && !HasFailure()) {
     const Box box = RandomBox(random, {{}, MakingOwner::kSize});
     std::vector<float> samples(std::size_t(box.voxel_count()));
     const Status read = worker->ReadNow(0, box, std::as_writable_bytes(std::span(samples)));
@@ -520,7 +520,7 @@ TEST(OwnedSource, WhatIsDroppedUnderAReaderIsNeverWrong) {
   ends = true;
   ++tries;
   tries.notify_all();
-  EXPECT_EQ(right, 500);
+  EXPECT_EQ(right, 5000);
 }
 
 // What `child` exits with, which runs in a process of its own while this one runs `meanwhile` with its id and its first number.
