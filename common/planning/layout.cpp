@@ -26,6 +26,10 @@ constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 // thick, cubes of this many voxels a side. Those of grids may be bricks: their cells count more than voxels.
 constexpr std::int64_t kSmallestCube = 36;
 
+// Of boxes that are made on demand, a frame has about so many groups, if there are as many boxes: what is opaque in a group is known before
+// the next but one is handed out, and boxes that it hides are not made.
+constexpr std::uint64_t kGroupsToMake = 64;
+
 // How many units along each axis cover so many voxels.
 Index3 UnitsOver(const Index3& size, const Index3& unit) { return (size - Uniform(1)) / unit + Uniform(1); }
 
@@ -354,7 +358,16 @@ struct LayoutMaker::State {
     layout.touching = FindTouching(layout.partition);
     if (request.summary->on_demand && !fields.clip().empty()) FillClipped(layout);
     layout.group_bytes = std::uint64_t(request.box_bytes_target);
+    if (request.summary->on_demand) layout.group_bytes = std::min(layout.group_bytes, BytesShown(layout) / request.slots / kGroupsToMake);
     return layout;
+  }
+
+  std::uint64_t BytesShown(const Layout& layout) const {
+    std::uint64_t bytes = 0;
+    for (BoxId id = 0; id < layout.owners.size(); ++id) {
+      if (layout.owners[id] != kNoSlot) bytes += std::uint64_t(BytesOf({layout.partition.boxes()[id], 0}));
+    }
+    return bytes;
   }
 
   // Voxels of other boxes in the halo of one are not read if clipping leaves nothing that reads them.

@@ -30,8 +30,7 @@ namespace {
 using std::chrono::seconds;
 using testing::HasSubstr;
 
-constexpr Index3 kSize = {64, 64, 64}, kChunk = {16, 16, 16};
-constexpr std::uint64_t kChunkVoxels = 16 * 16 * 16;
+constexpr Index3 kSize = {64, 64, 64};
 constexpr std::uint32_t kOwners = 3;
 constexpr Duration kPatience = seconds(60);
 
@@ -66,7 +65,7 @@ class OwnersOnDemandTest : public testing::Test {
     }
     for (const auto& worker : workers_) worker->WaitUntilRegistered();
     client_.emplace(Client::Connect(context_, coordinator_->client_endpoint(), kPatience).value());
-    const std::vector<Box> boxes = CutAtBlocks({{0, 0, 0}, kSize}, kChunk);
+    const std::vector<Box> boxes = CutAtBlocks({{0, 0, 0}, kSize}, Uniform(chunk_));
     for (std::uint32_t owner = 0; owner < kOwners; ++owner) {
       VolumeOwnerOptions of{.endpoint = coordinator_->worker_endpoint(), .dataset = "ball", .owner = owner, .owners = kOwners};
       of.description.geometry.size = kSize;
@@ -75,7 +74,7 @@ class OwnersOnDemandTest : public testing::Test {
       const std::size_t begin = boxes.size() * owner / kOwners, end = boxes.size() * (owner + 1) / kOwners;
       for (std::size_t i = begin; i < end; ++i) of.layout.boxes.push_back({.box = boxes[i], .held = boxes[i]});
       of.layout.PlaceDense();
-      of.made_bytes = budget_chunks * kChunkVoxels;
+      of.made_bytes = budget_chunks * CountIn(Uniform(chunk_));
       of.make = [this, held = of.layout.boxes](std::size_t box, std::uint64_t time) { return Make(held[box].box, time); };
       owners_.push_back(VolumeOwner::Start(context_, of).value());
       ASSERT_TRUE(owners_.back()->Begin(kPatience).ok());
@@ -98,14 +97,15 @@ class OwnersOnDemandTest : public testing::Test {
       ++made_[box];
       if (fails_) return Status::InvalidArgument("the sea is rough");
     }
-    const auto samples = std::shared_ptr<std::byte[]>(new std::byte[kChunkVoxels], [](std::byte* gone) {
-      std::fill_n(gone, kChunkVoxels, std::byte{0xEE});  // whoever reads it now sees it
+    const std::size_t count = CountIn(box.size());
+    const auto samples = std::shared_ptr<std::byte[]>(new std::byte[count], [count](std::byte* gone) {
+      std::fill_n(gone, count, std::byte{0xEE});  // whoever reads it now sees it
       delete[] gone;
     });
     std::byte* to = samples.get();
     for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
-        to = std::copy_n(volume_.block.bytes.begin() + volume_.block.Offset({box.begin.x, y, z}), kChunk.x, to);
+        to = std::copy_n(volume_.block.bytes.begin() + volume_.block.Offset({box.begin.x, y, z}), box.size().x, to);
       }
     }
     return MadeBox(samples, samples.get());
@@ -124,6 +124,7 @@ class OwnersOnDemandTest : public testing::Test {
   }
 
   Volume volume_;
+  std::int32_t chunk_ = 16;
   Context context_;
   std::unique_ptr<CoordinatorService> coordinator_;
   std::vector<std::unique_ptr<WorkerService>> workers_;
@@ -178,6 +179,26 @@ TEST_F(OwnersOnDemandTest, ACropMakesTheBoxThatItShows) {
   if (!made.empty()) {
     EXPECT_EQ(made.begin()->first, (Box{{16, 16, 32}, {32, 32, 48}}));
   }
+}
+
+// Solid matter fills the picture: the nearest layer of boxes shows, and the halo is in the next one. Those behind are hidden, but for what
+// a worker draws before the columns beside it are opaque.
+TEST_F(OwnersOnDemandTest, BoxesThatOpaqueOnesHideAreNotMade) {
+  volume_ = MakeTestVolume(kSize, ScalarType::kUint8, [](const Index3&) { return 250.0; });
+  chunk_ = 8;
+  ASSERT_NO_FATAL_FAILURE(Start(1));
+  Open();
+  FrameRequest request = TestRequest(FindRenderer("raycast"), 0, 0);
+  request.view.elevation_degrees = 0;
+  request.view.zoom = 3;
+  request.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 1, 0.5, 0}}, .opacity_distance = 1};
+  request.termination = 0.01;
+  ASSERT_TRUE(client_->Render(request, kPatience).ok());
+  std::array<int, 8> layers = {};
+  for (const auto& [box, times] : Made()) ++layers.at(std::size_t(box.begin.y / chunk_));
+  EXPECT_EQ(layers[0], 64);
+  EXPECT_LT(layers[2] + layers[3], 64) << "of 128";
+  for (const std::size_t hidden : {4, 5, 6, 7}) EXPECT_EQ(layers.at(hidden), 0) << hidden;
 }
 
 TEST_F(OwnersOnDemandTest, AFailureToMakeIsTheEndOfThePictureInOneLine) {
