@@ -11,12 +11,13 @@
 namespace slabstream {
 namespace {
 
-class OwnersThatVanishTest : public MultiProcessTest, public testing::WithParamInterface<const char*> {
+class VanishingOwnersTest : public MultiProcessTest {
  protected:
-  void Start() {
+  void Start(const std::string& how, int stuck = 0) {
+    how_ = how;
     ASSERT_NO_FATAL_FAILURE(StartCoordinators());
     for (int i = 0; i < 2; ++i) StartWorker();
-    for (std::uint32_t owner = 0; owner < kBalls; ++owner) StartOwner(owner);
+    for (std::uint32_t owner = 0; owner < kBalls; ++owner) StartOwner(owner, owner == 1 ? stuck : 0);
     for (std::uint64_t time = 0; time < kBallsPeriod; ++time) {
       right_.push_back(RenderDirectly(Request(), BallsAt(time)));
       without_.push_back(RenderDirectly(Request(), BallsAt(time, 1)));
@@ -34,8 +35,9 @@ class OwnersThatVanishTest : public MultiProcessTest, public testing::WithParamI
     worker_endpoint_ = FieldOf(ready, "workers");
     client_.emplace(Connect());
   }
-  void StartOwner(std::uint32_t owner) {
-    owners_[owner].emplace(std::vector<std::string>{SLABSTREAM_BALL_OWNER_PROGRAM, worker_endpoint_, std::to_string(owner), GetParam()});
+  void StartOwner(std::uint32_t owner, int stuck = 0) {
+    owners_[owner].emplace(
+        std::vector<std::string>{SLABSTREAM_BALL_OWNER_PROGRAM, worker_endpoint_, std::to_string(owner), how_, std::to_string(stuck)});
   }
   static FrameRequest Request(Missing missing = Missing::kFail) {
     FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 0);
@@ -65,13 +67,16 @@ class OwnersThatVanishTest : public MultiProcessTest, public testing::WithParamI
   }
   static void ExpectOneOf(const Picture& picture, const std::vector<LocalImage>& images) { EXPECT_LE(Least(picture, images), 1e-6F); }
 
+  std::string how_;
   std::optional<Client> client_;
   std::array<std::optional<ChildProcess>, kBalls> owners_;
   std::vector<LocalImage> right_, without_;  // by time % kBallsPeriod; without: what owner 1 holds
 };
 
+class OwnersThatVanishTest : public VanishingOwnersTest, public testing::WithParamInterface<const char*> {};
+
 TEST_P(OwnersThatVanishTest, AndComeBack) {
-  ASSERT_NO_FATAL_FAILURE(Start());
+  ASSERT_NO_FATAL_FAILURE(Start(GetParam()));
   Result<Picture> picture = AwaitPicture();
   ASSERT_TRUE(picture.ok());
   std::uint64_t stored = 0, sent = 0;
@@ -121,6 +126,26 @@ TEST_P(OwnersThatVanishTest, AndComeBack) {
 
 INSTANTIATE_TEST_SUITE_P(Voxels, OwnersThatVanishTest, testing::Values("in-place", "asked"),
                          [](const auto& each) { return each.param == std::string("asked") ? "Asked" : "InPlace"; });
+
+class OwnersThatMakeBoxesTest : public VanishingOwnersTest, public testing::WithParamInterface<int> {};
+
+TEST_P(OwnersThatMakeBoxesTest, VanishMeanwhileAndComeBack) {
+  ASSERT_NO_FATAL_FAILURE(Start("on-demand", GetParam()));
+  std::jthread viewer([&] {
+    const Result<Picture> picture =
+        Await([](const Result<Picture>& each) { return each.status().message().find("owner 1 of 3") != std::string::npos; });
+    EXPECT_EQ(picture.status().message().find('\n'), std::string::npos);
+  });
+  EXPECT_EQ(owners_[1]->ReadLine(), "making");
+  owners_[1]->Kill(SIGKILL);
+  owners_[1]->Wait();
+  viewer.join();
+  StartOwner(1);
+  ASSERT_TRUE(AwaitPicture().ok());
+}
+
+// The first making is for the survey that opens the dataset, later ones for pictures.
+INSTANTIATE_TEST_SUITE_P(Making, OwnersThatMakeBoxesTest, testing::Values(1, 4));
 
 }  // namespace
 }  // namespace slabstream
