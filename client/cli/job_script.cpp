@@ -35,6 +35,8 @@ is_over() {
 # preempted job that ends by itself.
 run_workers() {
   local file="" waited step
+  # srun --overlap, where Slurm knows it: else srun may wait minutes for a step of workers that have ended.
+  export SLURM_OVERLAP=1
   while true; do
     waited=0
     until is_over "$file"; do

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # owners.sh PREFIX LIB SOURCES FOLDER: builds SOURCES/owner.c, and owner.f90 if there is gfortran, against what is installed in PREFIX, with its
-# libraries in PREFIX/LIB, starts a service, and leaves a picture of the field of each in FOLDER: c.png and fortran.png.
+# libraries in PREFIX/LIB, starts a service, and leaves pictures of the same field of each in FOLDER: c.png and fortran.png.
 set -euo pipefail
 prefix="$1" lib="$1/$2" sources="$3" folder="$4"
 cd "$folder"
@@ -20,6 +20,8 @@ fi
 trap '"$prefix/bin/slabstream" down > /dev/null' EXIT
 "$prefix/bin/slabstream" up --detach --workers 1 --listen 'tcp://127.0.0.1:*' > up.log
 for language in "${languages[@]}"; do
+  shown=()
+  [[ "$language" == c ]] || shown=(--channel same)
   # With no service named: the one that `up` has started.
   coproc owner { exec "./owner-$language"; }
   # shellcheck disable=SC2154  # coproc sets it
@@ -27,7 +29,7 @@ for language in "${languages[@]}"; do
   read -r said <&"${owner[0]}"
   echo "$language: $said"
   for _ in {1..200}; do  # until the service has heard of a time
-    "$prefix/bin/slabstream" render "$language" --size 64 --azimuth 30 -o "$language.png" > render.log 2>&1 && break
+    "$prefix/bin/slabstream" render "$language" --size 64 --azimuth 30 --transfer viridis "${shown[@]}" -o "$language.png" > render.log 2>&1 && break
   done
   [[ -f "$language.png" ]] || cat render.log
   eval "exec ${owner[1]}>&-"

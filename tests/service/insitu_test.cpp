@@ -8,7 +8,9 @@
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -186,6 +188,89 @@ TEST(Insitu, TheMemoryOfTheLastTimeIsNotGivenAway) {
   }
   EXPECT_GE(pictures, 20);
   slabstream_insitu_close(owner);
+}
+
+// Two boxes, one of which is kept. What was dropped becomes something else at once.
+TEST(Insitu, BoxesAreMadeOnDemandAndDropped) {
+  struct Maker {
+    const Volume volume = MakeTestVolume(kSize, ScalarType::kUint8, [](const Index3& v) {
+      return std::max(0.0, 250 - 16 * Length(ToVec3(v) - Vec3{9, 10, 14}));
+    });
+    // The second one has ghosts, also outside of the volume.
+    const std::array<Box, 2> boxes = {{{{0, 0, 0}, {9, 24, 28}}, {{9, 0, 0}, {20, 24, 28}}}};
+    const std::array<Box, 2> arrays = {{boxes[0], {{8, -1, 0}, {21, 25, 28}}}};
+    std::mutex mutex;
+    std::map<const void*, std::unique_ptr<Array>> made;
+    int makings = 0;
+  } maker;
+  slabstream_insitu_maker functions = {};
+  functions.context = &maker;
+  functions.most_bytes = 1;
+  functions.make = [](void* context, std::uint32_t box, std::uint64_t time, const void** samples, char* error, std::uint32_t error_bytes) {
+    Maker& self = *static_cast<Maker*>(context);
+    const std::lock_guard lock(self.mutex);
+    ++self.makings;
+    if (time == 4) {
+      std::string_view("the disk is full").copy(error, error_bytes);
+      return int(SLABSTREAM_INSITU_UNAVAILABLE);
+    }
+    const Index3 size = self.arrays.at(box).size();
+    auto array = std::make_unique<Array>(self.arrays.at(box), Strides{1, size.x, std::int64_t{size.x} * size.y}, self.volume);
+    *samples = array->bytes.data();
+    self.made[*samples] = std::move(array);
+    return 0;
+  };
+  functions.drop = [](void* context, std::uint32_t, std::uint64_t time, const void* samples) {
+    Maker& self = *static_cast<Maker*>(context);
+    const std::lock_guard lock(self.mutex);
+    EXPECT_EQ(time, 3U);
+    ASSERT_TRUE(self.made.contains(samples));
+    std::ranges::fill(self.made[samples]->bytes, 77);
+    self.made.erase(samples);
+  };
+
+  Service running;
+  Client client = running.Connect();
+  const std::string service = running.coordinator->worker_endpoint();
+  const slabstream_insitu_field field = Field(service);
+  slabstream_insitu* owner = nullptr;
+  ASSERT_EQ(slabstream_insitu_open(&owner, &field), 0) << slabstream_insitu_error();
+  EXPECT_EQ(slabstream_insitu_on_demand(owner, nullptr), SLABSTREAM_INSITU_INVALID_ARGUMENT);
+  EXPECT_THAT(slabstream_insitu_error(), HasSubstr("maker, make or drop is NULL"));
+  for (const std::size_t i : {0, 1}) {
+    const Box &box = maker.boxes.at(i), &array = maker.arrays.at(i);
+    ASSERT_EQ(slabstream_insitu_add_box(owner, &box.begin.x, &box.end.x, &array.begin.x, &array.end.x, nullptr), 0);
+  }
+  ASSERT_EQ(slabstream_insitu_on_demand(owner, &functions), 0) << slabstream_insitu_error();
+  ASSERT_EQ(slabstream_insitu_start(owner), 0) << slabstream_insitu_error();
+  EXPECT_EQ(slabstream_insitu_on_demand(owner, &functions), SLABSTREAM_INSITU_INVALID_ARGUMENT) << "it is after start";
+  const std::array<const void*, 2> nowhere = {};
+  std::uint64_t freed = 0;
+  ASSERT_EQ(slabstream_insitu_adopt(owner, 3, 0, nowhere.data(), kPatience, &freed), 0) << slabstream_insitu_error();
+  EXPECT_EQ(maker.makings, 0) << "nobody looks";
+
+  FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 0);
+  request.termination = 0;
+  const auto render_until = [&](auto&& is_it) {
+    Result<Picture> picture = Status::Internal("");
+    for (const Time end = MonotonicNow() + std::chrono::seconds(60); MonotonicNow() < end;) {
+      picture = client.Render(request, std::chrono::seconds(60));
+      if (is_it(picture)) break;
+    }
+    return picture;
+  };
+  const Result<Picture> picture = render_until([](const Result<Picture>& each) { return each.ok(); });
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, maker.volume), request.size), 1e-6F);
+  {
+    const std::lock_guard lock(maker.mutex);
+    EXPECT_EQ(maker.made.size(), 1U) << "one box is kept";
+  }
+  ASSERT_EQ(slabstream_insitu_adopt(owner, 4, 0, nowhere.data(), kPatience, &freed), 0) << slabstream_insitu_error();
+  const Result<Picture> failed = render_until([](const Result<Picture>& each) { return !each.ok(); });
+  EXPECT_THAT(failed.status().message(), HasSubstr("the disk is full"));
+  slabstream_insitu_close(owner);
+  EXPECT_TRUE(maker.made.empty()) << "all was dropped";
 }
 
 TEST(Insitu, WhateverIsWrongIsACodeAndALine) {
