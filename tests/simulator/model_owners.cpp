@@ -95,8 +95,9 @@ void ModelOwners::PlanTroubles(Duration span) {
               process.stalled = service_.now() + random_.Real(0.5, 15);
               AtProcess(process, process.stalled, [this, &process] { TryBegin(process); });
             }));
-  somewhere(random_.Integer(0, 2),
-            to_some(Count::kOwnersPaused, [this](Process& process) { process.held = service_.now() + random_.Real(0.1, 8); }));
+  somewhere(random_.Integer(0, 2), to_some(Count::kOwnersPaused, [this](Process& process) {
+              process.held = std::max(process.held, service_.now() + random_.Real(0.1, 8));  // what waits keeps its order
+            }));
   somewhere(random_.Integer(0, 2), [this] { SpawnStranger(); });
   if (random_.Chance(0.15)) {
     somewhere(1, [this] {
