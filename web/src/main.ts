@@ -7,6 +7,7 @@ import { ChannelRanges } from "./channel_ranges";
 import { takesFunction } from "./channels";
 import { channelsSection } from "./channels_section";
 import { clipSection } from "./clip_section";
+import { type Connection, GatewayConnection } from "./connection";
 import { type Context, follow } from "./context";
 import { openSection, section, toggle } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
@@ -72,8 +73,8 @@ class Page {
   private addressTimer = 0;
   private readonly file = h("input", { type: "file" });
 
-  constructor(token: string) {
-    this.api = new Api(token);
+  constructor(connection: Connection, private readonly token: string) {
+    this.api = new Api(connection);
     const { store, notices, api } = this;
     const context: Context = this.context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
     const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
@@ -107,7 +108,7 @@ class Page {
       else if (state.azimuth !== before.azimuth || state.elevation !== before.elevation) this.starts = false;
       this.show();
       clearTimeout(this.addressTimer);
-      this.addressTimer = setTimeout(() => showInAddress(store.state, api.token), ADDRESS_MS);
+      this.addressTimer = setTimeout(() => showInAddress(store.state, token), ADDRESS_MS);
     });
     addEventListener("hashchange", () => {
       if (location.hash.includes("token=")) return location.reload(); // a link of another start of the gateway, perhaps
@@ -182,7 +183,7 @@ class Page {
     const loaded = drawn || (this.refused && this.listed.some(each => each.name === dataset && each.state === "ready"));
     if (this.volume?.name === dataset || this.asking === dataset || !loaded) return;
     this.asking = dataset;
-    Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
+    Promise.all([this.api.datasets(), centreOf(this.api.connection, dataset)]).then(([list, { centre, world, unit }]) => {
       const entry = list.find((each: Dataset) => each.name === dataset);
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
@@ -215,7 +216,7 @@ class Page {
 
   // A socket does not say why it was refused; a request does.
   private async checkToken(): Promise<void> {
-    const answer = await fetch("api/v1/datasets", { headers: { Authorization: `Bearer ${this.api.token}` } }).catch(() => null);
+    const answer = await this.api.connection.request("datasets", {}, {}).catch(() => null);
     if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("This gateway has another token: each start makes a new one.");
   }
 
@@ -257,7 +258,7 @@ class Page {
   private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
 
   private copyLink(withToken: boolean): void {
-    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it can use this gateway until it ends." : "The link is copied. It gives no access: others need their own."));
+    void copyText(linkOf(this.store.state, withToken ? this.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it can use this gateway until it ends." : "The link is copied. It gives no access: others need their own."));
   }
 
   private actions(): ConstructorParameters<typeof Shell>[0] {
@@ -341,9 +342,10 @@ const token = takeToken();
 const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
 if (token) {
   showAlone("Connecting…");
-  loadOffers().then(() => {
+  const connection = new GatewayConnection(new URL(location.href), token);
+  loadOffers(connection).then(() => {
     INITIAL.renderer = automaticRenderer();
-    new Page(token);
+    new Page(connection, token);
   }).catch((error: unknown) => showAlone(`The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`));
 } else {
   showAlone("Slabstream");

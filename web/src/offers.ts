@@ -1,5 +1,6 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
 import type { Dataset } from "./api";
+import type { Connection } from "./connection";
 
 export interface Offer {
   name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; region_presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
@@ -10,8 +11,8 @@ export interface Renderer { name: string; title: string; abilities: string[]; pa
 const offers = new Map<string, Offer>();
 let ofPictures: readonly Offer[] = []; // not of slices
 
-export async function loadOffers(): Promise<void> {
-  const response = await fetch("api/v1/options", { cache: "no-store" });
+export async function loadOffers(connection: Connection): Promise<void> {
+  const response = await connection.request("options", {}, {});
   const { slice, render } = (await response.json()) as { slice: Offer[]; render: Offer[] };
   for (const offer of [...slice, ...render]) offers.set(offer.name, offer);
   ofPictures = render;

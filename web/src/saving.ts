@@ -1,6 +1,7 @@
 // Pictures as files: what panes show, rendered anew at any size, with the page's marks drawn over it or without.
 import { type Annotations, Drawing } from "./annotations";
 import type { Api } from "./api";
+import type { Connection } from "./connection";
 import { h, svg } from "./dom";
 import { type Frame, Session, type View } from "./session";
 
@@ -10,9 +11,9 @@ export interface Part { name: string; title: string; view: View; marks: Annotati
 const MARKS_SIDE = 600; // pixels of the shorter side of a picture whose marks have the page's own size
 
 // A lossless picture of a view.
-function draw(token: string, view: View, canvas: HTMLCanvasElement, place: (frame: Frame) => void): Promise<Frame> {
+function draw(connection: Connection, view: View, canvas: HTMLCanvasElement, place: (frame: Frame) => void): Promise<Frame> {
   return new Promise((resolve, reject) => {
-    const session: Session = new Session(token, {
+    const session: Session = new Session(connection, {
       frame: frame => {
         if (!frame.header.final) return;
         place(frame);
@@ -37,9 +38,9 @@ async function pictureOf(drawing: SVGElement, width: number, height: number): Pr
   return image;
 }
 
-async function pictureOfPart(token: string, { view, marks }: Part, width: number, height: number, marked: boolean): Promise<HTMLCanvasElement> {
+async function pictureOfPart(connection: Connection, { view, marks }: Part, width: number, height: number, marked: boolean): Promise<HTMLCanvasElement> {
   const canvas = h("canvas", { width, height }), context = canvas.getContext("2d") as CanvasRenderingContext2D;
-  const frame = await draw(token, view, canvas, ({ header, picture }) => {
+  const frame = await draw(connection, view, canvas, ({ header, picture }) => {
     const [r, g, b, a] = header.background;
     context.fillStyle = `rgb(${[r, g, b].map(c => Math.round(c * 255)).join(" ")} / ${a})`;
     context.fillRect(0, 0, width, height);
@@ -64,7 +65,7 @@ export async function pictureFile(api: Api, parts: readonly Part[], { width, hei
   for (const [i, part] of parts.entries()) {
     const x = i % across === 0 ? 0 : left, y = i < across ? 0 : top, options = { ...part.view.options };
     if (transparent) delete options["background"];
-    const one = await pictureOfPart(api.token, { ...part, view: { ...part.view, options } }, across === 1 ? width : x === 0 ? left : width - left, across === 1 ? height : y === 0 ? top : height - top, marked);
+    const one = await pictureOfPart(api.connection, { ...part, view: { ...part.view, options } }, across === 1 ? width : x === 0 ? left : width - left, across === 1 ? height : y === 0 ? top : height - top, marked);
     context.drawImage(one, x, y);
   }
   return new Promise((resolve, reject) => canvas.toBlob(blob => (blob ? resolve(blob) : reject(new Error("The picture is too large for this browser."))), "image/png"));

@@ -57,7 +57,7 @@ export class Slices {
   }
 
   private make(plane: string, name: string): Slice {
-    const pane = new Pane(plane, `${name} slice. Arrow keys move the cross-hair, Page Up and Page Down the slice.`, this.context.api.token, {
+    const pane = new Pane(plane, `${name} slice. Arrow keys move the cross-hair, Page Up and Page Down the slice.`, this.context.api.connection, {
       drawn: () => this.annotate(slice), resized: () => this.show(slice), error: message => this.context.say(`${name}: ${message}`, "error"),
     });
     const slice: Slice = { pane, plane, name };

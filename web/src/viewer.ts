@@ -29,7 +29,7 @@ export class Viewer {
   private changed = false; // since the last view was sent
 
   constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, private readonly measuring: Measuring, private readonly labels: Labels, private readonly ranges: ChannelRanges, events: PaneEvents) {
-    this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
+    this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.connection, {
       ...events, drawn: shown => { this.resolveFit(shown); this.annotate(); events.drawn?.(shown); }, resized: () => this.send(),
     });
     this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
