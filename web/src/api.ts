@@ -39,7 +39,8 @@ export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [nu
 export class Api {
   private readonly missing = new Set<string>();
 
-  constructor(readonly connection: Connection) {}
+  // `ended`: nobody waits for answers any more.
+  constructor(readonly connection: Connection, readonly ended: AbortSignal) {}
 
   // Whether the gateway has said that it has no such address.
   lacks(path: string): boolean { return this.missing.has(path); }
@@ -52,6 +53,7 @@ export class Api {
     this.request(path, fields, { method: "POST", body }, signal);
 
   private async request(path: string, fields: Record<string, string>, what: { method?: string; body?: BodyInit | null }, signal?: AbortSignal): Promise<Response> {
+    if (this.ended.aborted) throw new DOMException("The viewer is gone.", "AbortError");
     const response = await this.connection.request(path, fields, { ...what, ...(signal ? { signal } : {}) });
     if (response.ok) return response;
     const answer = (await response.json().catch(() => null)) as { error?: string } | null;

@@ -1,6 +1,6 @@
 // One stream of pictures of docs/http.md, with one view that changes. It connects again by itself.
-import type { Dataset, Options } from "./api";
-import type { Connection, Stream } from "./connection";
+import type { Api, Dataset, Options } from "./api";
+import type { Stream } from "./connection";
 import type { Vec3 } from "./vec";
 
 export interface Geometry {
@@ -60,11 +60,12 @@ export class Session {
   private lookedAt = 0;
   private readonly looking: number;
 
-  constructor(private readonly connection: Connection, private readonly events: SessionEvents) {
+  constructor(private readonly api: Api, private readonly events: SessionEvents) {
     this.connect();
     this.looking = setInterval(() => this.look(), LOOK_MS);
     addEventListener("online", this.retryNow);
     document.addEventListener("visibilitychange", this.retryNow);
+    api.ended.addEventListener("abort", this.end);
   }
 
   // The latest view wins; one that equals the last one is not sent.
@@ -86,14 +87,15 @@ export class Session {
     if (this.wanted) this.show(this.wanted);
   }
 
-  end(): void {
+  readonly end = (): void => {
     this.ended = true;
     clearTimeout(this.timer);
     clearInterval(this.looking);
     removeEventListener("online", this.retryNow);
     document.removeEventListener("visibilitychange", this.retryNow);
+    this.api.ended.removeEventListener("abort", this.end);
     this.stream?.close();
-  }
+  };
 
   private readonly retryNow = (): void => {
     if (this.ended || document.hidden || this.stream) return;
@@ -124,7 +126,7 @@ export class Session {
 
   private connect(): void {
     this.events.connection?.("connecting", "");
-    const stream = this.stream = this.connection.open();
+    const stream = this.stream = this.api.connection.open();
     this.heard();
     stream.onopen = () => {
       if (this.stream !== stream) return;
