@@ -27,6 +27,7 @@
 #include "gateway/reply.h"
 #include "gateway/request_fields.h"
 #include "gateway/request_trace.h"
+#include "gateway/rights.h"
 #include "gateway/service_link.h"
 #include "gateway/service_news.h"
 #include "gateway/view_session.h"
@@ -36,7 +37,31 @@ namespace {
 
 namespace asio = boost::asio;
 
-constexpr std::string_view kViewProtocol = "slabstream.view.v1", kTokenProtocol = "slabstream.token.";
+constexpr std::string_view kViewProtocol = "slabstream.view.v1", kTokenProtocol = "slabstream.token.", kBearer = "Bearer ";
+
+// Pages that may show the viewer and ask the gateway: those of this machine, such as notebooks, and those that --origin names.
+std::vector<std::string> PagesOf(const GatewayOptions& options) {
+  std::vector<std::string> pages = {"http://localhost:*", "http://127.0.0.1:*"};
+  pages.insert(pages.end(), options.pages.begin(), options.pages.end());
+  return pages;
+}
+
+// A body that is cut off when the token that it was asked for with expires.
+class EndingStream final : public BodyStream {
+ public:
+  EndingStream(std::shared_ptr<BodyStream> body, Access access) : body_(std::move(body)), access_(std::move(access)) {}
+
+  void Read(std::function<void(Result<std::string>)> next) override {
+    body_->Read([access = access_, next = std::move(next)](Result<std::string> part) {
+      next(UnixNow() < access.until ? std::move(part) : Result<std::string>(Status::Unavailable(access.ExpiredText())));
+    });
+  }
+  void Abandon() override { body_->Abandon(); }
+
+ private:
+  const std::shared_ptr<BodyStream> body_;
+  const Access access_;
+};
 
 }  // namespace
 
@@ -46,7 +71,7 @@ class Gateway::Impl : public HttpApplication {
       : context_(context),
         service_(std::move(service)),
         options_(std::move(options)),
-        rules_(options_.listen, options_.tls.has_value(), options_.proxy_origin),
+        rules_(options_.listen, options_.tls.has_value(), options_.proxy.origin, PagesOf(options_)),
         work_(asio::make_work_guard(io_)),
         traces_(options_.collector ? std::make_shared<TraceSender>(*options_.collector, ThisProcess("slabstream-gateway")) : nullptr),
         encoders_(std::max(2U, std::thread::hardware_concurrency())),
@@ -65,13 +90,13 @@ class Gateway::Impl : public HttpApplication {
   }
 
   Status Start() {
-    if (!options_.listen.loopback && !options_.tls && options_.proxy_origin.empty()) {
+    if (!options_.listen.loopback && !options_.tls && options_.proxy.origin.empty()) {
       return Status::InvalidArgument(
           fmt::format("--listen {} is not loopback: it needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
     }
     if (Status status = CheckToken(options_.token); !status.ok()) return status;
     HttpLimits limits = options_.limits;
-    if (!options_.proxy_origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
+    if (!options_.proxy.origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
     Result<std::unique_ptr<HttpServer>> server =
         HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, limits, *this);
     if (!server.ok()) return server.status();
@@ -100,52 +125,82 @@ class Gateway::Impl : public HttpApplication {
   std::string url(bool with_token) const {
     const std::string host = HostOf({.host = options_.listen.host, .port = server_->port()});
     const std::string own = fmt::format("{}://{}", options_.tls ? "https" : "http", host);
-    return (options_.proxy_origin.empty() ? own : options_.proxy_origin) + (with_token ? "/#token=" + options_.token : "/");
+    return (options_.proxy.origin.empty() ? own : options_.proxy.origin) + options_.proxy.path +
+           (with_token ? "/#token=" + options_.token : "/");
   }
 
   // ---- HttpApplication
 
   void Handle(HttpRequest request, ReplyFunction reply) override {
-    const auto counted = [this, reply = std::move(reply)](HttpReply answer) {
+    if (auto refusal = OriginRefusal(request)) {
+      metrics_.CountResponse(refusal->status);
+      return reply(*std::move(refusal));
+    }
+    const auto counted = [this, origin = request.origin, reply = std::move(reply)](HttpReply answer) {
       metrics_.CountResponse(answer.status);
+      if (origin) {
+        answer.headers.emplace_back("Access-Control-Allow-Origin", *origin);
+        answer.headers.emplace_back("Access-Control-Expose-Headers", "Slabstream-Renderer");
+      }
       reply(std::move(answer));
     };
-    if (auto refusal = OriginRefusal(request)) return counted(*std::move(refusal));
-    const Result<Target> target = ParseTarget(request.target);
+    Result<Target> target = ParseTarget(request.target);
     if (!target.ok()) return counted(Failure(target.status()));
+    const std::string& base = options_.proxy.path;
+    if (!base.empty() && target->path == base) {  // the page's addresses are relative: they need the slash
+      return counted({.status = 308, .body = {}, .headers = {{"Location", base + "/" + request.target.substr(base.size())}}});
+    }
+    target->path = BelowBase(target->path);
     const auto route = routes_.find(target->path);
+    if (request.method == "OPTIONS" && request.origin && (route != routes_.end() || FindAsset(target->path) != nullptr)) {
+      return counted(Preflight());
+    }
     if (route == routes_.end()) {
       if (const Asset* asset = FindAsset(target->path); asset != nullptr && (request.method == "GET" || request.method == "HEAD")) {
         return counted(AssetReply(*asset, request));
       }
       return counted(Failure(404, fmt::format("there is nothing at '{}'", Shown(target->path))));
     }
-    if (!route->second.open && !MayAsk(request, *target)) return counted(NoToken());
-    for (const PictureField& field : target->fields) {
-      if (field.name == "dataset") uploads_->Touch(field.text, MonotonicNow());
-    }
-    const bool get = request.method == "GET" || request.method == "HEAD";
-    if (!get && !(request.method == "POST" && route->second.takes_post)) {
+    const RouteRights& rights = AllRights().find(target->path)->second;
+    const bool get = request.method == "GET" || request.method == "HEAD", post = request.method == "POST";
+    const std::optional<Right> right = get ? rights.get : post ? rights.post : std::nullopt;
+    if (!right) {
       HttpReply answer = Failure(405, fmt::format("{} is not a method of {}", Shown(request.method), target->path));
-      answer.headers.emplace_back("Allow", route->second.takes_post ? "GET, HEAD, POST" : "GET, HEAD");
+      answer.headers.emplace_back("Allow", !rights.post ? "GET, HEAD" : !rights.get ? "POST" : "GET, HEAD, POST");
       return counted(std::move(answer));
     }
-    if (!route->second.traced) return route->second.handle(request, *target, counted, nullptr);
-    const auto trace = RequestTrace::Begin(traces_, request, options_.tls ? "https" : "http", route->first);
-    if (trace == nullptr) return route->second.handle(request, *target, counted, nullptr);
-    const auto traced = [counted, trace](HttpReply answer) {
-      trace->End(answer.status);
+    const Result<Access> access = *right == Right::kNone ? Access() : AccessOf(request, *target);
+    if (!access.ok()) return counted(NoToken(access.status()));
+    if (const auto why = WhyNot(*right, *access)) return counted(NoRight(*why));
+    Result<PictureFields> fields = FieldsOf(*target, post && !route->second.takes_bytes ? std::string_view(request.body) : "");
+    if (!fields.ok()) return counted(Failure(fields.status()));
+    for (const PictureField& field : *fields) {
+      if (field.name != "dataset" || *right == Right::kNone) continue;
+      if (const auto why = WhyNotShown(field.text, *access)) return counted(NoRight(*why));
+      uploads_->Touch(field.text, MonotonicNow());
+    }
+    const auto shown = [counted, access = *access](HttpReply answer) {
+      // The service names other datasets where one is missing.
+      if (access.datasets && answer.status == 404) answer = Failure(ShownStatus(Status::NotFound(""), access));
+      if (answer.rest != nullptr && access.until != Access::kForEver) answer.rest = std::make_shared<EndingStream>(answer.rest, access);
       counted(std::move(answer));
     };
-    route->second.handle(request, *target, traced, trace);
+    const auto trace =
+        route->second.traced ? RequestTrace::Begin(traces_, request, options_.tls ? "https" : "http", route->first) : nullptr;
+    const auto traced = [shown, trace](HttpReply answer) {
+      if (trace != nullptr) trace->End(answer.status);
+      shown(std::move(answer));
+    };
+    route->second.handle({request, *std::move(fields), *access, traced, trace});
   }
 
   std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) override {
     if (auto refusal = OriginRefusal(request)) return *std::move(refusal);
     const Result<Target> target = ParseTarget(request.target);
     if (!target.ok()) return Failure(target.status());
-    if (target->path != "/api/v1/view") return Failure(404, "the WebSocket is /api/v1/view");
-    if (!MayAsk(request, *target)) return NoToken();
+    if (BelowBase(target->path) != "/api/v1/view") return Failure(404, "the WebSocket is /api/v1/view");
+    const Result<Access> access = AccessOf(request, *target);
+    if (!access.ok()) return NoToken(access.status());
     if (std::ranges::find(request.subprotocols, kViewProtocol) == request.subprotocols.end()) {
       return Failure(400, fmt::format("the WebSocket needs the subprotocol {}", kViewProtocol));
     }
@@ -154,119 +209,132 @@ class Gateway::Impl : public HttpApplication {
       return Failure(429, fmt::format("there are {} views already, which is the limit", sessions_.size()));
     }
     auto session = std::make_shared<ViewSession>(SessionSurroundings{.io = io_, .encoders = encoders_, .metrics = metrics_},
-                                                 std::make_unique<ServiceLink>(context_, service_), news_,
+                                                 std::make_unique<ServiceLink>(context_, service_), news_, *access,
                                                  [this](ViewSession& closed) { sessions_.erase(&closed); });
     sessions_.insert(session.get());
     return WebSocketAccepted{.session = std::move(session), .subprotocol = std::string(kViewProtocol)};
   }
 
   std::vector<std::pair<std::string, std::string>> CommonHeaders() const override {
-    std::string frames = "'self' http://localhost:* http://127.0.0.1:*";  // notebooks
-    for (const std::string& source : options_.frame_sources) frames += " " + source;
-    if (!options_.proxy_origin.empty()) frames += " " + options_.proxy_origin;
+    std::string frames = fmt::format("'self' {}", fmt::join(PagesOf(options_), " "));
+    if (!options_.proxy.origin.empty()) frames += " " + options_.proxy.origin;
     return {
         {"Content-Security-Policy",
          fmt::format("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; font-src "
                      "'self'; base-uri 'none'; form-action 'none'; frame-ancestors {}",
                      frames)},
         {"X-Content-Type-Options", "nosniff"},
-        {"Referrer-Policy", "no-referrer"}};
+        {"Referrer-Policy", "no-referrer"},
+        {"Vary", "Origin"}};
   }
 
   void CountRefusal(std::string_view reason) override { metrics_.CountRefusal(reason); }
 
  private:
+  struct Asked {
+    const HttpRequest& request;
+    PictureFields fields;  // all but the token
+    const Access& access;
+    ReplyFunction reply;
+    RequestTracePointer trace;  // may be null
+  };
   struct Route {
-    bool open = false;  // needs no token
-    bool takes_post = false;
     bool traced = false;
-    std::function<void(const HttpRequest&, const Target&, ReplyFunction, RequestTracePointer)> handle;
+    bool takes_bytes = false;  // the body is no JSON
+    std::function<void(Asked)> handle;
   };
 
   static std::string Shown(const std::string& text) { return text.substr(0, 128); }
 
   std::map<std::string, Route, std::less<>> Routes() {
-    const auto answer = [](std::function<HttpReply()> make) {
-      return [make = std::move(make)](const HttpRequest&, const Target&, const ReplyFunction& reply, const RequestTracePointer&) {
-        reply(make());
-      };
+    const auto answer = [](std::function<HttpReply(const Access&)> make) {
+      return [make = std::move(make)](const Asked& asked) { asked.reply(make(asked.access)); };
+    };
+    const auto text = [&](std::string (*make)()) {
+      return answer([make, made = std::string()](const Access&) mutable {
+        if (made.empty()) made = make();
+        return HttpReply{.body = made};
+      });
     };
     std::map<std::string, Route, std::less<>> routes;
-    routes["/livez"] = {.open = true, .handle = answer([] { return HttpReply{.type = "text/plain", .body = "ok\n"}; })};
-    routes["/readyz"] = {.open = true, .handle = answer([this] {
-                                         if (news_->health == ServiceHealth::kReady) return HttpReply{.type = "text/plain", .body = "ok\n"};
-                                         return Failure(503, news_->reason);
-                                       })};
-    routes["/metrics"] = {.handle = answer([this] {
+    routes["/livez"] = {.handle = answer([](const Access&) { return HttpReply{.type = "text/plain", .body = "ok\n"}; })};
+    routes["/readyz"] = {.handle = answer([this](const Access&) {
+                           if (news_->health == ServiceHealth::kReady) return HttpReply{.type = "text/plain", .body = "ok\n"};
+                           return Failure(503, news_->reason);
+                         })};
+    routes["/metrics"] = {.handle = answer([this](const Access&) {
                             const TraceSender::Counts traces = traces_ != nullptr ? traces_->counts() : TraceSender::Counts();
                             return HttpReply{.type = "text/plain; version=0.0.4", .body = metrics_.Text(*news_, traces)};
                           })};
-    routes["/api/v1/openapi.json"] = {.open = true, .handle = answer([] {
-                                                      static const std::string text = OpenApi().dump() + "\n";
-                                                      return HttpReply{.body = text};
-                                                    })};
-    routes["/api/v1/options"] = {.open = true, .handle = answer([] {
-                                                 static const std::string text = OfferedOptions().dump() + "\n";
-                                                 return HttpReply{.body = text};
-                                               })};
-    routes["/api/v1/status"] = {
-        .handle = answer([this] { return news_->health == ServiceHealth::kGone ? ServiceGone() : JsonReply(StatusJson(news_->status)); })};
-    routes["/api/v1/datasets"] = {.handle = answer([this] {
+    routes["/api/v1/openapi.json"] = {.handle = text([] { return OpenApi().dump() + "\n"; })};
+    routes["/api/v1/options"] = {.handle = text([] { return OfferedOptions().dump() + "\n"; })};
+    routes["/api/v1/status"] = {.handle = answer([this](const Access& access) {
+                                  if (news_->health == ServiceHealth::kGone) return ServiceGone();
+                                  return JsonReply(StatusJson(ShownStatus(news_->status, access)));
+                                })};
+    routes["/api/v1/datasets"] = {.handle = answer([this](const Access& access) {
                                     if (news_->health == ServiceHealth::kGone) return ServiceGone();
-                                    return JsonReply({{"datasets", DatasetsJson(news_->status.datasets)}});
+                                    return JsonReply({{"datasets", DatasetsJson(ShownStatus(news_->status, access).datasets)}});
                                   })};
     const auto bind = [](auto& requests, auto method) {
-      return [&requests, method](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
-        Result<PictureFields> fields = FieldsOf(target, request);
-        if (!fields.ok()) return reply(Failure(fields.status()));
-        std::invoke(method, *requests, *std::move(fields), std::move(reply), request.gone);
+      return [&requests, method](Asked asked) {
+        std::invoke(method, *requests, std::move(asked.fields), std::move(asked.reply), asked.request.gone);
       };
     };
     const auto picture = [this](auto method, PictureFileType type) {
-      return [this, method, type](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
-        Result<PictureFields> fields = FieldsOf(target, request);
-        if (!fields.ok()) return reply(Failure(fields.status()));
-        std::invoke(method, *pictures_, type, *std::move(fields), std::move(reply), request.gone, std::move(trace));
+      return [this, method, type](Asked asked) {
+        std::invoke(method, *pictures_, type, std::move(asked.fields), std::move(asked.reply), asked.request.gone, std::move(asked.trace));
       };
     };
     for (const PictureFileTypeNames& names : PictureFileTypes()) {
       const auto route = [&](const char* kind) -> Route& { return routes[fmt::format("/api/v1/{}{}", kind, names.ending)]; };
-      route("render") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render, names.type)};
-      route("slice") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice, names.type)};
+      route("render") = {.traced = true, .handle = picture(&PictureRequests::Render, names.type)};
+      route("slice") = {.traced = true, .handle = picture(&PictureRequests::Slice, names.type)};
     }
-    routes["/api/v1/command"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Command)};
-    routes["/api/v1/turntable.mp4"] = {.takes_post = true, .handle = bind(movies_, &MovieRequests::Turntable)};
+    routes["/api/v1/command"] = {.handle = bind(pictures_, &PictureRequests::Command)};
+    routes["/api/v1/turntable.mp4"] = {.handle = bind(movies_, &MovieRequests::Turntable)};
     routes["/api/v1/histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Histogram)};
     routes["/api/v1/joint-histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::JointHistogram)};
     routes["/api/v1/labels"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Labels)};
     routes["/api/v1/value"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Value)};
     routes["/api/v1/profile"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Profile)};
     routes["/api/v1/statistics"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
-    routes["/api/v1/pick"] = {.takes_post = true, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
+    routes["/api/v1/pick"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
-    routes["/api/v1/parameters"] = {
-        .takes_post = true,
-        .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
-          Result<PictureFields> fields = FieldsOf(target, request);
-          if (!fields.ok()) return reply(Failure(fields.status()));
-          questions_->Parameters(*std::move(fields), request.method == "POST", std::move(reply), request.gone);
-        }};
-    routes["/api/v1/upload"] = {
-        .takes_post = true,
-        .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
-          if (request.method != "POST") return reply(Failure(405, "files are sent by POST"));
-          PictureFields fields = target.fields;
-          std::erase_if(fields, [](const PictureField& field) { return field.name == "token"; });
-          std::vector<std::string> taken;
-          for (const DatasetStatus& dataset : news_->status.datasets) taken.push_back(dataset.name);
-          uploads_->Handle(std::move(fields), request.body, taken, std::move(reply), request.gone);
-        }};
-    routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};
+    routes["/api/v1/parameters"] = {.handle = [this](Asked asked) {
+      questions_->Parameters(std::move(asked.fields), asked.request.method == "POST", std::move(asked.reply), asked.request.gone);
+    }};
+    routes["/api/v1/upload"] = {.takes_bytes = true, .handle = [this](Asked asked) {
+                                  std::vector<std::string> taken;
+                                  for (const DatasetStatus& dataset : news_->status.datasets) taken.push_back(dataset.name);
+                                  uploads_->Handle(std::move(asked.fields), asked.request.body, taken, std::move(asked.reply),
+                                                   asked.request.gone);
+                                }};
+    routes["/api/v1/view"] = {.handle = answer([](const Access&) { return Failure(426, "this is a WebSocket"); })};
+    // None is left without a right, and none has one that is not there.
+    for (const auto& [path, route] : routes) CHECK(AllRights().contains(path)) << path;
+    CHECK_EQ(routes.size(), AllRights().size());
     return routes;
   }
 
+  // A proxy may leave the path of its address in requests, or take it away.
+  std::string BelowBase(const std::string& path) const {
+    const std::string& base = options_.proxy.path;
+    return path.starts_with(base + "/") ? path.substr(base.size()) : path;
+  }
+
+  // What a browser asks before it lets a page of another origin send a token or JSON.
+  static HttpReply Preflight() {
+    return {.status = 204,
+            .body = {},
+            .headers = {{"Access-Control-Allow-Methods", "GET, HEAD, POST"},
+                        {"Access-Control-Allow-Headers", "Authorization, Content-Type"},
+                        {"Access-Control-Max-Age", "600"}}};
+  }
+
   static HttpReply AssetReply(const Asset& asset, const HttpRequest& request) {
-    HttpReply reply{.type = std::string(asset.type), .body = {}, .headers = {{"Cache-Control", "no-cache"}, {"Vary", "Accept-Encoding"}}};
+    HttpReply reply{
+        .type = std::string(asset.type), .body = {}, .headers = {{"Cache-Control", "no-cache"}, {"Vary", "Accept-Encoding, Origin"}}};
     if (AcceptsGzip(request.accept_encoding)) {
       reply.body = GzippedBytes(asset);
       reply.headers.emplace_back("Content-Encoding", "gzip");
@@ -286,21 +354,30 @@ class Gateway::Impl : public HttpApplication {
     return Failure(403, *why);
   }
 
-  bool MayAsk(const HttpRequest& request, const Target& target) const {
-    if (request.authorization && request.authorization->starts_with("Bearer ")) return IsBearer(request.authorization, options_.token);
-    for (const std::string& protocol : request.subprotocols) {
-      if (protocol.starts_with(kTokenProtocol)) return SameToken(std::string_view(protocol).substr(kTokenProtocol.size()), options_.token);
-    }
+  Result<Access> AccessOf(const HttpRequest& request, const Target& target) const {
+    std::string_view token;
+    const auto protocol = std::ranges::find_if(request.subprotocols, [](const auto& each) { return each.starts_with(kTokenProtocol); });
     const auto field = std::ranges::find(target.fields, "token", &PictureField::name);
-    return field != target.fields.end() && SameToken(field->text, options_.token);
+    if (request.authorization && request.authorization->starts_with(kBearer)) {
+      token = std::string_view(*request.authorization).substr(kBearer.size());
+    } else if (protocol != request.subprotocols.end()) {
+      token = std::string_view(*protocol).substr(kTokenProtocol.size());
+    } else if (field != target.fields.end()) {
+      token = field->text;
+    }
+    return CheckAccess(token, options_.token, UnixNow());
   }
 
-  HttpReply NoToken() {
+  HttpReply NoToken(const Status& why) {
     CountRefusal("token");
-    HttpReply answer =
-        Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed, or in its --token-file");
+    HttpReply answer = Failure(401, why.message());
     answer.headers.emplace_back("WWW-Authenticate", "Bearer");
     return answer;
+  }
+
+  HttpReply NoRight(const std::string& why) {
+    CountRefusal("right");
+    return Failure(403, why);
   }
 
   // How the service is, once a second, and more often while it is gone.

@@ -1,9 +1,15 @@
 // slabstream-gateway: pictures of a service over HTTP and WebSockets (docs/http.md). It ends on SIGINT or SIGTERM.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
 #include <cstdio>
 #include <string>
 
+#include "client/service/gateway_state.h"
 #include "client/service/service_choice.h"
 #include "client/service/service_state.h"
+#include "common/base/log.h"
 #include "common/base/notify_ready.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
@@ -47,14 +53,23 @@ Status Serve(Options options) {
   Context context;
   const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
   if (!gateway.ok()) return gateway.status();
+  const Status recorded =
+      SaveGateway({.address = (*gateway)->url(false),
+                   .token = options.gateway.token,
+                   .pid = ::getpid(),
+                   .started_unix = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()});
+  if (!recorded.ok()) LogInfo(fmt::format("`slabstream token` needs --token-file for this gateway: {}", recorded.message()));
   // Whoever started this process reads the address from this line. A token that lasts is not in it: logs would keep it.
   (void)std::printf("ready %s\n", (*gateway)->url(options.token_file.empty()).c_str());
-  if (Status told = FlushOutput(); !told.ok()) return told;
-  NotifyReady();
-  const sigset_t signals = StopSignals();
-  int signal = 0;
-  (void)::sigwait(&signals, &signal);
-  return Status::Ok();
+  const Status told = FlushOutput();
+  if (told.ok()) {
+    NotifyReady();
+    const sigset_t signals = StopSignals();
+    int signal = 0;
+    (void)::sigwait(&signals, &signal);
+  }
+  ForgetGateway(::getpid());
+  return told;
 }
 
 int Run(int argc, char** argv) {
@@ -71,14 +86,15 @@ int Run(int argc, char** argv) {
   const Option key = app.AddText("--tls-key", options.tls.key, "Private key of the certificate (PEM)").TypeName("FILE");
   certificate.Needs(key);
   key.Needs(certificate);
-  AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
-            "Public address of a proxy that ends TLS, such as https://viewer.example.org")
-      .TypeName("ORIGIN");
-  AddParsedList(
-      app, "--frame-in", options.gateway.frame_sources, ParseFrameSource,
-      "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
-      "vscode-webview: for notebooks of VS Code")
-      .TypeName("ORIGIN");
+  AddParsed(app, "--behind-proxy", options.gateway.proxy, ParseProxyAddress,
+            "Public address of a proxy in front, with its path: https://viewer.example.org or https://example.org/render/. The proxy may "
+            "take the path away or leave it")
+      .TypeName("ADDRESS");
+  AddParsedList(app, "--origin", options.gateway.pages, ParsePageSource,
+                "Let pages of this origin show the viewer in a frame, and ask the gateway with a token: https://notebooks.example.org; or "
+                "all pages of a scheme, such as vscode-webview: for notebooks of VS Code")
+      .TypeName("ORIGIN")
+      .Default("http://localhost:* and http://127.0.0.1:*, which always may");
   AddParsed(app, "--max-upload", options.gateway.max_upload_bytes, ParseUploadLimit,
             "Largest file that a page may send to the service as a dataset; 0: none may")
       .TypeName("SIZE")

@@ -52,13 +52,13 @@ Result<Target> ParseTarget(std::string_view text) {
   return target;
 }
 
-Result<PictureFields> FieldsOf(const Target& target, const HttpRequest& request) {
+Result<PictureFields> FieldsOf(const Target& target, std::string_view body) {
   PictureFields fields;
   for (const PictureField& field : target.fields) {
     if (field.name != "token") fields.push_back(field);
   }
-  if (request.method != "POST" || request.body.empty()) return fields;
-  const Result<Json> json = ParseJson(request.body);
+  if (body.empty()) return fields;
+  const Result<Json> json = ParseJson(body);
   if (!json.ok()) return Status::InvalidArgument("the body: " + json.status().message());
   Result<PictureFields> more = FieldsOfJson(*json);
   if (!more.ok()) return more.status();

@@ -21,8 +21,8 @@ struct Target {
 // InvalidArgument: no path, a '%' that is no escape, or more than kMaxPictureFields fields.
 Result<Target> ParseTarget(std::string_view text);
 
-// All but the token. InvalidArgument: the body.
-Result<PictureFields> FieldsOf(const Target& target, const HttpRequest& request);
+// All but the token, and those of a body in JSON unless it is empty. InvalidArgument: the body.
+Result<PictureFields> FieldsOf(const Target& target, std::string_view body);
 
 // Takes fields out by their names. The first mistake stays, and what is taken after it does not matter.
 class FieldReader {

@@ -18,6 +18,7 @@ namespace asio = boost::asio;
 
 constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
 constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
+constexpr std::uint16_t kExpired = 4401;                  // close code: those from 4000 on are the application's
 constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
 std::string TextOf(const Json& json) { return json.dump(); }
@@ -40,8 +41,13 @@ int Scaled(int pixels, double scale) { return std::max(1, int(double(pixels) * s
 }  // namespace
 
 ViewSession::ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
-                         std::function<void(ViewSession&)> closed)
-    : around_(surroundings), link_(std::move(link)), news_(std::move(news)), closed_(std::move(closed)), timer_(surroundings.io) {}
+                         Access access, std::function<void(ViewSession&)> closed)
+    : around_(surroundings),
+      link_(std::move(link)),
+      news_(std::move(news)),
+      access_(std::move(access)),
+      closed_(std::move(closed)),
+      timer_(surroundings.io) {}
 
 void ViewSession::OnOpen(WebSocketPeer& peer) {
   peer_ = &peer;
@@ -71,10 +77,17 @@ void ViewSession::End() {
 std::string_view ViewSession::dataset() const {
   if (!view_) return {};
   const auto named = std::ranges::find(view_->options, "dataset", &PictureField::name);
-  return named == view_->options.end() ? std::string_view() : std::string_view(named->text);
+  return named == view_->options.end() || !access_.Shows(named->text) ? std::string_view() : std::string_view(named->text);
+}
+
+bool ViewSession::HasExpired() {
+  if (UnixNow() < access_.until) return false;
+  peer_->Close(kExpired, access_.ExpiredText());
+  return true;
 }
 
 void ViewSession::OnText(std::string_view text) {
+  if (HasExpired()) return;
   Result<PageMessage> message = ParsePageMessage(text);
   if (!message.ok()) {
     around_.metrics.CountRefusal("message");
@@ -104,15 +117,16 @@ void ViewSession::OnNews(std::shared_ptr<const ServiceNews> news) {
 }
 
 void ViewSession::SendStatus() {
-  if (peer_ == nullptr) return;
+  if (peer_ == nullptr || HasExpired()) return;
   Json json = {{"type", "status"}, {"service", slabstream::NameOf(news_->health)}, {"reason", news_->reason}};
-  const Json status = StatusJson(news_->status);
+  const Json status = StatusJson(ShownStatus(news_->status, access_));
   for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
   peer_->SendText(TextOf(json));
 }
 
-void ViewSession::SendError(std::uint64_t seq, const Status& status) {
+void ViewSession::SendError(std::uint64_t seq, const Status& why) {
   if (peer_ == nullptr) return;
+  const Status status = ShownStatus(why, access_);
   peer_->SendText(TextOf({{"type", "error"}, {"seq", seq}, {"code", ToString(status.code())}, {"error", status.message()}}));
 }
 
@@ -152,6 +166,10 @@ void ViewSession::Render(const ViewAction& action) {
   const double scale = action.scale, coarseness = action.coarseness;
   const std::uint64_t order = ++orders_;
   Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
+  if (job.ok()) {
+    // The frames of a job are of one dataset.
+    if (const auto why = WhyNotShown(job->frames.front().dataset, access_)) job = Status::InvalidArgument(*why);
+  }
   if (!job.ok()) {
     SendError(seq, job.status());
     rendering_ = Rendering{.order = order};

@@ -15,6 +15,7 @@
 #include "gateway/frame_message.h"
 #include "gateway/metrics.h"
 #include "gateway/page_message.h"
+#include "gateway/rights.h"
 #include "gateway/service_link.h"
 #include "gateway/service_news.h"
 #include "gateway/view_machine.h"
@@ -30,8 +31,8 @@ struct SessionSurroundings {
 
 class ViewSession final : public WebSocketSession, public std::enable_shared_from_this<ViewSession> {
  public:
-  // `closed` is called at the end, when the session leaves.
-  ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
+  // `access`: what the page's token gives; it ends the session, too. `closed` is called at the end, when the session leaves.
+  ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news, Access access,
               std::function<void(ViewSession&)> closed);
 
   void OnOpen(WebSocketPeer& peer) override;
@@ -41,10 +42,11 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
   void End();                        // the gateway stops
-  std::string_view dataset() const;  // the dataset of the latest view; empty: no view has come
+  std::string_view dataset() const;  // the dataset of the latest view; empty: no view has come, or the token does not show it
 
  private:
   void Handle(ViewMessage view);
+  bool HasExpired();  // closes the session if so
   void Do(const ViewMachine::Actions& actions);
   void Render(const ViewAction& action);  // kRender
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
@@ -53,12 +55,13 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void Encode(bool final, int quality);
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
   void Send(std::uint64_t frame);
-  void SendError(std::uint64_t seq, const Status& status);
+  void SendError(std::uint64_t seq, const Status& why);
   void SetTimer();
 
   SessionSurroundings around_;
   std::unique_ptr<ServiceLink> link_;  // null after OnClosed
   std::shared_ptr<const ServiceNews> news_;
+  const Access access_;
   std::function<void(ViewSession&)> closed_;
   WebSocketPeer* peer_ = nullptr;  // null before OnOpen and after OnClosed
   ViewMachine machine_;

@@ -12,6 +12,7 @@
 #include "client/cli/laboratory.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/picture_orders.h"
+#include "client/cli/token.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
 #include "client/request/camera_file.h"
@@ -344,6 +345,32 @@ void DeclareView(const CommandLine& line) {
   sub.AddFlag("!--no-browser", options.browser, "Only print the address");
 }
 
+Result<Duration> ParseLifetime(std::string_view option, std::string_view text) {
+  constexpr Duration kLongest = std::chrono::hours(24 * 366);
+  Result<Duration> lasts = ParseDuration(option, text, kLongest);
+  if (!lasts.ok() || *lasts >= std::chrono::seconds(1)) return lasts;
+  return Status::InvalidArgument(fmt::format("{} {} is less than 1s", option, text));
+}
+
+Result<std::string> ParseTokenDataset(std::string_view option, std::string_view text) {
+  if (!text.empty() && text.size() <= kMaxNameBytes) return std::string(text);
+  return Status::InvalidArgument(fmt::format("{} has {} bytes, must have 1 to {}", option, text.size(), kMaxNameBytes));
+}
+
+void DeclareToken(const CommandLine& line) {
+  const Command sub =
+      line.app.AddCommand("token", "Make a token for a gateway that expires, and may be for viewing or some datasets alone");
+  TokenOptions& options = OptionsOf(line, sub, RunToken);
+  AddParsed(sub, "--for", options.lasts, ParseLifetime, "How long it is valid, from now on").Required().TypeName("TIME");
+  AddParsedList(sub, "--dataset", options.datasets, ParseTokenDataset, "Only for this dataset; may be given several times")
+      .TypeName("NAME")
+      .Default("all of the service");
+  sub.AddFlag("--view-only", options.view_only, "Its holder may send no files and change no parameters of simulations");
+  sub.AddText("--token-file", options.token_file, "The file with the gateway's own token")
+      .TypeName("FILE")
+      .Default("the token of the gateway that this user started here last");
+}
+
 void DeclareDown(const CommandLine& line) {
   const Command sub = line.app.AddCommand("down", "End a service that `up` started");
   DownOptions& options = OptionsOf(line, sub, RunDown);
@@ -471,10 +498,11 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {
-      DeclareRender, DeclareTurntable, DeclareSlice,    DeclareInfo, DeclareValue, DeclareMeasure,    DeclareTransfer,   DeclareConvert,
-      DeclareIndex,  DeclareSphere,    DeclareClusters, DeclareUp,   DeclareView,  DeclareDown,       DeclareStatus,     DeclareAnnotate,
-      DeclareKeys,   DeclareData,      DeclareSteer,    DeclareLogs, DeclareSlurm, DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,      DeclareInfo,       DeclareValue,
+                                                 DeclareMeasure,  DeclareTransfer,  DeclareConvert,    DeclareIndex,      DeclareSphere,
+                                                 DeclareClusters, DeclareUp,        DeclareView,       DeclareToken,      DeclareDown,
+                                                 DeclareStatus,   DeclareAnnotate,  DeclareKeys,       DeclareData,       DeclareSteer,
+                                                 DeclareLogs,     DeclareSlurm,     DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
   return kCommands;
 }
 

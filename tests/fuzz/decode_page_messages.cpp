@@ -1,6 +1,7 @@
-// What pages and scripts send to the gateway: messages of a WebSocket, and targets of requests.
+// What pages and scripts send to the gateway: messages of a WebSocket, targets of requests, and tokens.
 #include <algorithm>
 
+#include "common/http/access_token.h"
 #include "common/http/address.h"
 #include "gateway/page_message.h"
 #include "gateway/request_fields.h"
@@ -49,10 +50,25 @@ bool DecodeTarget(std::string_view text) {
 
 // Names of hosts come from the same requests.
 void DecodeHost(std::string_view text) {
-  static const OriginRules rules({}, false, "https://viewer.example.org");
+  static const OriginRules rules({}, false, "https://viewer.example.org", {"http://localhost:*", "vscode-webview:"});
   const auto refusal = rules.Refusal(text, text);
   CHECK(refusal.has_value());  // no host is an origin
   CheckRefusal(Status::InvalidArgument(*refusal));
+}
+
+// Any text as a token, and as the claims and the header of one that is signed: whoever holds the gateway's token signs what they want.
+bool DecodeToken(std::string_view text) {
+  constexpr std::string_view kSecret = "Jb8fXqkz3mYw0nT5sVQy1A", kHeader = R"({"alg":"HS256"})", kClaims = R"({"exp":1})";
+  constexpr std::int64_t kNow = 1764450000;
+  CheckRefusal(CheckAccess(text, kSecret, kNow).status());
+  CheckRefusal(CheckAccess(SignedToken(text, kClaims, kSecret), kSecret, kNow).status());  // it has expired
+  const Result<Access> access = CheckAccess(SignedToken(kHeader, text, kSecret), kSecret, kNow);
+  if (!access.ok()) {
+    CheckRefusal(access.status());
+    return false;
+  }
+  CHECK_GT(access->until, kNow);
+  return true;
 }
 
 }  // namespace
@@ -60,6 +76,7 @@ void DecodeHost(std::string_view text) {
 bool DecodePageMessage(std::span<const std::byte> bytes) {
   const std::string_view text = FuzzInput(bytes).Text();
   DecodeHost(text);
+  if (DecodeToken(text)) return true;
   return text.starts_with('/') ? DecodeTarget(text) : DecodeMessageOfPage(text);
 }
 
@@ -73,6 +90,7 @@ std::vector<FuzzBytes> PageMessageSeeds() {
           R"({"type": "ack", "frame": 5})",
           "/api/v1/render.png?dataset=head&azimuth=-30.5&renderer=raycast&isovalue=300:red:0.5&light=1,0,0&light=0%2C1,0&title=a+b",
           "/api/v1/slice.png?dataset=head&plane=axial&label-mode=surface",
+          R"({"exp": 1764450060, "iat": 1764450000, "datasets": ["head", "fmri@3"], "view_only": true})",
       }) {
     seeds.push_back(SeedOf(text));
   }

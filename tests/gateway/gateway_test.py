@@ -3,6 +3,7 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import base64
 import concurrent.futures
 import csv
 import gzip
@@ -26,7 +27,7 @@ import unittest
 import urllib.parse
 from pathlib import Path
 
-from page import Closed, Gateway, Page, Refused, png_pixels, whole
+from page import Closed, Gateway, Page, Refused, png_pixels, signed, whole
 
 PROGRAMS = Path(sys.argv[1]) if len(sys.argv) > 1 else None
 TIMEOUT = 120  # far above what anything needs
@@ -37,6 +38,18 @@ def process_ended(pid):
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] in "ZX"
     except OSError:
         return True
+
+
+def listening_port(pid):
+    """Where the process listens: its own line of the table of sockets."""
+    own = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            own.add(os.readlink(descriptor))
+        except OSError:
+            continue
+    sockets = [line.split() for line in Path(f"/proc/{pid}/net/tcp").read_text().splitlines()[1:]]
+    return next(int(fields[1].split(":")[1], 16) for fields in sockets if fields[3] == "0A" and f"socket:[{fields[9]}]" in own)
 
 
 def wait_until(condition, what):
@@ -593,7 +606,7 @@ class HttpTest(WithService):
                                      ("gzip;q=0", False), ("*, gzip ; q=0.000", False), ("", False), ("gzip;q=0.001", True)):
                 for method in ("GET", "HEAD"):
                     status, headers, body = self.gateway.request(path, method=method, headers={"Accept-Encoding": accepted})
-                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding", "gzip" if packed else None), accepted)
+                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding, Origin", "gzip" if packed else None), accepted)
                     if method == "GET":
                         self.assertEqual(len(body), int(headers["Content-Length"]))
                         self.assertEqual(gzip.decompress(body) if packed else body, whole_file)
@@ -617,7 +630,7 @@ class HttpTest(WithService):
             ({"Host": "127.0.0.1.evil.example"}, 403), ({"Host": f"127.0.0.1:{port}.evil.example"}, 403),
             ({"Host": "localhost:evil.example"}, 403), ({"Host": f"[::1]:{port}.evil.example"}, 403), ({"Host": "127.0.0.1:65536"}, 403),
             ({"Host": "[::1]:1"}, 200), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
-            ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403)]:
+            ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403), ({"Origin": "http://localhost:1"}, 200)]:
             self.assertEqual(self.gateway.request("/livez", headers=headers)[0], status, headers)
             if status == 200:
                 self.page(headers=headers).close()
@@ -631,6 +644,32 @@ class HttpTest(WithService):
             Page(self.gateway, protocols=["slabstream.view.v1"])
         with self.assertRaisesRegex(Refused, "400"):
             Page(self.gateway, protocols=["slabstream.token." + self.gateway.token])
+
+    def test_pages_of_other_origins_ask_as_browsers_want_it(self):
+        allowed = lambda answer: {name.lower(): value for name, value in answer[1].items() if name.lower().startswith("access-control-")}  # noqa: E731
+        wanted = {"Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization,content-type"}
+        for path in ("/api/v1/render.png", "/api/v1/upload", "/assets/page.js", "/"):
+            answer = self.gateway.request(path, method="OPTIONS", token=False, headers={"Origin": "http://localhost:5173", **wanted})
+            self.assertEqual((answer[0], answer[2], answer[1]["Vary"]), (204, b"", "Origin"), path)
+            self.assertEqual(allowed(answer), {"access-control-allow-origin": "http://localhost:5173", "access-control-allow-methods": "GET, HEAD, POST",
+                                               "access-control-allow-headers": "Authorization, Content-Type", "access-control-max-age": "600",
+                                               "access-control-expose-headers": "Slabstream-Renderer"})
+        mine, foreign = {"Origin": "http://127.0.0.1:5173"}, {"Origin": "https://evil.example"}
+        self.assertEqual(self.gateway.request("/nothing", method="OPTIONS", headers={**mine, **wanted})[0], 404)
+        self.assertEqual(self.gateway.request("/api/v1/status", method="OPTIONS")[0], 405)
+        # A page may read its answers, also those that refuse it.
+        for path, token, status in (("/api/v1/status", True, 200), ("/api/v1/status", False, 401), ("/api/v1/render.png?dataset=none", True, 404),
+                                    ("/assets/page.js", False, 200), ("/nothing", True, 404)):
+            answer = self.gateway.request(path, token=token, headers=mine)
+            self.assertEqual((answer[0], answer[1]["Access-Control-Allow-Origin"]), (status, mine["Origin"]), path)
+            self.assertIn("Origin", answer[1]["Vary"])
+            # Other pages get nothing, and caches keep what they got for nobody else.
+            for method in ("GET", "OPTIONS"):
+                answer = self.gateway.request(path, method=method, headers={**foreign, **wanted})
+                self.assertEqual((answer[0], allowed(answer), answer[1]["Vary"]), (403, {}, "Origin"), path)
+                self.assertEqual(json.loads(answer[2])["error"], "Origin 'https://evil.example' is another site; --origin names those that may ask")
+            self.assertEqual(allowed(self.gateway.request(path, token=token)), {})
+        self.page(headers=mine).close()
 
     def test_hostile_requests(self):
         host = f"Host: {self.gateway.authority}\r\n".encode()
@@ -697,6 +736,150 @@ class HttpTest(WithService):
         self.assertRegex(text, "slabstream_service_workers 2\n")
         if shutil.which("promtool"):
             subprocess.run(["promtool", "check", "metrics"], input=text, text=True, check=True)
+
+
+# What each request needs: a token at all, one that may change things, one for all datasets, both.
+NONE, VIEW, STEER, WATCH, SEND = "none", "view", "steer", "watch", "send"
+PICTURES = [f"/api/v1/{kind}.{ending}" for kind in ("render", "slice") for ending in ("png", "jpg", "webp", "tif", "exr", "pdf", "svg")]
+QUESTIONS = [f"/api/v1/{name}" for name in ("histogram", "joint-histogram", "labels", "value", "profile", "statistics", "transfer")]
+BOTH = [*PICTURES, "/api/v1/command", "/api/v1/pick", "/api/v1/turntable.mp4"]  # by GET and POST
+RIGHTS = [("GET", path, NONE) for path in ("/livez", "/readyz", "/api/v1/openapi.json", "/api/v1/options")] + [
+    ("GET", "/metrics", WATCH), ("POST", "/api/v1/parameters", STEER), ("POST", "/api/v1/upload", SEND)] + [
+    ("GET", path, VIEW) for path in (*BOTH, *QUESTIONS, "/api/v1/status", "/api/v1/datasets", "/api/v1/parameters", "/api/v1/view")] + [
+    ("POST", path, VIEW) for path in BOTH]
+
+
+class TokenTest(WithService):
+    """What holders of tokens may do that expire, or that are for viewing or some datasets alone."""
+
+    FIELDS = {"at": "1,1,1", "from": "0,0,0", "to": "1,1,1", "x": 3, "y": 3, "size": 16, "frames": 1, "file": "a.nrrd", "bytes": 10}
+    TAKEN = {"value": ["at"], "profile": ["from", "to"], "pick": ["x", "y", "size"], "upload": ["file", "bytes"], "render": ["size"], "slice": ["size"],
+             "turntable": ["size", "frames"]}
+
+    def ask(self, gateway, path, method, dataset, in_body=False):
+        """The status of a request that is right but for the token, and its error."""
+        fields = {name: self.FIELDS[name] for name in self.TAKEN.get(path.split("/")[-1].split(".")[0], [])}
+        if dataset and path not in ("/api/v1/upload", "/metrics", "/livez", "/readyz"):
+            fields["dataset"] = dataset
+        body = json.dumps(fields) if in_body else "" if method == "POST" else None
+        target = path if in_body else path + "?" + urllib.parse.urlencode(fields)
+        status, headers, answer = gateway.request(target, method=method, body=body)
+        return status, json.loads(answer)["error"] if status in (401, 403) else ""
+
+    def test_every_request_wants_its_right(self):
+        known = {(method.upper(), path) for path, methods in self.gateway.json("/api/v1/openapi.json")[1]["paths"].items() for method in methods}
+        self.assertEqual(known - {(method, path) for method, path, _ in RIGHTS}, set(), "the test has every request")
+        own, expired = self.gateway, self.gateway.holding(exp=int(time.time()))
+        given = {own.holding(): {NONE, VIEW, STEER, WATCH, SEND}, own.holding(view_only=True): {NONE, VIEW, WATCH},
+                 own.holding(datasets=["a"]): {NONE, VIEW, STEER}, own.holding(datasets=["a"], view_only=True): {NONE, VIEW}}
+        for method, path, need in RIGHTS:
+            asked = (method, path)
+            for gateway, rights in given.items():
+                status, why = self.ask(gateway, path, method, "a")
+                if need in rights:
+                    self.assertNotIn(status, (401, 403), asked)
+                    self.assertEqual(status, self.ask(own, path, method, "a")[0], asked)
+                else:
+                    self.assertEqual(status, 403, asked)
+                    self.assertRegex(why, "^the token is (view-only|for dataset a alone)$")
+            self.assertEqual(self.ask(expired, path, method, "a")[0] == 401, need != NONE, asked)
+            if need in (VIEW, STEER) and path not in ("/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
+                for in_body in (False, True) if method == "POST" else (False,):
+                    for other in ("b", "none"):  # whether there is one or not
+                        self.assertEqual(self.ask(own.holding(datasets=["a"]), path, method, other, in_body), (403, f"the token does not show dataset '{other}'"),
+                                         asked)
+        upload = own.json("/api/v1/upload?file=x.nrrd&bytes=1", method="POST", body=b"")[1]["upload"]
+        drop = f"/api/v1/upload?upload={upload}&drop=true"
+        self.assertEqual(own.holding(view_only=True).json(drop, method="POST", body=b""), (403, {"error": "the token is view-only"}))
+        self.assertEqual(own.json(drop, method="POST", body=b""), (200, {}))
+
+    def test_other_datasets_are_not_told_of(self):
+        holder = self.gateway.holding(datasets=["a", "gone"])
+        self.get("/api/v1/histogram", dataset="b")  # the service knows it well
+        names = lambda gateway, path: {each["name"] for each in gateway.json(path)[1]["datasets"]}  # noqa: E731
+        for path in ("/api/v1/datasets", "/api/v1/status"):
+            self.assertEqual((names(self.gateway, path) >= NAMES, names(holder, path)), (True, {"a"}), path)
+        # The service's error would list its datasets.
+        self.assertIn("the catalogue has a, b", self.gateway.json("/api/v1/histogram?dataset=gone")[1]["error"])
+        for path in ("histogram?dataset=gone", "render.png?dataset=gone&size=16", "pick?dataset=gone&x=1&y=1", "turntable.mp4?dataset=gone&size=16&frames=1"):
+            self.assertEqual(holder.json("/api/v1/" + path), (404, {"error": "there is no such dataset"}), path)
+        # No way to say it twice.
+        for target, body in (("/api/v1/command?dataset=a&dataset=b", None), ("/api/v1/command?dataset=b", '{"dataset": "a"}'),
+                             ("/api/v1/command?dataset=a", '{"dataset": "b"}'), ("/api/v1/command", '{"dataset": ["a", "b"]}'),
+                             ("/api/v1/command", '{"dataset": "a", "dataset": "b"}'), ("/api/v1/command?%64ataset=b", None)):
+            status, answer = holder.json(target, **({} if body is None else {"method": "POST", "body": body}))
+            self.assertIn(status, (400, 403), (target, body, answer))
+
+    def test_a_page_sees_what_its_token_shows(self):
+        page = Page(self.gateway.holding(datasets=["a", "gone"]))
+        self.addCleanup(page.close)
+        self.assertEqual([each["name"] for each in page.text("status", lambda status: status["datasets"])["datasets"]], ["a"])
+        page.final(page.view({"dataset": "a", "size": 16}))
+        for name, why in (("b", "the token does not show dataset 'b'"), ("none", "the token does not show dataset 'none'"), ("gone", "there is no such dataset")):
+            seq = page.view({"dataset": name, "size": 16})
+            error = page.text("error")
+            self.assertEqual((error["seq"], error["error"]), (seq, why))
+            seq = page.view({"dataset": name, "size": 16, "plane": "zyx"}, picture="slice")
+            self.assertEqual(page.text("error", lambda error: error["seq"] == seq)["error"], why)
+        page.final(page.view({"dataset": "a", "size": 16}))
+
+    def test_it_ends_at_its_time_also_in_an_open_stream(self):
+        until = int(time.time()) + 4
+        holder = self.gateway.holding(exp=until)
+        page = Page(holder)
+        self.addCleanup(page.close)
+        page.final(page.view({"dataset": "a", "size": 16}))
+        with self.assertRaises(Closed) as closed:
+            while True:
+                page.receive()
+        self.assertGreaterEqual(time.time(), until)
+        line = time.strftime("the token expired at %Y-%m-%dT%H:%M:%SZ", time.gmtime(until))
+        self.assertEqual((closed.exception.code, closed.exception.reason), (4401, line))
+        for path in ("/api/v1/status", "/api/v1/render.png?dataset=a"):
+            status, headers, body = holder.request(path)
+            self.assertEqual((status, headers["WWW-Authenticate"], json.loads(body)), (401, "Bearer", {"error": line}))
+        with self.assertRaisesRegex(Refused, "401"):
+            Page(holder)
+        self.assertEqual(self.get("/api/v1/status")[0], 200)
+
+    def test_a_token_that_is_wrong_gives_nothing(self):
+        secret, hour = self.gateway.token, int(time.time()) + 3600
+        token = signed(secret, {"exp": hour})
+        missing = self.gateway.json("/api/v1/status", token=False)[1]["error"]
+        def asked(token):
+            return self.gateway.json("/api/v1/status", token=False, headers={"Authorization": "Bearer " + token})
+        self.assertEqual(asked(token)[0], 200)
+        self.assertEqual(self.gateway.request("/api/v1/status?token=" + token, token=False)[0], 200)
+        unsigned = token.rsplit(".", 1)[0]
+        for wrong in (unsigned, unsigned + ".", signed("x" * 22, {"exp": hour}), signed("", {"exp": hour}), token[:-1], token + "A", secret + "." + token,
+                      signed(secret, {"exp": hour}, {"alg": "none"}).rsplit(".", 1)[0] + "."):
+            self.assertEqual(asked(wrong), (401, {"error": missing}), wrong)
+        for claims, header, why in (({}, None, "no claim exp"), ({"exp": hour}, {"alg": "none"}, "HS256"), ({"exp": hour}, {"typ": "JWT"}, "HS256"), ([], None, "object"),
+                                    ({"exp": str(hour)}, None, "'exp'"), ({"exp": hour, "datasets": "a"}, None, "'datasets'"), ({"exp": hour, "datasets": [1]}, None, "'datasets'"),
+                                    ({"exp": hour, "view_only": 1}, None, "'view_only'"), ({"exp": hour, "nbf": hour}, None, "'nbf'"), ({"exp": -1}, None, "expired at 1970"),
+                                    ({"exp": 1e300, "datasets": None}, None, "'datasets'")):
+            status, answer = asked(signed(secret, claims, header))
+            self.assertEqual((status, why in answer["error"], "\n" in answer["error"]), (401, True, False), answer)
+        nothing = self.gateway.holding(datasets=[])
+        self.assertEqual(nothing.json("/api/v1/datasets"), (200, {"datasets": []}))
+
+    def test_the_command_line_makes_one(self):
+        token, link = self.programs.run("token", "--for", "1h", "--dataset", "a", "--view-only").stdout.splitlines()
+        self.assertEqual(link, f"http://{self.gateway.authority}/#token={token}&dataset=a")
+        holder = Gateway(link)
+        self.assertEqual(holder.json("/api/v1/datasets")[1]["datasets"][0]["name"], "a")
+        self.assertEqual(holder.request("/api/v1/render.png?dataset=b")[0], 403)
+        self.assertEqual(holder.request("/api/v1/upload?file=a.nrrd&bytes=3", method="POST", body=b"")[0], 403)
+        claims = json.loads(base64.urlsafe_b64decode(token.split(".")[1] + "=="))
+        self.assertAlmostEqual(claims["exp"], time.time() + 3600, delta=TIMEOUT)
+        several = self.programs.run("token", "--for", "90s", "--dataset", "a,b", "--dataset", "c").stdout.splitlines()
+        self.assertEqual({each["name"] for each in Gateway(several[1] + "&").json("/api/v1/datasets")[1]["datasets"]}, {"a", "b", "c"})
+        for arguments, why in ((["--for", "0s"], "--for 0s is less than 1s"), (["--for", "500ms"], "--for 500ms is less than 1s"), (["--for", "day"], "is not a time"),
+                               (["--for", "9000h"], "out of range"), ([], "--for"), (["--for", "1h", "--dataset", ""], "--dataset"),
+                               (["--for", "1h", "--dataset", "x" * 300], "--dataset has 300 bytes, must have 1 to 256"),
+                               (["--for", "1h", "--token-file", "none"], "--token-file")):
+            error = self.programs.run("token", *arguments, expect=2).stderr
+            self.assertEqual((why in error, len(error.splitlines())), (True, 1), error)
 
 
 class SteeringTest(WithService):
@@ -933,6 +1116,18 @@ class TurntableTest(unittest.TestCase):
         head = gateway.request("/api/v1/turntable.mp4?dataset=a&size=16&frames=2", method="HEAD")
         self.assertEqual((head[0], head[2]), (200, b""))
 
+    def test_it_is_cut_off_when_its_token_expires(self):
+        gateway = self.gateway("exec cat")
+        until = int(time.time()) + 3
+        connection = self.opened(gateway.holding(exp=until), size=256, frames=1000)  # far more than what buffers hold
+        wait_until(lambda: time.time() >= until, "it has expired")
+        answer, most = b"", 100 << 20
+        while len(answer) < most and (part := connection.recv(1 << 20)):
+            answer += part
+        self.assertLess(len(answer), most)
+        self.assertFalse(answer.endswith(b"0\r\n\r\n"), "there is no last chunk")
+        wait_until(lambda: not self.encoders(), "the encoder has ended")
+
     def test_its_frames_are_spread_over_times(self):
         gateway = self.gateway("exec cat")
         fields = {"dataset": "times", "size": "24x16", "renderer": "mip", "background": "#204060", "no-fit": "true"}
@@ -1163,6 +1358,26 @@ class StartTest(unittest.TestCase):
         _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--listen", "127.0.0.1")
         self.assertEqual(gateway.authority, "viewer.example.org:8443")
 
+    def test_below_a_path(self):
+        child = self.programs.start("slabstream-gateway", "--behind-proxy", "https://viewer.example.org/render")
+        address, token = child.stdout.readline().split()[1].split("#token=")
+        self.assertEqual(address, "https://viewer.example.org/render/")
+        gateway = Gateway(f"http://127.0.0.1:{listening_port(child.pid)}/#token={token}")
+        # The proxy may leave the path in requests, or take it away.
+        for base in ("/render", ""):
+            for path, token, status in (("/", False, 200), ("/assets/page.js", False, 200), ("/livez", False, 200), ("/api/v1/options?a=b", False, 200),
+                                        ("/metrics", True, 200), ("/metrics", False, 401), ("/nothing", True, 404), ("//livez", True, 404)):
+                self.assertEqual(gateway.request(base + path, token=token)[0], status, base + path)
+            page = Page(gateway, target=base + "/api/v1/view", headers={"Host": "viewer.example.org", "Origin": "https://viewer.example.org"})
+            self.assertEqual(page.receive()["type"], "hello")
+            page.close()
+        status, headers, _ = gateway.request("/render?x=1", token=False)
+        self.assertEqual((status, headers["Location"]), (308, "/render/?x=1"), "the page's addresses are relative")
+        for path in ("/rende/livez", "/render2/livez", "/renderlivez", "/render/render/livez", "/RENDER/livez", "/x/render/livez"):
+            self.assertEqual(gateway.json(path), (404, {"error": f"there is nothing at '{path.removeprefix('/render') if path.startswith('/render/') else path}'"}))
+        for wrong in ("https://viewer.example.org/render?x", "/render/", "https://a/../b"):
+            self.assertEqual(self.refused("--behind-proxy", wrong)[0], 2, wrong)
+
     def test_a_token_of_a_file(self):
         file = self.programs.folder / "token"
         file.write_text("0123456789abcdef\n")
@@ -1177,12 +1392,50 @@ class StartTest(unittest.TestCase):
         self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
         self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/metrics")[0], 200)
 
-    def test_frames_of_other_pages(self):
-        _, gateway = self.programs.gateway("--frame-in", "vscode-webview:", "--frame-in", "https://Hub.example.org")
+    def test_tokens_last_as_long_as_the_token_that_they_are_signed_with(self):
+        refused = self.programs.run("token", "--for", "1h", expect=1).stderr
+        self.assertIn("no gateway of this user runs here; --token-file names the file of its token", refused)
+        for name, text in (("kept", "Jb8fXqkz3mYw0nT5sVQy1A"), ("short", "0123456789abcdef")):
+            (self.programs.folder / name).write_text(text + "\n")
+            (self.programs.folder / name).chmod(0o600)
+        self.assertIn("has 16 characters; to sign others it needs at least 22", self.programs.run("token", "--for", "1h", "--token-file", "short", expect=2).stderr)
+        token, = self.programs.run("token", "--for", "1h", "--token-file", "kept").stdout.splitlines()  # no gateway of it runs: there is no link
+        for _ in range(2):
+            child, _ = self.programs.gateway()  # another one
+            kept = self.programs.start("slabstream-gateway", "--token-file", "kept", "--behind-proxy", "https://viewer.example.org/render/")
+            kept.stdout.readline()
+            gateway = Gateway(f"http://127.0.0.1:{listening_port(kept.pid)}/#token={token}")
+            self.assertEqual(gateway.request("/metrics")[0], 200)
+            links = [self.programs.run("token", "--for", "1h", *more).stdout.splitlines()[1] for more in ((), ("--token-file", "kept"))]
+            for link in links:
+                self.assertTrue(link.startswith("https://viewer.example.org/render/#token=eyJ"), link)
+            records = list((self.programs.folder / "slabstream").glob("*.gateway"))
+            self.assertEqual([record.stat().st_mode & 0o777 for record in records], 2 * [0o600])
+            for each in (child, kept):
+                self.programs.end(each)
+            self.assertEqual(list((self.programs.folder / "slabstream").glob("*.gateway")), [], "the secret goes with its gateway")
+        child, _ = self.programs.gateway()
+        child.kill()
+        child.wait()
+        self.programs.end(child)
+        self.programs.run("token", "--for", "1h", expect=1)
+        self.assertEqual(list((self.programs.folder / "slabstream").glob("*.gateway")), [], "also that of one which was killed")
+
+    def test_pages_that_are_named_may_show_it_and_ask(self):
+        _, gateway = self.programs.gateway("--origin", "vscode-webview:", "--origin", "https://Hub.example.org:443")
         policy = gateway.request("/")[1]["Content-Security-Policy"]
         self.assertTrue(policy.endswith("frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview: https://hub.example.org"), policy)
-        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'"):
-            self.assertEqual(self.refused("--frame-in", wrong)[0], 2, wrong)
+        for origin, status in (("https://hub.example.org", 200), ("vscode-webview://0a1b", 200), ("http://localhost:8888", 200),
+                               ("https://hub.example.org.evil.example", 403), ("https://example.org", 403), ("null", 403)):
+            answer = gateway.request("/assets/page.js", token=False, headers={"Origin": origin})
+            self.assertEqual((answer[0], answer[1]["Access-Control-Allow-Origin"]), (status, origin if status == 200 else None), origin)
+            if status == 200:
+                Page(gateway, headers={"Origin": origin}).close()
+            else:
+                with self.assertRaisesRegex(Refused, "403"):
+                    Page(gateway, headers={"Origin": origin})
+        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'", "https:"):
+            self.assertEqual(self.refused("--origin", wrong)[0], 2, wrong)
 
     def test_view_with_a_port_and_a_token_that_stay(self):
         self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")

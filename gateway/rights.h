@@ -1,0 +1,43 @@
+// Which right each request needs, and what a token shows of the service. Every request is in the one table: the gateway answers no other.
+// Pure.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/http/access_token.h"
+#include "common/wire/client_messages.h"
+
+namespace slabstream {
+
+enum class Right : std::uint8_t {
+  kNone,   // no token is needed
+  kView,   // any token; of the datasets those that it shows
+  kWatch,  // a token for all datasets
+  kSteer,  // a token that is not view-only; of the datasets those that it shows
+  kSend,   // a token for all datasets that is not view-only
+};
+
+struct RouteRights {
+  std::optional<Right> get;  // HEAD, too; nullopt: the method is not taken
+  std::optional<Right> post;
+};
+
+// By path, below that of --behind-proxy.
+const std::map<std::string, RouteRights, std::less<>>& AllRights();
+
+// What the holder of a token reads that does not give this right. nullopt: it does.
+std::optional<std::string> WhyNot(Right right, const Access& access);
+// The same of a dataset, whether there is one of this name or not.
+std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access);
+
+// A token for some datasets tells nothing of others, nor where data comes from.
+StatusReply ShownStatus(StatusReply status, const Access& access);
+// The service names others where a dataset is missing.
+Status ShownStatus(Status status, const Access& access);
+
+}  // namespace slabstream

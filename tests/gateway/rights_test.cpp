@@ -1,0 +1,108 @@
+#include "gateway/rights.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "gateway/openapi.h"
+
+namespace slabstream {
+namespace {
+
+constexpr char kSecret[] = "Jb8fXqkz3mYw0nT5sVQy1A";
+constexpr std::int64_t kNow = 1764450000;
+
+// jwt.encode({"exp": 1764450060, "iat": 1764450000, "datasets": ["head"], "view_only": True}, kSecret, algorithm="HS256") of PyJWT.
+constexpr char kByOthers[] =
+    "eyJhbGciOiJIUzI1NiIsInR5cCI6IkpXVCJ9.eyJleHAiOjE3NjQ0NTAwNjAsImlhdCI6MTc2NDQ1MDAwMCwiZGF0YXNldHMiOls"
+    "iaGVhZCJdLCJ2aWV3X29ubHkiOnRydWV9.UXeUxXWSn3kJLl-oOZSsVbGXHPZlKOXnMxCioCDzjzc";
+
+std::string Signed(const Access& access) { return SignAccess(access, kSecret).value(); }
+
+TEST(AccessTokenTest, SaysWhatItsHolderMayUntilItExpires) {
+  for (const Access& access : {Access{.until = kNow + 1}, Access{.until = kNow + 1, .view_only = true},
+                               Access{.until = kNow + 3600, .datasets = {{"head", "a.b_c-d"}}},
+                               Access{.until = kNow + 3600, .datasets = {{"head"}}, .view_only = true}}) {
+    const std::string token = Signed(access);
+    EXPECT_EQ(token.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_."), std::string::npos) << token;
+    EXPECT_EQ(CheckAccess(token, kSecret, kNow).value(), access);
+    EXPECT_TRUE(CheckAccess(token, kSecret, access.until - 1).ok());
+    EXPECT_FALSE(CheckAccess(token, kSecret, access.until).ok());
+    EXPECT_FALSE(CheckAccess(token, "Jb8fXqkz3mYw0nT5sVQy1B", kNow).ok());
+  }
+  EXPECT_EQ(CheckAccess(kSecret, kSecret, kNow).value(), Access());
+  EXPECT_EQ(CheckAccess(Signed({.until = 0}), kSecret, kNow).status().message(), "the token expired at 1970-01-01T00:00:00Z");
+  EXPECT_EQ(CheckAccess(kByOthers, kSecret, kNow).value(), (Access{.until = kNow + 60, .datasets = {{"head"}}, .view_only = true}));
+}
+
+TEST(AccessTokenTest, AnyOtherByteMakesItWrong) {
+  const std::string token = Signed({.until = kNow + 9, .datasets = {{"head"}}, .view_only = true});
+  const std::string why = CheckAccess("", kSecret, kNow).status().message();
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    for (const char other : {'A', 'B', '.', '=', '\0'}) {
+      std::string altered = token;
+      if (altered[i] == other) continue;
+      altered[i] = other;
+      EXPECT_EQ(CheckAccess(altered, kSecret, kNow).status().message(), why) << altered;
+    }
+    EXPECT_EQ(CheckAccess(token.substr(0, i), kSecret, kNow).status().message(), why);
+    EXPECT_EQ(CheckAccess(token.substr(i + 1), kSecret, kNow).status().message(), why);
+  }
+  for (const std::string& other :
+       {token + "A", token + ".", "." + token, token.substr(0, token.rfind('.') + 1), std::string(".."), std::string(5000, 'A') + ".A.A"}) {
+    EXPECT_EQ(CheckAccess(other, kSecret, kNow).status().message(), why) << other;
+  }
+}
+
+TEST(AccessTokenTest, AShortSecretSignsNothing) {
+  const std::string secret = "0123456789abcdef", token = Signed({.until = kNow + 9});
+  EXPECT_EQ(SignAccess({.until = kNow}, secret).status().message(),
+            "the gateway's own token has 16 characters; to sign others it needs at least 22, at random");
+  EXPECT_TRUE(CheckAccess(secret, secret, kNow).ok());
+  EXPECT_FALSE(SignAccess({.until = kNow, .datasets = {{std::string(5000, 'a')}}}, kSecret).ok());
+}
+
+TEST(AccessTest, DatasetsMeanTheirTimes) {
+  const Access access{.until = kNow, .datasets = {{"fmri", "run@2"}}};
+  for (const char* name : {"fmri", "fmri@0", "fmri@17", "run@2"}) EXPECT_TRUE(access.Shows(name)) << name;
+  for (const char* name : {"", "fmri2", "fmr", "run", "run@3", "run@22", "FMRI", "@fmri", "other@fmri"})
+    EXPECT_FALSE(access.Shows(name)) << name;
+  EXPECT_TRUE(Access().Shows("any"));
+  EXPECT_FALSE((Access{.datasets = std::vector<std::string>()}).Shows("any"));
+}
+
+TEST(RightsTest, TokensGiveWhatTheySay) {
+  const Access all, view{.view_only = true}, one{.datasets = {{"head"}}}, least{.datasets = {{"head"}}, .view_only = true};
+  using enum Right;
+  const auto given = [](const Access& access) {
+    std::set<Right> rights;
+    for (const Right right : {kNone, kView, kWatch, kSteer, kSend}) {
+      if (!WhyNot(right, access)) rights.insert(right);
+    }
+    return rights;
+  };
+  EXPECT_EQ(given(all), (std::set<Right>{kNone, kView, kWatch, kSteer, kSend}));
+  EXPECT_EQ(given(view), (std::set<Right>{kNone, kView, kWatch}));
+  EXPECT_EQ(given(one), (std::set<Right>{kNone, kView, kSteer}));
+  EXPECT_EQ(given(least), (std::set<Right>{kNone, kView}));
+}
+
+TEST(RightsTest, TheDocumentHasTheMethodsOfTheTable) {
+  const Json document = OpenApi();
+  for (const auto& [path, operations] : document["paths"].items()) {
+    ASSERT_TRUE(AllRights().contains(path)) << path;
+    const RouteRights& rights = AllRights().find(path)->second;
+    EXPECT_EQ(operations.contains("get"), rights.get.has_value()) << path;
+    EXPECT_EQ(operations.contains("post"), rights.post.has_value()) << path;
+  }
+  std::set<std::string> left;
+  for (const auto& [path, rights] : AllRights()) {
+    const bool other_ending = (path.starts_with("/api/v1/render.") || path.starts_with("/api/v1/slice.")) && !path.ends_with(".png");
+    if (!document["paths"].contains(path) && !other_ending) left.insert(path);
+    EXPECT_TRUE(rights.get || rights.post) << path;
+  }
+  EXPECT_EQ(left, std::set<std::string>{"/api/v1/view"}) << "the WebSocket";
+}
+
+}  // namespace
+}  // namespace slabstream
