@@ -1,15 +1,15 @@
 // Fields for what the service draws onto a picture: a title, bars and marks, as many as it offers.
 import { toggle } from "./controls";
 import { h } from "./dom";
-import { offered, words } from "./offers";
+import { type Offers, words } from "./offers";
 import type { Options } from "./api";
 import type { State } from "./state";
 
 const MOST_TITLE = 120;
 
-export function annotationFields(state: State): { elements: HTMLElement[]; options(): Options } {
+export function annotationFields(offers: Offers, state: State): { elements: HTMLElement[]; options(): Options } {
   const shown: Record<string, boolean> = { "scale-bar": state.scaleBar, "color-bar": state.colorBar, "orientation-marker": state.marker };
-  const flags = offered("Annotations").filter(({ type }) => type === undefined).map(({ name, help }) => {
+  const flags = offers.offered("Annotations").filter(({ type }) => type === undefined).map(({ name, help }) => {
     const control = toggle(words(name), on => { shown[name] = on; });
     control.set(shown[name] ?? false);
     control.element.title = help;

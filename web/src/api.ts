@@ -1,4 +1,5 @@
-// Requests to the gateway, relative to the page's address, so that it works below any path.
+// Requests to the gateway.
+import type { Connection } from "./connection";
 import type { BoxStatistics, Profile } from "./measure";
 import type { Vec3 } from "./vec";
 
@@ -38,7 +39,8 @@ export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [nu
 export class Api {
   private readonly missing = new Set<string>();
 
-  constructor(public token: string) {}
+  // `ended`: nobody waits for answers any more.
+  constructor(readonly connection: Connection, readonly ended: AbortSignal) {}
 
   // Whether the gateway has said that it has no such address.
   lacks(path: string): boolean { return this.missing.has(path); }
@@ -50,9 +52,9 @@ export class Api {
   send = (path: string, fields: Record<string, string>, body: ArrayBuffer | null, signal?: AbortSignal): Promise<Response> =>
     this.request(path, fields, { method: "POST", body }, signal);
 
-  private async request(path: string, fields: Record<string, string>, what: RequestInit, signal?: AbortSignal): Promise<Response> {
-    const query = new URLSearchParams(fields).toString();
-    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, { ...what, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(signal ? { signal } : {}) });
+  private async request(path: string, fields: Record<string, string>, what: { method?: string; body?: BodyInit | null }, signal?: AbortSignal): Promise<Response> {
+    if (this.ended.aborted) throw new DOMException("The viewer is gone.", "AbortError");
+    const response = await this.connection.request(path, fields, { ...what, ...(signal ? { signal } : {}) });
     if (response.ok) return response;
     const answer = (await response.json().catch(() => null)) as { error?: string } | null;
     throw new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);

@@ -27,7 +27,7 @@ function usualRange(histogram: Histogram): readonly [number, number] {
 export class ChannelRanges {
   constructor(private readonly context: Context, private readonly histograms: Histograms) {}
 
-  histogram(channel: Channel): Histogram | null { return this.histograms.of(sourceOf(this.context.store.state, channel)); }
+  histogram(channel: Channel): Histogram | null { return this.histograms.of(sourceOf(this.context.offers, this.context.store.state, channel)); }
 
   of(channel: Channel): readonly [number, number] {
     return ownOf(this.context.store.state.channelRanges, channel) ?? channel.window ?? this.usual(channel);
@@ -58,16 +58,16 @@ export class ChannelRanges {
 
   // All that show become wider or narrower, and brighter or darker, as Viewer.window.
   window(widen: number, raise: number): void {
-    const { store } = this.context;
-    store.update({ channelRanges: shownChannels(store.state).reduce((ranges, channel) => {
+    const { offers, store } = this.context;
+    store.update({ channelRanges: shownChannels(offers, store.state).reduce((ranges, channel) => {
       const [low, high] = this.of(channel), width = (high - low) * Math.exp(1.5 * widen), middle = (low + high) / 2 - raise * (high - low);
       return withOwn(ranges, channel, [rounded(middle - width / 2), rounded(middle + width / 2)] as const);
     }, store.state.channelRanges) }, "window");
   }
 
   legend(): readonly LegendEntry[] {
-    const { state } = this.context.store;
-    return state.colorBar ? shownChannels(state).map(channel => {
+    const { offers, store: { state } } = this.context;
+    return state.colorBar ? shownChannels(offers, state).map(channel => {
       const [low, high] = this.of(channel);
       return { name: `${channel.name}  ${text(low)} to ${text(high)}`, color: colorOf(state, channel) };
     }) : [];

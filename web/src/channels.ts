@@ -1,6 +1,6 @@
 // The channels and the overlay of the dataset that is shown: which of them show, how they look, and what the service is asked for.
 import { type Dataset, NAMES, type Options, type Source } from "./api";
-import { shownDataset } from "./offers";
+import type { Offers } from "./offers";
 import type { State } from "./state";
 import { timeOptions } from "./times";
 import { type ColorMap, toParaView } from "./transfer";
@@ -33,12 +33,11 @@ export function channelsOf({ fields = [] }: Dataset): readonly Channel[] {
 export const OVERLAY: Channel = { key: "overlay", name: "Overlay", color: "#ff4fd8", window: null, shown: false };
 export const hasOverlay = (dataset: Dataset | null): boolean => dataset?.fields?.some(({ channel, labels }) => !channel && !labels) ?? false;
 
-let known: Dataset | null = null, ofKnown: readonly Channel[] | null = null;
+const made = new WeakMap<Dataset, readonly Channel[]>(); // so that a channel stays the same object
 // Of the shown dataset; null: they are not known yet.
-export function channels(): readonly Channel[] | null {
-  const dataset = shownDataset();
-  if (dataset !== known) { known = dataset; ofKnown = dataset && channelsOf(dataset); }
-  return ofKnown;
+export function channels({ dataset }: Offers): readonly Channel[] | null {
+  if (dataset && !made.has(dataset)) made.set(dataset, channelsOf(dataset));
+  return dataset && (made.get(dataset) ?? null);
 }
 
 // What the user says of a channel, and records where something else is said.
@@ -49,8 +48,8 @@ export function withOwn<T>(record: Readonly<Record<string, T>>, { key, name }: C
 }
 
 // A list of channels that the dataset has not says nothing.
-export function shownChannels({ channels: wanted }: State): readonly Channel[] {
-  const all = channels() ?? [], listed = all.filter(({ key, name }) => wanted?.includes(key) || wanted?.includes(name));
+export function shownChannels(offers: Offers, { channels: wanted }: State): readonly Channel[] {
+  const all = channels(offers) ?? [], listed = all.filter(({ key, name }) => wanted?.includes(key) || wanted?.includes(name));
   return listed.length > 0 || wanted?.length === 0 ? listed : all.filter(({ shown }) => shown);
 }
 export const colorOf = (state: State, channel: Channel): string => ownOf(state.channelColors, channel) ?? channel.color;
@@ -62,9 +61,9 @@ export const transferOf = (state: State, channel: Channel): string | ColorMap =>
 const isSaid = (state: State, but = ""): boolean => state.channels !== null || state.blend !== "auto" || LOOKS.some(look => Object.keys(state[look]).some(key => key !== but));
 export const isAsSaid = (state: State): boolean => !state.overlay && !isSaid(state);
 
-const hasChannels = (state: State): boolean => (channels() ? channels()?.length !== 0 : isSaid(state, OVERLAY.key));
+const hasChannels = (offers: Offers, state: State): boolean => (channels(offers) ? channels(offers)?.length !== 0 : isSaid(state, OVERLAY.key));
 // Whether the transfer function can be that of what shows: it is one function, and channels have looks of their own.
-export const takesFunction = (state: State): boolean => !hasChannels(state) || (channels() ? shownChannels(state) : state.channels ?? []).length === 1;
+export const takesFunction = (offers: Offers, state: State): boolean => !hasChannels(offers, state) || (channels(offers) ? shownChannels(offers, state) : state.channels ?? []).length === 1;
 
 // Any look of the overlay shows it.
 function lookOf(state: State, channel: Channel, look: Looks): string | null {
@@ -80,24 +79,24 @@ const told = (state: State): Channel[] => [...new Set(LOOKS.flatMap(look => Obje
 
 // `own`: options of the transfer function and the like. They count if they say something, and then the only channel has no other look.
 // `several`: the renderer shows more than one.
-export function channelOptions(state: State, own: Options, several: boolean): Options {
-  const known = channels(), over = state.overlay && several && (!known || hasOverlay(shownDataset())) ? [OVERLAY] : [];
+export function channelOptions(offers: Offers, state: State, own: Options, several: boolean): Options {
+  const known = channels(offers), over = state.overlay && several && (!known || hasOverlay(offers.dataset)) ? [OVERLAY] : [];
   const overlaid = over.length > 0 ? looksOf(state, over) : {};
-  if (!hasChannels(state)) return { ...own, ...overlaid };
-  const shown = known ? shownChannels(state) : told(state), keys = known ? shown.map(channel => channel.key) : state.channels, first = known?.[0]?.key ?? "0";
+  if (!hasChannels(offers, state)) return { ...own, ...overlaid };
+  const shown = known ? shownChannels(offers, state) : told(state), keys = known ? shown.map(channel => channel.key) : state.channels, first = known?.[0]?.key ?? "0";
   if (keys?.length === 0) return { ...overlaid, [NAMES.channels]: first, [NAMES.channelOpacities]: [`${first}=0`, overlaid[NAMES.channelOpacities]].filter(Boolean).join(",") }; // none shows
   const which = state.channels && keys ? { [NAMES.channels]: keys.join(",") } : {};
-  const says = takesFunction(state) && Object.entries(own).some(([name, value]) => name !== "opacity-distance" && value !== "auto");
+  const says = takesFunction(offers, state) && Object.entries(own).some(([name, value]) => name !== "opacity-distance" && value !== "auto");
   return { ...which, ...(says ? { ...own, ...overlaid } : looksOf(state, [...shown, ...over])) };
 }
 
 // The fields that show, as requests name them.
-export const shownKeys = (state: State): readonly string[] => {
-  const shown = channels()?.length ? shownChannels(state).map(({ key }) => key) : ["0"];
-  return state.overlay && hasOverlay(shownDataset()) ? [...shown, OVERLAY.key] : shown;
+export const shownKeys = (offers: Offers, state: State): readonly string[] => {
+  const shown = channels(offers)?.length ? shownChannels(offers, state).map(({ key }) => key) : ["0"];
+  return state.overlay && hasOverlay(offers.dataset) ? [...shown, OVERLAY.key] : shown;
 };
 
 // What questions are about: a channel, or the first one that shows.
-export function sourceOf(state: State, channel: Channel | undefined = shownChannels(state)[0]): Source {
-  return { dataset: state.dataset, ...(channel && { [NAMES.field]: channel.key }), ...timeOptions(state) };
+export function sourceOf(offers: Offers, state: State, channel: Channel | undefined = shownChannels(offers, state)[0]): Source {
+  return { dataset: state.dataset, ...(channel && { [NAMES.field]: channel.key }), ...timeOptions(offers, state) };
 }

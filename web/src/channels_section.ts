@@ -5,7 +5,7 @@ import { type Context, follow } from "./context";
 import { button, choice, colorField, iconButton, numberField, section, toggle, undoButtons } from "./controls";
 import { h, put, shown, svg } from "./dom";
 import type { Histograms } from "./histograms";
-import { hasRegions, presetChoices, shownDataset, turnTo, words } from "./offers";
+import { words } from "./offers";
 import { histogramPath, Scale } from "./plot";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { LOOK, type State } from "./state";
@@ -47,17 +47,17 @@ function rangePlot({ store }: Context, ranges: ChannelRanges, channel: Channel):
 }
 
 function channelRow(context: Context, ranges: ChannelRanges, channel: Channel, show: (shown: readonly Channel[], what: string) => void, solo: () => void): Row {
-  const { store } = context, { name, key } = channel, isOverlay = channel === OVERLAY;
+  const { store, offers } = context, { name, key } = channel, isOverlay = channel === OVERLAY;
   const withLook = (look: Looks, value: unknown): Partial<State> => ({ [look]: withOwn(store.state[look] as Readonly<Record<string, unknown>>, channel, value) });
   const set = (look: Looks, value: unknown): void => store.update(withLook(look, value), `${look} ${key}`);
   const factor = (what: string, look: "channelGammas" | "channelOpacities", [low, high]: readonly [number, number]) => numberField(`${what} of ${name}`, value => { const held = clamp(value, low, high); set(look, held === 1 ? undefined : held); }, "0.05");
-  const isOn = (): boolean => (isOverlay ? store.state.overlay : shownChannels(store.state).includes(channel)), others = (): readonly Channel[] => shownChannels(store.state).filter(each => each !== channel);
-  const eye = iconButton(`Show ${name}`, "eye", () => (isOverlay ? store.update({ overlay: !isOn(), ...(isOn() ? {} : turnTo("fields", store.state.renderer)) }, "overlay") : show(isOn() ? others() : [...others(), channel], "channel")));
+  const isOn = (): boolean => (isOverlay ? store.state.overlay : shownChannels(offers, store.state).includes(channel)), others = (): readonly Channel[] => shownChannels(offers, store.state).filter(each => each !== channel);
+  const eye = iconButton(`Show ${name}`, "eye", () => (isOverlay ? store.update({ overlay: !isOn(), ...(isOn() ? {} : offers.turnTo("fields", store.state.renderer)) }, "overlay") : show(isOn() ? others() : [...others(), channel], "channel")));
   const color = colorField(`Colour of ${name}`, value => set("channelColors", value));
   const auto = button("Auto", null, () => ranges.set(channel, ranges.usual(channel), `auto ${key}`), "quiet"), alone = button("Solo", null, solo, "quiet");
   auto.setAttribute("aria-label", `Auto: range of ${name} from its histogram`);
   alone.setAttribute("aria-label", `Solo: only ${name}`);
-  const presets = presetChoices().filter(([preset]) => !hasRegions(preset) && (preset !== "auto" || isOverlay)), first = transferOf(store.state, channel);
+  const presets = offers.presetChoices().filter(([preset]) => !offers.hasRegions(preset) && (preset !== "auto" || isOverlay)), first = transferOf(store.state, channel);
   const map = choice(`Colours of ${name}`, [["", "Its colour"], ...presets, ...(typeof first === "string" ? [] : [[OWN, "A function of its own"] as const])], value => store.update({
     ...withLook("channelTransfers", value === "" || value === "auto" ? undefined : value === OWN ? first : value),
     ...(isOverlay && { ...withLook("channelColors", value === "" ? colorOf(store.state, channel) : undefined) }),
@@ -87,13 +87,13 @@ function channelRow(context: Context, ranges: ChannelRanges, channel: Channel, s
 }
 
 export function channelsSection(context: Context, ranges: ChannelRanges, histograms: Histograms): HTMLElement {
-  const { store } = context, list = h("div", { class: "list" });
+  const { store, offers } = context, list = h("div", { class: "list" });
   let made: readonly Channel[] = [], rows: readonly Row[] = [], before: State["channels"] = null; // before: what showed before one was alone
-  const all = (): readonly Channel[] => channels() ?? [];
-  const rowsOf = (): readonly Channel[] => [...all(), ...(hasOverlay(shownDataset()) ? [OVERLAY] : [])];
+  const all = (): readonly Channel[] => channels(offers) ?? [];
+  const rowsOf = (): readonly Channel[] => [...all(), ...(hasOverlay(offers.dataset) ? [OVERLAY] : [])];
   const show = (wanted: readonly Channel[], what: string): void => store.update({ channels: all().filter(channel => wanted.includes(channel)).map(channel => channel.key) }, what);
   const solo = (channel: Channel): void => {
-    const now = shownChannels(store.state);
+    const now = shownChannels(offers, store.state);
     if (now.length === 1 && now[0] === channel) return store.update({ channels: before }, "solo");
     if (now.length > 1) before = store.state.channels;
     show([channel], "solo");

@@ -54,7 +54,7 @@ export function slider(label: string, low: number, high: number, step: number, t
 
 export function numberField(label: string, change: (value: number) => void, step = "any"): Control<number> & { input: HTMLInputElement } {
   const input: HTMLInputElement = h("input", { type: "number", step, "aria-label": label, inputmode: "decimal", onchange: () => { if (Number.isFinite(input.valueAsNumber)) change(rounded(input.valueAsNumber)); } });
-  return { element: input, input, set: value => { if (document.activeElement !== input || input.valueAsNumber !== value) input.value = String(rounded(value, 5)); } };
+  return { element: input, input, set: value => { if (!input.matches(":focus") || input.valueAsNumber !== value) input.value = String(rounded(value, 5)); } };
 }
 
 // The same, and null while it is empty.
@@ -62,7 +62,7 @@ export function optionalField(label: string, change: (value: number | null) => v
   const field = numberField(label, change);
   field.input.placeholder = "Automatic";
   field.input.addEventListener("change", () => { if (field.input.value === "") change(null); });
-  return { ...field, set: value => { if (value !== null) field.set(value); else if (document.activeElement !== field.input) field.input.value = ""; } };
+  return { ...field, set: value => { if (value !== null) field.set(value); else if (!field.input.matches(":focus")) field.input.value = ""; } };
 }
 
 // A number that may be left out; then the field shows what it is without.
@@ -70,13 +70,13 @@ export function parameterField(label: string, standard: string, [low, high]: rea
   const id = newId();
   const bound = (x: number): number | null => (Number.isFinite(x) ? x : null);
   const input: HTMLInputElement = h("input", { type: "number", id, step: "any", placeholder: standard || " ", min: bound(low), max: bound(high), inputmode: "decimal", onchange: () => { if (input.checkValidity()) change(input.value); } });
-  return { element: row(label, input, id), set: value => { if (document.activeElement !== input || value === "") input.value = value; } };
+  return { element: row(label, input, id), set: value => { if (!input.matches(":focus") || value === "") input.value = value; } };
 }
 
 export function textField(label: string, hint: string, pattern: string, change: (value: string) => void): Control<string> {
   const id = newId();
   const input: HTMLInputElement = h("input", { type: "text", id, placeholder: hint, pattern, spellcheck: "false", autocomplete: "off", onchange: () => { if (input.checkValidity()) change(input.value.trim()); } });
-  return { element: row(label, input, id), set: value => { if (document.activeElement !== input) input.value = value; } };
+  return { element: row(label, input, id), set: value => { if (!input.matches(":focus")) input.value = value; } };
 }
 
 export function colorField(label: string, change: (value: string) => void): Control<string> & { input: HTMLInputElement } {
@@ -103,7 +103,8 @@ export function openSection(element: HTMLDetailsElement): void {
 export function menu(opener: HTMLButtonElement, label: string, items: () => HTMLElement[]): HTMLElement {
   const list = h("div", { class: "menu", role: "menu", "aria-label": label, hidden: true });
   const holder = h("div", { class: "menu-holder" }, opener, list);
-  const close = (): void => { list.hidden = true; opener.setAttribute("aria-expanded", "false"); };
+  const outside = (event: Event): void => { if (!event.composedPath().includes(holder)) close(); };
+  const close = (): void => { list.hidden = true; opener.setAttribute("aria-expanded", "false"); document.removeEventListener("pointerdown", outside); };
   opener.setAttribute("aria-haspopup", "menu");
   close();
   opener.addEventListener("click", () => {
@@ -111,14 +112,14 @@ export function menu(opener: HTMLButtonElement, label: string, items: () => HTML
     list.replaceChildren(...items());
     list.hidden = false;
     opener.setAttribute("aria-expanded", "true");
+    document.addEventListener("pointerdown", outside);
     list.querySelector<HTMLElement>("[role=menuitem]")?.focus();
   });
   holder.addEventListener("focusout", event => { if (event.relatedTarget instanceof Node && !holder.contains(event.relatedTarget)) close(); });
-  document.addEventListener("pointerdown", event => { if (event.target instanceof Node && !holder.contains(event.target)) close(); });
   list.addEventListener("click", () => { close(); opener.focus(); });
   holder.addEventListener("keydown", event => {
     if (event.key === "Escape" && !list.hidden) { close(); opener.focus(); event.stopPropagation(); }
-    const all = [...list.querySelectorAll<HTMLElement>("[role=menuitem]")], at = all.indexOf(document.activeElement as HTMLElement);
+    const all = [...list.querySelectorAll<HTMLElement>("[role=menuitem]")], at = all.findIndex(item => item.matches(":focus"));
     const to = event.key === "ArrowDown" ? at + 1 : event.key === "ArrowUp" ? at - 1 + all.length : -1;
     if (at >= 0 && to >= 0) { all[to % all.length]?.focus(); event.preventDefault(); event.stopPropagation(); }
   });

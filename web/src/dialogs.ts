@@ -1,16 +1,16 @@
 // Windows over the page: help, the picture as a file, the command, the token.
-import type { Api } from "./api";
+import type { Context } from "./context";
 import { button, choice, iconButton, toggle } from "./controls";
 import { copyText, download, h } from "./dom";
 import type { KeyGroup } from "./keys";
 import { renderOptions } from "./options";
 import { type Part, pictureFile } from "./saving";
-import type { State } from "./state";
 
-export function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
+// In a viewer, or in a place that has its style.
+export function dialog(place: HTMLElement, title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
   const element: HTMLDialogElement = h("dialog", { "aria-label": title, onclose: () => element.remove(), onclick: (event: MouseEvent) => { if (event.target === element) element.close(); } },
     h("div", { class: "dialog-body" }, h("header", {}, h("h2", {}, title), iconButton("Close", "close", () => element.close(), "Esc")), ...content));
-  document.body.append(element);
+  place.append(element);
   element.showModal();
   return element;
 }
@@ -21,26 +21,27 @@ const POINTER_HELP: readonly (readonly [string, string])[] = [
   ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Show it: a volume, or a colour map (ParaView’s JSON)"],
 ];
 
-export function helpDialog(groups: readonly KeyGroup[]): void {
+export function helpDialog(place: HTMLElement, groups: readonly KeyGroup[]): void {
   const table = (rows: readonly (readonly [string, string])[]): HTMLElement => h("dl", { class: "keys" }, ...rows.map(([key, does]) => h("div", {}, h("dt", {}, h("kbd", {}, key)), h("dd", {}, does))));
-  dialog("Help", h("div", { class: "help" },
+  dialog(place, "Help", h("div", { class: "help" },
     h("section", {}, h("h3", {}, "Pointer and touch"), h("dl", { class: "keys wide" }, ...POINTER_HELP.map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))))),
     ...groups.map(group => h("section", {}, h("h3", {}, group.title), table(group.keys.map(key => [key.label, key.does]))))));
 }
 
-export function tokenDialog(reason: string, use: (token: string) => void): void {
+export function tokenDialog(place: HTMLElement, reason: string, use: (token: string) => void): void {
   const input = h("input", { type: "text", id: "token", placeholder: " ", autocomplete: "off", spellcheck: "false", required: true });
   const form = h("form", { method: "dialog", onsubmit: () => use(/token=([^&\s]+)/.exec(input.value)?.[1] ?? input.value.trim()) },
     h("p", {}, reason), h("label", { for: "token" }, "Token, or the whole address that slabstream view printed"), input,
     h("div", { class: "dialog-actions" }, h("button", { type: "submit", class: "button primary" }, "Open")));
-  dialog("This viewer needs a token", form);
+  dialog(place, "This viewer needs a token", form);
   input.focus();
 }
 
 const SIZES: readonly (readonly [string, number, number])[] = [["Square", 1024, 1024], ["Full HD", 1920, 1080], ["4K", 3840, 2160]];
 
 // `parts`: of the panes, the 3-D picture first.
-export function screenshotDialog(state: State, api: Api, parts: readonly Part[], width: number, height: number, paneSize: readonly [number, number]): void {
+export function screenshotDialog(context: Context, parts: readonly Part[], width: number, height: number, paneSize: readonly [number, number]): void {
+  const { state } = context.store;
   const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", min: 16, max: 8192, step: 1, required: true, value, "aria-label": label });
   const w = field("Width in pixels", paneSize[0]), t = field("Height in pixels", paneSize[1]);
   let transparent = false, marked = state.scaleBar, chosen: readonly Part[] = parts.slice(0, 1), name = "";
@@ -59,7 +60,7 @@ export function screenshotDialog(state: State, api: Api, parts: readonly Part[],
     save.disabled = true;
     status.textContent = "Rendering…";
     try {
-      download(`${state.dataset}${name}-${w.value}x${t.value}.png`, await pictureFile(api, chosen, { width: Number(w.value), height: Number(t.value), marked, transparent }));
+      download(`${state.dataset}${name}-${w.value}x${t.value}.png`, await pictureFile(context, chosen, { width: Number(w.value), height: Number(t.value), marked, transparent }));
       status.textContent = "Saved.";
     } catch (error) {
       status.textContent = error instanceof Error ? error.message : String(error);
@@ -71,16 +72,16 @@ export function screenshotDialog(state: State, api: Api, parts: readonly Part[],
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
     h("div", { class: "button-row" }, button("As shown", null, () => setSize(...shownSize()), "quiet"), ...SIZES.map(([size, x, y]) => button(size, null, () => setSize(x, y), "quiet"))),
     clear.element, notes.element, status, h("div", { class: "dialog-actions" }, save));
-  dialog("Picture", form);
+  dialog(context.element, "Picture", form);
 }
 
 // The commands that make this picture, and a movie that turns it.
-export async function commandDialog(state: State, api: Api, width: number, height: number, say: (message: string, kind?: "error") => void): Promise<void> {
+export async function commandDialog({ store: { state }, offers, api, element, say }: Context, width: number, height: number): Promise<void> {
   try {
-    const { command, files } = await api.command({ ...renderOptions(state), size: `${width}x${height}` });
+    const { command, files } = await api.command({ ...renderOptions(offers, state), size: `${width}x${height}` });
     const movie = command.replace(/^slabstream render/, "slabstream turntable").replace(/ -o \S+$/, " --frames 120 -o turntable.mp4");
     const line = (title: string, text: string): HTMLElement => h("section", {}, h("h3", {}, title), h("pre", { tabindex: 0 }, text), button("Copy", "copy", () => void copyText(text).then(() => say("Copied.")), "quiet"));
-    dialog("Command", line("This picture", command), line("A movie of one turn (needs ffmpeg)", movie),
+    dialog(element, "Command", line("This picture", command), line("A movie of one turn (needs ffmpeg)", movie),
       ...Object.entries(files ?? {}).map(([name, text]) => h("section", {}, h("h3", {}, `The file ${name}`), h("p", { class: "hint" }, "The command reads this colour map."), button(`Save ${name}`, "save", () => download(name, new Blob([text], { type: "application/json" })), "quiet"))));
   } catch (error) {
     say(error instanceof Error ? error.message : String(error), "error");

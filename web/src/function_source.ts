@@ -38,7 +38,7 @@ export class FunctionSource {
   }
 
   // Whether the picture follows it.
-  get shows(): boolean { return "transfer" in renderOptions(this.context.store.state); }
+  get shows(): boolean { return "transfer" in renderOptions(this.context.offers, this.context.store.state); }
 
   // What colours of the picture mean; null: no bar can say it.
   bar(): ColorBar | null {
@@ -65,7 +65,7 @@ export class FunctionSource {
   // What it is a function of; presets are those of all times. Null: it is not known yet.
   of(): Source | null {
     const volume = this.context.volume();
-    return volume && { ...sourceOf({ ...this.context.store.state, time: "" }), dataset: volume.name };
+    return volume && { ...sourceOf(this.context.offers, { ...this.context.store.state, time: "" }), dataset: volume.name };
   }
 
   private key(preset: string): string { return JSON.stringify([this.of(), preset]); }

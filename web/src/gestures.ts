@@ -3,6 +3,7 @@ import { orbited, panned, rolled, zoomed } from "./camera";
 import type { State } from "./state";
 
 export interface GestureTarget {
+  takesWheel(): boolean;
   state(): State;
   // Side of a pixel of the page in the world, at the target's depth; 0: not known yet.
   pixelSize(): number;
@@ -99,6 +100,7 @@ export function listenToGestures(canvas: HTMLCanvasElement, target: GestureTarge
   canvas.addEventListener("contextmenu", event => event.preventDefault());
   canvas.addEventListener("dblclick", event => target.place(event.offsetX, event.offsetY));
   canvas.addEventListener("wheel", event => {
+    if (!target.takesWheel()) return;
     event.preventDefault();
     const unit = event.deltaMode === 1 ? 30 : event.deltaMode === 2 ? 300 : event.ctrlKey ? 6 : 1;
     const pixels = Math.max(-MOST_WHEEL_PIXELS, Math.min(MOST_WHEEL_PIXELS, event.deltaY * unit));

@@ -2,7 +2,6 @@
 import { type Context, follow } from "./context";
 import { iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
-import { can, turnTo } from "./offers";
 import { Scale } from "./plot";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { LOOK, type SlopePoint } from "./state";
@@ -52,7 +51,7 @@ export class GradientEditor {
   }
 
   private refresh(): void {
-    const { list } = this, { state } = this.context.store, on = list.length > 0, able = can("gradient-opacity", state.renderer);
+    const { list } = this, { state } = this.context.store, on = list.length > 0, able = this.context.offers.can("gradient-opacity", state.renderer);
     this.on.set(on);
     this.body.hidden = !on;
     this.hint.hidden = !on;
@@ -94,7 +93,7 @@ export class GradientEditor {
     const { store } = this.context, steep = this.scale().domain[1];
     this.selected = 0;
     if (!on) return this.edit([], "by gradient");
-    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...turnTo("gradient-opacity", store.state.renderer) }, "by gradient");
+    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...this.context.offers.turnTo("gradient-opacity", store.state.renderer) }, "by gradient");
   }
 
   private moveTo(slope: number | null, opacity: number | null): void {

@@ -10,7 +10,7 @@ export class Histograms {
 
   constructor(private readonly context: Context) {
     context.onVolume(() => { this.known.clear(); this.asked = new Set(); });
-    whenTimeRests(context.store, () => { this.asked = new Set(); this.changed(); });
+    whenTimeRests(context, () => { this.asked = new Set(); this.changed(); });
   }
 
   onChange(listener: () => void): void { this.listeners.push(listener); }

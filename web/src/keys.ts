@@ -11,8 +11,8 @@ const ARROW_CONTROLS = "input[type=range], input[type=radio], select, [role=menu
 const SPACE_CONTROLS = "button, summary, select, input:not([type=range])";
 
 // Keys act wherever the focus is, but in text fields, where they are text, and while a dialog is open. A control keeps the arrows that change it.
-function actsOn(target: EventTarget | null, key: string): boolean {
-  return target instanceof Element && !document.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS)) && !(key === " " && target.matches(SPACE_CONTROLS));
+function actsOn(viewer: HTMLElement, target: EventTarget | null, key: string): boolean {
+  return target instanceof Element && !viewer.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS)) && !(key === " " && target.matches(SPACE_CONTROLS));
 }
 
 // Keys whose place counts where their letter is none of ours, by their places on the keyboard of the United States.
@@ -30,22 +30,26 @@ export function meaningsOf({ key, code, shiftKey }: Pick<KeyboardEvent, "key" | 
 // With other keys held, a key belongs to the browser; but many keyboards type brackets with AltGr (Ctrl and Alt to some systems) or Alt.
 const isFree = ({ ctrlKey, metaKey, altKey, key }: KeyboardEvent): boolean => (!ctrlKey && !metaKey && !altKey) || (altKey && !metaKey && /^[[\]{}]$/.test(key));
 
-export function listenToKeys(groups: () => readonly KeyGroup[], undo: () => void, redo: () => void): void {
+// On a page of its own a viewer hears all keys. Elsewhere it hears keys while it has the focus, and these act on nothing else.
+export function listenToKeys(viewer: HTMLElement, isPage: boolean, signal: AbortSignal, groups: () => readonly KeyGroup[], undo: () => void, redo: () => void): void {
+  const heard: GlobalEventHandlers = isPage ? document : viewer;
   // The picture has the focus from the start; its ring shows once keys are used.
-  document.addEventListener("keydown", () => put(document.body, "data-keys", "used"), true);
-  document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
-  document.addEventListener("keydown", event => {
+  heard.addEventListener("keydown", () => put(viewer, "data-keys", "used"), { capture: true, signal });
+  heard.addEventListener("pointerdown", () => { delete viewer.dataset["keys"]; }, { capture: true, signal });
+  if (!isPage) viewer.addEventListener("keydown", event => { if (!event.ctrlKey && !event.metaKey) event.stopPropagation(); });
+  heard.addEventListener("keydown", event => {
     const field = event.target instanceof HTMLElement && event.target.matches(TEXT_FIELDS);
     const meanings = meaningsOf(event), step = meanings.find(each => each === "z" || each === "y");
     if ((event.ctrlKey || event.metaKey) && !event.altKey && !field && step) {
       event.preventDefault();
+      event.stopPropagation();
       return step === "y" || event.shiftKey ? redo() : undo();
     }
-    if (!isFree(event) || !actsOn(event.target, event.key)) return;
+    if (!isFree(event) || !actsOn(viewer, event.target, event.key)) return;
     const all = groups().flatMap(group => group.keys), meant = meanings.find(each => all.some(({ keys }) => keys.includes(each)));
     const key = all.find(({ keys }) => meant !== undefined && keys.includes(meant));
     if (!key) return;
     event.preventDefault();
     key.run(event.shiftKey, event.timeStamp);
-  });
+  }, { signal });
 }

@@ -4,10 +4,10 @@ import { button } from "./controls";
 import { dialog } from "./dialogs";
 import { copyText, download, h, shown } from "./dom";
 
-export async function labelTable({ api, say }: Context, dataset: string): Promise<void> {
+export async function labelTable({ api, say, element }: Context, dataset: string): Promise<void> {
   const status = h("p", { role: "status", class: "hint" }, "Measuring…");
   const table = h("div", { class: "label-table", tabindex: 0, role: "region", "aria-label": "Values of labels", hidden: true }), actions = h("div", { class: "dialog-actions", hidden: true });
-  dialog("Labels", status, table, actions);
+  dialog(element, "Labels", status, table, actions);
   try {
     const answer = await api.labelStatistics(dataset);
     if (!answer) { status.textContent = "This gateway does not measure labels."; return; }

@@ -2,7 +2,6 @@
 import type { LegendEntry } from "./annotations";
 import type { LabelName } from "./api";
 import type { Context } from "./context";
-import { can } from "./offers";
 import { labelMode } from "./options";
 
 // Whether * (any characters, also none) and ? (one) in the pattern can stand for what the name has there.
@@ -69,8 +68,8 @@ export class Labels {
 
   // The legend of the picture, if it is wanted.
   legend(): readonly LegendEntry[] {
-    const { state } = this.context.store;
-    if (!state.legend || labelMode(state) === "off" || !can("labels", state.renderer)) return [];
+    const { offers, store: { state } } = this.context;
+    if (!state.legend || labelMode(offers, state) === "off" || !offers.can("labels", state.renderer)) return [];
     return this.names.filter(label => this.shows(label)).map(label => ({ name: labelText(label), color: label.color ?? "" }));
   }
 

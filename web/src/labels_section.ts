@@ -4,7 +4,6 @@ import { type Context, follow } from "./context";
 import { row, section, segmented, slider, textField, toggle } from "./controls";
 import { h } from "./dom";
 import { isListed, type Labels, labelText, listOf } from "./labels";
-import { can, hasLabelsAlone, titlesThatCan, turnTo } from "./offers";
 import { labelMode } from "./options";
 import { LOOK } from "./state";
 import { rounded } from "./vec";
@@ -48,19 +47,19 @@ function labelList({ store }: Context, labels: Labels): { element: HTMLElement; 
 }
 
 export function labelsSection(context: Context, labels: Labels): HTMLElement {
-  const { store } = context, list = labelList(context, labels);
-  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" ? turnTo("labels", store.state.renderer) : {}) }, "labels"));
+  const { store, offers } = context, list = labelList(context, labels);
+  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" ? offers.turnTo("labels", store.state.renderer) : {}) }, "labels"));
   const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
-  const smooth = toggle("Smooth surfaces", on => store.update({ labelSurface: on ? "smooth" : "blocky", ...(on ? turnTo("smooth-labels", store.state.renderer) : {}) }, "surfaces of labels"));
+  const smooth = toggle("Smooth surfaces", on => store.update({ labelSurface: on ? "smooth" : "blocky", ...(on ? offers.turnTo("smooth-labels", store.state.renderer) : {}) }, "surfaces of labels"));
   const which = textField("Shown", "all, or 1,5-9,Frontal_*", "[^,]+(,[^,]+)*", value => store.update({ labelsShown: value }, "labels shown"));
   const legend = toggle("Legend", on => store.update({ legend: on }));
   const hint = h("p", { class: "hint" });
   const element = section("Labels", false, row("Shown as", mode.element), tint.element, smooth.element, which.element, legend.element, hint, list.element);
   const update = (): void => {
-    const { state } = store, shownAs = labelMode(state), on = shownAs !== "off";
+    const { state } = store, shownAs = labelMode(offers, state), on = shownAs !== "off";
     element.hidden = !context.volume()?.labels;
     mode.set(shownAs);
-    for (const other of ["off", "tint", "highlight"]) mode.enable(other, !hasLabelsAlone());
+    for (const other of ["off", "tint", "highlight"]) mode.enable(other, !offers.hasLabelsAlone);
     tint.set(state.labelTint);
     smooth.set(state.labelSurface === "smooth");
     which.set(state.labelsShown);
@@ -68,8 +67,8 @@ export function labelsSection(context: Context, labels: Labels): HTMLElement {
     tint.element.hidden = shownAs !== "tint" && shownAs !== "highlight";
     smooth.element.hidden = shownAs !== "surface";
     which.element.hidden = list.element.hidden = legend.element.hidden = !on;
-    hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
-    hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : "Point at a label in the picture to list it here.";
+    hint.hidden = !on || (offers.can("labels", state.renderer) && labels.names.length > 0);
+    hint.textContent = !offers.can("labels", state.renderer) ? `Labels are shown by: ${offers.titlesThatCan("labels")}.` : "Point at a label in the picture to list it here.";
     list.refresh();
   };
   labels.onChange(update);

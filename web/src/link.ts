@@ -1,15 +1,14 @@
-// The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
-// The token comes in the link that the gateway prints, and stays out of the address and of copied links.
+// The whole state of a view as texts, by the names of the command line where there are such; and as a link's part behind '#'.
 import { NAMES } from "./api";
 import { GAMMAS, OVERLAY } from "./channels";
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
-import { limitsOf, parametersIn } from "./offers";
+import type { Offers } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST_KEY_FRAMES, type SlopePoint, type State, type Surface } from "./state";
 import { cornersOf, isArea, MOST_REGIONS, type Region } from "./regions";
 import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
 
-interface Field<T> { name: string; write: (value: T) => string; read: (text: string) => T | undefined }
+interface Field<T> { name: string; write: (value: T) => string; read: (text: string, offers: Offers) => T | undefined }
 
 const number = (text: string | undefined): number | undefined => (text === undefined || text.trim() === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
 const numbers = (text: string, count: number): number[] | undefined => {
@@ -22,10 +21,10 @@ const list = <T>(text: string | null, separator: string, read: (item: string) =>
 };
 const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
 const oneOf = <T extends string>(name: string, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
-const within = (name: string, limits: () => readonly [number, number]): Field<number> => ({
-  name, write: String, read: value => { const n = number(value), [low, high] = limits(); return n !== undefined && n >= low && n <= high ? n : undefined; },
+const within = (name: string, limits: (offers: Offers) => readonly [number, number]): Field<number> => ({
+  name, write: String, read: (value, offers) => { const n = number(value), [low, high] = limits(offers); return n !== undefined && n >= low && n <= high ? n : undefined; },
 });
-const real = (name: string): Field<number> => within(name, () => limitsOf(name));
+const real = (name: string): Field<number> => within(name, offers => offers.limitsOf(name));
 const flag = (name: string): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
 const nullable = <T>(field: Field<T>): Field<T | null> => ({ name: field.name, write: value => (value === null ? "" : field.write(value)), read: field.read });
 const point = (name: string): Field<Vec3> => ({ name, write: value => value.join(","), read: value => numbers(value, 3) as Vec3 | undefined });
@@ -85,14 +84,14 @@ const map: Field<ColorMap> = {
   write: value => [encodeURIComponent(value.name), value.colors.map(p => [p.x, p.r, p.g, p.b].join(",")).join(";"),
     value.opacities.map(p => (p.mid === 0.5 && p.sharp === 0 ? [p.x, p.y] : [p.x, p.y, p.mid, p.sharp]).join(",")).join(";"),
     value.material ? MATERIAL.map(name => value.material?.[name] ?? "").join(",") : "", value.regions ? regions.write(value.regions) : ""].join("|").replace(/\|+$/, ""),
-  read: value => {
+  read: (value, offers) => {
     const [name, colorText, opacityText, materialText, regionText] = value.split("|");
     const colors = list(colorText || null, ";", item => { const n = numbers(item, 4); return n && { x: n[0] as number, r: n[1] as number, g: n[2] as number, b: n[3] as number }; });
     const opacities = list(opacityText || null, ";", item => {
       const n = numbers(item, 4) ?? [...(numbers(item, 2) ?? []), 0.5, 0];
       return n.length === 4 ? { x: n[0] as number, y: n[1] as number, mid: n[2] as number, sharp: n[3] as number } : undefined;
     });
-    const areas = regionText ? regions.read(regionText) : [];
+    const areas = regionText ? regions.read(regionText, offers) : [];
     if (!colors || !opacities || !areas || (areas.length === 0 && (colors.length === 0 || opacities.length === 0))) return undefined;
     const map = { name: decoded(name ?? ""), colors, opacities, ...(areas.length > 0 && { regions: areas }) };
     if (!materialText) return map;
@@ -103,15 +102,15 @@ const map: Field<ColorMap> = {
 // "0=100:4000,1=5:7": a value each.
 const each = <T>(name: string, key: RegExp, { write, read }: Pick<Field<T>, "write" | "read">): Field<Readonly<Record<string, T>>> => ({
   name, write: value => Object.entries(value).map(([of, one]) => `${of}=${write(one)}`).join(","),
-  read: value => {
-    const pairs = list(value, ",", item => { const [of, text] = item.split("="), one = text === undefined ? undefined : read(text); return of && key.test(of) && one !== undefined ? ([of, one] as const) : undefined; });
+  read: (value, offers) => {
+    const pairs = list(value, ",", item => { const [of, text] = item.split("="), one = text === undefined ? undefined : read(text, offers); return of && key.test(of) && one !== undefined ? ([of, one] as const) : undefined; });
     return pairs && Object.fromEntries(pairs);
   },
 });
 const share = within("", () => [0, 1]);
 const transfer: Field<string | ColorMap> = { // a list's own marks stay apart from those of a function
   name: "", write: value => (typeof value === "string" ? value : encodeURIComponent(map.write(value))),
-  read: value => (NAME.test(value) ? value : map.read(decoded(value))),
+  read: (value, offers) => (NAME.test(value) ? value : map.read(decoded(value), offers)),
 };
 const CHANNEL = /^[^,=]+$/, NO_CHANNEL = "none";
 const channels: Field<readonly string[]> = {
@@ -146,7 +145,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   dataset: text("dataset", /^.{0,256}$/),
   azimuth: real("azimuth"), elevation: real("elevation"), roll: real("roll"),
   zoom: real("zoom"), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
-  renderer: text("renderer", NAME), 
+  renderer: text("renderer", NAME),
   shading: text("shading", NAME), lights: many<Vec3>("light", 3), shadows: real("shadows"), ambientOcclusion: real("ambient-occlusion"), background: text("background", COLOR),
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
@@ -162,62 +161,44 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
 // Spaces and most marks are legible as they are in a fragment.
 const escaped = (value: string): string => encodeURIComponent(value).replace(/%2C/g, ",").replace(/%3A/g, ":").replace(/%3B/g, ";").replace(/%23/g, "%23").replace(/%7C/g, "|");
 
-// Only what differs from the page's first state, and the direction of the view, whose first one depends on the dataset.
-export function fragmentOf(state: State): string {
-  const parts: string[] = [];
+// Names and texts, as in links.
+export type Fields = Readonly<Record<string, string>>;
+
+const initialOf = (offers: Offers): State => ({ ...INITIAL, renderer: offers.automaticRenderer });
+
+// Only what differs from the first state, and the direction of the view, whose first one depends on the dataset.
+export function fieldsOf(state: State, offers: Offers): Fields {
+  const fields: Record<string, string> = {}, initial = initialOf(offers);
   const add = <K extends keyof Named>(key: K): void => {
     const value = FIELDS[key].write(state[key]);
-    if (key === "azimuth" || key === "elevation" || value !== FIELDS[key].write(INITIAL[key])) parts.push(`${FIELDS[key].name}=${escaped(value)}`);
+    if (key === "azimuth" || key === "elevation" || value !== FIELDS[key].write(initial[key])) fields[FIELDS[key].name] = value;
   };
   (Object.keys(FIELDS) as (keyof Named)[]).forEach(add);
-  for (const [name, value] of Object.entries(state.parameters)) parts.push(`${name}=${value}`);
-  return parts.join("&");
+  return { ...fields, ...state.parameters };
 }
 
 // Short forms: overlay-range=3:8 says channel-range=overlay=3:8. In older links the function "one-color" stands beside a colour.
 const OF_OVERLAY = { transfer: NAMES.channelTransfers, range: NAMES.channelRanges, weight: NAMES.channelOpacities, color: NAMES.channelColors };
 
 // What is wrong or missing has its first value.
-export function stateOf(fragment: string): State {
-  const given = new URLSearchParams(fragment.replace(/\+/g, "%2B"));
+export function stateOf(fields: Fields, offers: Offers): State {
+  const given: Record<string, string> = { ...fields };
   for (const [short, whole] of Object.entries(OF_OVERLAY)) {
-    const value = given.get(`overlay-${short}`);
-    if (value !== null && value !== "one-color") given.set(whole, [given.get(whole), `${OVERLAY.key}=${value}`].filter(Boolean).join(","));
+    const value = given[`overlay-${short}`];
+    if (value !== undefined && value !== "one-color") given[whole] = [given[whole], `${OVERLAY.key}=${value}`].filter(Boolean).join(",");
   }
-  const state: State = { ...INITIAL, parameters: parametersIn(given) };
+  const state: State = { ...initialOf(offers), parameters: offers.parametersIn(given) };
   const take = <K extends keyof Named>(key: K): void => {
-    const value = given.get(FIELDS[key].name);
-    const read = value === null ? undefined : FIELDS[key].read(value);
+    const value = given[FIELDS[key].name];
+    const read = value === undefined ? undefined : FIELDS[key].read(value, offers);
     if (read !== undefined) state[key] = read;
   };
   (Object.keys(FIELDS) as (keyof Named)[]).forEach(take);
   return state;
 }
 
-// ---- the token
+// Whether they say from where one looks; else the dataset does.
+export const sayDirection = (fields: Fields): boolean => "azimuth" in fields || "elevation" in fields;
 
-const KEPT = `slabstream.token ${location.pathname}`; // for one tab, so that it can be loaded again
-
-export function takeToken(): string {
-  const token = new URLSearchParams(location.hash.slice(1)).get("token");
-  try {
-    if (token) sessionStorage.setItem(KEPT, token);
-    return token ?? sessionStorage.getItem(KEPT) ?? "";
-  } catch {
-    return token ?? ""; // a frame without storage: the address keeps the token
-  }
-}
-
-function tokenIsKept(token: string): boolean {
-  try { return sessionStorage.getItem(KEPT) === token; } catch { return false; }
-}
-
-export function linkOf(state: State, token = ""): string {
-  const link = new URL(location.href);
-  link.hash = (token ? `token=${token}&` : "") + fragmentOf(state);
-  return link.href;
-}
-
-export function showInAddress(state: State, token: string): void {
-  history.replaceState(null, "", linkOf(state, tokenIsKept(token) ? "" : token));
-}
+export const fragmentOf = (fields: Fields): string => Object.entries(fields).map(([name, value]) => `${name}=${escaped(value)}`).join("&");
+export const fieldsIn = (fragment: string): Fields => Object.fromEntries([...new URLSearchParams(fragment.replace(/\+/g, "%2B"))].reverse()); // the first of a name counts

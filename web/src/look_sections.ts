@@ -4,22 +4,22 @@ import { takesFunction } from "./channels";
 import { type Context, follow } from "./context";
 import { button, choice, colorField, iconButton, numberField, parameterField, row, rows, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
-import { automaticRenderer, can, limitsOf, type Offer, parametersOf, renderers, titleOf, titlesThatCan, turnTo, words } from "./offers";
+import { type Offer, type Offers, titleOf, words } from "./offers";
 import { projectionOf } from "./options";
-import { LOOK, type State, type Store, type Surface } from "./state";
+import { LOOK, type State, type Surface } from "./state";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
 // Renderers that draw cells come before the others, and only for datasets that have cells.
-function rendererChoices(cells: boolean): (readonly [string, string])[] {
-  const [drawCells, others] = [true, false].map(draws => renderers().filter(each => each.abilities.includes("cells") === draws));
+function rendererChoices({ renderers, automaticRenderer }: Offers, cells: boolean): (readonly [string, string])[] {
+  const [drawCells, others] = [true, false].map(draws => renderers.filter(each => each.abilities.includes("cells") === draws));
   const named = [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);
-  return [[automaticRenderer(), words(automaticRenderer())], ...named];
+  return [[automaticRenderer, words(automaticRenderer)], ...named];
 }
 
 // What the chosen renderer has of its own, as the service describes it.
-function parameterRows(store: Store): { element: HTMLElement; set(state: State): void } {
+function parameterRows({ store, offers }: Context): { element: HTMLElement; set(state: State): void } {
   const element = h("div", { class: "list" });
   let renderer = "", made: { name: string; standard: string; set(value: string): void }[] = [];
   const make = ({ name, help, unit, choices, default: standard = "" }: Offer): typeof made[number] => {
@@ -28,7 +28,7 @@ function parameterRows(store: Store): { element: HTMLElement; set(state: State):
       store.update({ parameters: value === "" || value === standard ? others : { ...others, [name]: value } }, name);
     };
     const label = unit ? `${words(name)}, ${unit}` : words(name);
-    const control = choices ? choice(label, choices.map(each => [each, words(each)] as const), put) : parameterField(label, standard, limitsOf(name), put);
+    const control = choices ? choice(label, choices.map(each => [each, words(each)] as const), put) : parameterField(label, standard, offers.limitsOf(name), put);
     control.element.title = help.split("; for --renderer")[0] as string;
     element.append(control.element);
     return { name, standard: choices ? standard : "", set: control.set };
@@ -36,31 +36,31 @@ function parameterRows(store: Store): { element: HTMLElement; set(state: State):
   return {
     element,
     set: state => {
-      if (state.renderer !== renderer) { renderer = state.renderer; element.replaceChildren(); made = parametersOf(renderer).map(make); }
+      if (state.renderer !== renderer) { renderer = state.renderer; element.replaceChildren(); made = offers.parametersOf(renderer).map(make); }
       for (const { name, standard, set } of made) set(state.parameters[name] ?? standard);
     },
   };
 }
 
 export function renderingSection(context: Context): HTMLElement {
-  const { store, volume } = context;
-  const renderer = choice("Renderer", rendererChoices(false), value => store.update({ renderer: value }, "renderer"));
-  const parameters = parameterRows(store);
+  const { store, volume, offers } = context;
+  const renderer = choice("Renderer", rendererChoices(offers, false), value => store.update({ renderer: value }, "renderer"));
+  const parameters = parameterRows(context);
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
   const shadingRow = row("Shading", shading.element);
   const projection = segmented("Projection", [["orthographic", "Parallel"], ["perspective", "Perspective"]], value => store.update({ projection: value as "orthographic" }));
   const background = colorField("Background", value => store.update({ background: value }, "background"));
   const update = (): void => {
     const { state } = store;
-    renderer.fill(rendererChoices((volume()?.cells ?? 0) > 0 || (state.renderer !== automaticRenderer() && can("cells", state.renderer))));
+    renderer.fill(rendererChoices(offers, (volume()?.cells ?? 0) > 0 || (state.renderer !== offers.automaticRenderer && offers.can("cells", state.renderer))));
     renderer.set(state.renderer);
     parameters.set(state);
     shading.set(state.shading);
-    shading.enable("depth-gradient", can("depth-shading", state.renderer));
-    projection.set(projectionOf(state));
-    projection.enable("perspective", can("perspective", state.renderer));
+    shading.enable("depth-gradient", offers.can("depth-shading", state.renderer));
+    projection.set(projectionOf(offers, state));
+    projection.enable("perspective", offers.can("perspective", state.renderer));
     background.set(state.background);
-    shadingRow.hidden = !can("lights", state.renderer);
+    shadingRow.hidden = !offers.can("lights", state.renderer);
   };
   follow(context, [...LOOK, "projection"], update);
   return section("Rendering", true, renderer.element, parameters.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
@@ -70,7 +70,7 @@ const without = <T>(list: readonly T[], index: number): T[] => list.filter((_, i
 const withItem = <T>(list: readonly T[], index: number, item: T): T[] => list.map((old, i) => (i === index ? item : old));
 
 export function surfacesSection(context: Context): HTMLElement {
-  const { store } = context;
+  const { store, offers } = context;
   const change = (index: number, patch: Partial<Surface>): void => {
     const surface = store.state.surfaces[index];
     if (surface) store.update({ surfaces: withItem(store.state.surfaces, index, { ...surface, ...patch }) }, `surface ${index}`);
@@ -89,20 +89,20 @@ export function surfacesSection(context: Context): HTMLElement {
     const colors = ["#e0b089", "#f2ede4", "#7fb4d8", "#d98383"];
     store.update({
       surfaces: [...store.state.surfaces, { value: rounded(low + (high - low) * 0.35, 4), color: colors[store.state.surfaces.length % colors.length] as string, opacity: 1 }],
-      ...turnTo("isosurfaces", store.state.renderer),
+      ...offers.turnTo("isosurfaces", store.state.renderer),
     }, "surface");
   }, "quiet");
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Value"), h("span", {}, "Colour"), h("span", {}, "Opacity"));
   const alone = toggle("Surfaces alone", on => store.update({ surfacesAlone: on }, "alone"));
-  const hint = h("p", { class: "hint" }, `Shown by: ${titlesThatCan("isosurfaces")}.`);
+  const hint = h("p", { class: "hint" }, `Shown by: ${offers.titlesThatCan("isosurfaces")}.`);
   const element = section("Isosurfaces", false, head, list.element, hint, alone.element, addButton);
   const update = (): void => {
     const { surfaces, surfacesAlone, renderer } = store.state;
-    element.hidden = !takesFunction(store.state);
+    element.hidden = !takesFunction(offers, store.state);
     list.set(surfaces);
     alone.set(surfacesAlone);
     head.hidden = alone.element.hidden = surfaces.length === 0;
-    hint.hidden = surfaces.length === 0 || can("isosurfaces", renderer);
+    hint.hidden = surfaces.length === 0 || offers.can("isosurfaces", renderer);
     addButton.disabled = surfaces.length >= MOST_SURFACES;
   };
   follow(context, LOOK, update);
@@ -119,7 +119,7 @@ function fromEye(right: number, up: number, context: Context): Vec3 {
 }
 
 export function lightSection(context: Context): HTMLElement {
-  const { store } = context;
+  const { store, offers } = context;
   const list = rows<Vec3>(index => {
     const fields = (["x", "y", "z"] as const).map((axis, i) => numberField(`Light ${index + 1}, ${axis}`, value => {
       const light = [...(store.state.lights[index] ?? [0, 0, 1])];
@@ -141,7 +141,7 @@ export function lightSection(context: Context): HTMLElement {
   const element = section("Light", false, hint, head, list.element, adders, shadows.element, occlusion.element);
   const update = (): void => {
     const { lights, renderer } = store.state;
-    const lit = can("lights", renderer), shadowed = can("shadows", renderer);
+    const lit = offers.can("lights", renderer), shadowed = offers.can("shadows", renderer);
     element.hidden = !lit && !shadowed;
     shadows.set(store.state.shadows);
     occlusion.set(store.state.ambientOcclusion);

@@ -40,7 +40,7 @@ export function measureSection(context: Context, measuring: Measuring): HTMLDeta
   let made: { measure: Measure; text: HTMLElement; plot: HTMLElement; profile: Profile | null }[] = [];
   const draw = (): void => {
     const { measures } = store.state;
-    put(document.body, "data-measuring", measuring.tool !== null);
+    put(context.element, "data-measuring", measuring.tool !== null);
     for (const { kind, tool } of tools) put(tool, "aria-pressed", String(kind === measuring.tool));
     const { tool, points } = measuring;
     putText(hint, tool ? `Click ${points.length === 0 ? "the first" : points.length + 1 < pointsOf(tool) ? "the next" : "the last"} point, in the picture or in a slice. Esc ends.` : measures.length === 0 ? "Choose what to measure, then click points in the picture or in slices." : "");

@@ -21,7 +21,7 @@ export class Measuring {
   constructor(private readonly context: Context) {
     context.store.subscribe(() => this.changed(), ["measures", "dataset", "channels"]);
     this.time = context.store.state.time;
-    whenTimeRests(context.store, () => { this.time = context.store.state.time; this.changed(); });
+    whenTimeRests(context, () => { this.time = context.store.state.time; this.changed(); });
     context.onVolume(() => this.changed());
   }
 
@@ -109,7 +109,7 @@ export class Measuring {
   private answerTo(measure: Measure): Answer | null {
     const volume = this.context.volume(), { kind, points } = measure;
     if (!volume || this.context.store.state.time !== this.time) return null;
-    const source = { ...sourceOf(this.context.store.state), dataset: volume.name }, key = JSON.stringify([source, kind, points]), known = this.answers.get(key);
+    const source = { ...sourceOf(this.context.offers, this.context.store.state), dataset: volume.name }, key = JSON.stringify([source, kind, points]), known = this.answers.get(key);
     if (known !== undefined) return known;
     this.answers.set(key, null);
     const { api } = this.context;

@@ -1,6 +1,7 @@
 // The window for a movie of one turn, which the gateway makes while the page reads it.
-import { type Api, ApiError, type Options } from "./api";
+import { ApiError, type Options } from "./api";
 import { annotationFields } from "./annotation_fields";
+import type { Context } from "./context";
 import { button, row, segmented } from "./controls";
 import { dialog } from "./dialogs";
 import { bytes, copyText, download, h } from "./dom";
@@ -37,7 +38,7 @@ class FrameCounter {
 }
 
 // `front`: where a movie begins unless it is to begin at the present view; null: the dataset has no front.
-export function movieDialog(state: State, api: Api, width: number, height: number, front: Partial<State> | null): void {
+export function movieDialog({ store: { state }, offers, api, element }: Context, width: number, height: number, front: Partial<State> | null): void {
   const field = (label: string, value: number, low: number, high: number): HTMLInputElement => h("input", { type: "number", min: low, max: high, step: 1, required: true, value, "aria-label": label });
   const shrink = Math.min(1, Math.sqrt(MOST_PIXELS / (width * height)));
   const w = field("Width in pixels", even(width * shrink), 16, 4096), t = field("Height in pixels", even(height * shrink), 16, 4096);
@@ -51,17 +52,17 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   const cancel = button("Cancel", null, () => running?.abort(), "quiet");
   cancel.hidden = true;
   const length = (): string => `${frames.value} frames, ${Math.round((10 * Number(frames.value)) / Number(fps.value)) / 10} s`;
-  const marks = annotationFields(state);
+  const marks = annotationFields(offers, state);
   // One turn, from the front or from here, or the way through the key frames.
   const ways = [...(front ? [["front", "A turn from the front"] as const] : []), ["view", "A turn from here"] as const, ...(state.path.length > 1 ? [["path", `${state.path.length} key frames`] as const] : [])];
   let way: string = state.path.length > 1 ? "path" : front ? "front" : "view";
   const start = segmented("Way", ways, value => { way = value; });
   start.set(way);
   const view = (): Options => {
-    const options = renderOptions(way === "front" ? { ...state, ...front } : state);
+    const options = renderOptions(offers, way === "front" ? { ...state, ...front } : state);
     if (way !== "path") return options;
     for (const name of CAMERA) delete options[name];
-    return { ...options, path: pathOf(state) };
+    return { ...options, path: pathOf(offers, state) };
   };
   const options = (): Options => ({ ...view(), ...marks.options(), size: `${w.value}x${t.value}` });
 
@@ -106,5 +107,5 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
     h("div", { class: "size-row" }, frames, h("span", {}, "frames,"), fps, h("span", {}, "a second")),
     ...(ways.length > 1 ? [row("Way", start.element)] : []), ...marks.elements, bar, status, help, h("div", { class: "dialog-actions" }, cancel, save));
-  dialog("Movie", form).addEventListener("close", () => running?.abort());
+  dialog(element, "Movie", form).addEventListener("close", () => running?.abort());
 }

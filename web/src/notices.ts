@@ -1,6 +1,6 @@
 // What the page says over the picture: what is wrong, what is loading, and short messages.
 import { h, put, putText } from "./dom";
-import type { Connection, Progress, ServiceStatus } from "./session";
+import type { Progress, Reached, ServiceStatus } from "./session";
 
 const MESSAGE_MS = 5000;
 const SLOW_MS = 400;
@@ -12,7 +12,7 @@ export class Notices {
   readonly progress = h("div", { class: "progress", role: "progressbar", "aria-label": "Loading", hidden: true }, h("div", { class: "progress-track" }, this.bar), this.doing);
   readonly messages = h("div", { class: "messages", role: "status", "aria-live": "polite" });
   readonly status = h("output", { class: "status", "aria-live": "off" });
-  private connection: Connection = "connecting";
+  private connection: Reached = "connecting";
   private everOpen = false;
   private reason = "";
   private service: ServiceStatus | null = null;
@@ -29,7 +29,7 @@ export class Notices {
     setTimeout(() => element.remove(), kind === "error" ? 2 * MESSAGE_MS : MESSAGE_MS);
   }
 
-  onConnection(connection: Connection, reason: string): void {
+  onConnection(connection: Reached, reason: string): void {
     if (connection === "open") { this.everOpen = true; this.reason = ""; }
     else if (reason) this.reason = reason;
     if (connection !== "connecting" || this.connection === "open") this.connection = connection; // while it tries again it stays lost

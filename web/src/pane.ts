@@ -1,5 +1,6 @@
 // A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
 import { Drawing } from "./annotations";
+import type { Api } from "./api";
 import { h, put } from "./dom";
 import { LevelBadge } from "./level_badge";
 import { type Frame, Session, type SessionEvents, type View } from "./session";
@@ -24,12 +25,12 @@ export class Pane {
   private size: [number, number] = [0, 0]; // pixels of the screen
   private exact: [number, number] | null = null; // the same as the browser rounds it, where it tells
 
-  constructor(name: string, label: string, token: string, private readonly events: PaneEvents) {
+  constructor(name: string, label: string, api: Api, private readonly events: PaneEvents) {
     this.canvas.setAttribute("tabindex", "0");
     this.canvas.setAttribute("role", "application");
     this.canvas.setAttribute("aria-label", label);
     this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing.element, this.level.element);
-    this.session = new Session(token, { ...events, frame: frame => this.draw(frame) });
+    this.session = new Session(api, { ...events, frame: frame => this.draw(frame) });
     this.watcher = new ResizeObserver(entries => {
       const exact = entries[entries.length - 1]?.devicePixelContentBoxSize?.[0];
       this.exact = exact ? [exact.inlineSize, exact.blockSize] : null;
@@ -87,7 +88,7 @@ export class Pane {
     this.events.drawn?.(this.shown);
     // For whoever embeds or measures the page.
     this.canvas.dispatchEvent(new CustomEvent("slabstream:drawn", {
-      bubbles: true,
+      bubbles: true, composed: true,
       detail: { pane: this.element.dataset["pane"], header, seq: header.seq, final: header.final, options: frame.view.options, inputAt: frame.view.inputAt, drawnAt: performance.now() },
     }));
   }

@@ -3,7 +3,6 @@ import { NAMES, type Options } from "./api";
 import type { Context } from "./context";
 import { choice, iconButton } from "./controls";
 import { h, icon, put, putText } from "./dom";
-import { shownDataset } from "./offers";
 import { LAST, numberOf, timeOptions, timesOf, timeText } from "./times";
 import { clamp } from "./vec";
 
@@ -32,15 +31,16 @@ export class Player {
     context.onVolume(() => this.refresh());
     context.store.subscribe(() => this.refresh(), ["time"]);
     context.store.subscribe(() => this.pause(), ["dataset"]);
-    document.addEventListener("visibilitychange", () => { if (this.playing) this.begin(); });
+    document.addEventListener("visibilitychange", () => { if (this.playing) this.begin(); }, { signal: context.ended });
+    context.ended.addEventListener("abort", () => this.pause());
   }
 
   get present(): boolean { return this.count > 1; }
-  private get count(): number { return timesOf(shownDataset()).count; }
+  private get count(): number { return timesOf(this.context.offers.dataset).count; }
   private get loops(): boolean { return this.loop.getAttribute("aria-pressed") === "true"; }
   private get isLive(): boolean { return this.context.store.state.time === LAST; }
   private get number(): number {
-    const dataset = shownDataset();
+    const { dataset } = this.context.offers;
     return dataset ? numberOf(this.context.store.state.time, dataset) ?? dataset.time ?? 0 : 0;
   }
 
@@ -66,11 +66,11 @@ export class Player {
 
   // A picture of the 3-D view is there.
   drawn(options: Options): void {
-    if (this.playing && options[NAMES.time] === timeOptions(this.context.store.state)[NAMES.time] && this.number === this.wanted) this.next();
+    if (this.playing && options[NAMES.time] === timeOptions(this.context.offers, this.context.store.state)[NAMES.time] && this.number === this.wanted) this.next();
   }
 
   refresh(): void {
-    const times = timesOf(shownDataset()), { number } = this;
+    const times = timesOf(this.context.offers.dataset), { number } = this;
     put(this.element, "hidden", !this.present);
     if (!this.present) return;
     put(this.slider, "max", String(times.count - 1));

@@ -22,8 +22,8 @@ export class Pointed {
     this.cancel();
     if (!at) return this.say("");
     this.say(this.position(at));
-    const { state } = this.context.store;
-    this.later(signal => this.context.api.value({ ...sourceOf(state), [NAMES.field]: shownKeys(state).join(",") }, at, signal));
+    const { offers, store: { state } } = this.context;
+    this.later(signal => this.context.api.value({ ...sourceOf(offers, state), [NAMES.field]: shownKeys(offers, state).join(",") }, at, signal));
   }
 
   // In the 3-D picture it is picked, at a point of the page's pixels.
@@ -39,7 +39,7 @@ export class Pointed {
 
   pick(pane: Shown, x: number, y: number, signal?: AbortSignal): Promise<Value | null> {
     const [width, height] = pane.frame.header.size, up = width / pane.cssWidth;
-    return this.context.api.pick({ ...renderOptions(this.context.store.state), size: `${width}x${height}` }, rounded(x * up), rounded(y * up), signal);
+    return this.context.api.pick({ ...renderOptions(this.context.offers, this.context.store.state), size: `${width}x${height}` }, rounded(x * up), rounded(y * up), signal);
   }
 
   clear(): void { this.cancel(); this.say(""); }

@@ -4,7 +4,6 @@ import type { Context } from "./context";
 import { button, colorField, iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
-import { can, hasRegions, rendererThatCan, turnTo } from "./offers";
 import { PLOT } from "./plot";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { drawPlot, edge, jointImage, outline, RegionScale } from "./region_plot";
@@ -91,10 +90,10 @@ export class RegionEditor {
   }
 
   refresh(map: ColorMap): void {
-    const regions = map.regions ?? [], on = regions.length > 0, able = can("regions", this.context.store.state.renderer);
+    const regions = map.regions ?? [], on = regions.length > 0, able = this.context.offers.can("regions", this.context.store.state.renderer);
     this.on.set(on);
     this.element.hidden = this.hint.hidden = !on;
-    this.switch.hidden = !on && rendererThatCan("regions") === "";
+    this.switch.hidden = !on && this.context.offers.rendererThatCan("regions") === "";
     this.hint.textContent = able ? `Gradients run upwards, in ${slopeUnit(this.context.volume())}. A double click on an edge adds a corner.` : "Only ray casting shows regions. The picture shows the automatic function instead.";
     if (!on) return;
     this.ask();
@@ -163,11 +162,11 @@ export class RegionEditor {
   }
 
   private turn(on: boolean): void {
-    const { store } = this.context, { map, preset, renderer } = store.state;
+    const { store, offers } = this.context, { map, preset, renderer } = store.state;
     this.selected = { region: 0, corner: 0, whole: true };
-    if (on) return store.update({ map: { ...(map ? this.source.current() : { colors: [], opacities: [] }), name: map?.name ?? "by value and gradient", regions: this.start() }, range: null, ...turnTo("regions", renderer) }, "by value and gradient");
+    if (on) return store.update({ map: { ...(map ? this.source.current() : { colors: [], opacities: [] }), name: map?.name ?? "by value and gradient", regions: this.start() }, range: null, ...offers.turnTo("regions", renderer) }, "by value and gradient");
     const { regions: _, ...curves } = map ?? this.source.current();
-    store.update({ ...(curves.colors.length > 0 ? { map: curves } : { map: null, preset: hasRegions(preset) ? "auto" : preset }), range: null }, "by value and gradient");
+    store.update({ ...(curves.colors.length > 0 ? { map: curves } : { map: null, preset: offers.hasRegions(preset) ? "auto" : preset }), range: null }, "by value and gradient");
   }
 
   // Borders of what is bright, and a veil of what is less so.

@@ -9,10 +9,12 @@ const ATTEMPTS = 6, PAUSE_MS = 1000;
 export class Sending {
   private readonly text = h("span", {});
   private readonly bar = h("progress", { max: 1, value: 0, "aria-label": "How much of the file is sent" });
-  readonly element = h("div", { class: "sending", role: "status", hidden: true }, this.text, this.bar, button("Cancel", null, () => this.running?.abort(), "quiet"));
+  readonly element = h("div", { class: "sending", role: "status", hidden: true }, this.text, this.bar, button("Cancel", null, () => this.cancel(), "quiet"));
   private running: AbortController | null = null;
 
   constructor(private readonly api: Api, private readonly say: (message: string, kind?: "note" | "error") => void, private readonly show: (dataset: string) => void) {}
+
+  cancel(): void { this.running?.abort(); }
 
   async send(file: File): Promise<void> {
     if (this.running) return this.say("Another file is being sent.", "error");

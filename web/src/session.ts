@@ -1,5 +1,6 @@
-// One stream of pictures: a WebSocket of docs/http.md with one view that changes. It connects again by itself.
-import type { Dataset, Options } from "./api";
+// One stream of pictures of docs/http.md, with one view that changes. It connects again by itself.
+import type { Api, Dataset, Options } from "./api";
+import type { Stream } from "./connection";
 import type { Vec3 } from "./vec";
 
 export interface Geometry {
@@ -29,7 +30,7 @@ export interface Progress { seq: number; phase: "queued" | "loading" | "running"
 export interface View { picture: "render" | "slice"; timeline: boolean; options: Options }
 export interface SentView extends View { seq: number; inputAt: number } // inputAt: of the oldest input that it shows, as performance.now()
 export interface Frame { header: FrameHeader; view: SentView; picture: ImageBitmap | null }
-export type Connection = "connecting" | "open" | "lost";
+export type Reached = "connecting" | "open" | "lost";
 
 export interface SessionEvents {
   // Draws the picture. It is acknowledged when the promise is kept.
@@ -37,7 +38,7 @@ export interface SessionEvents {
   status?(status: ServiceStatus): void;
   progress?(progress: Progress): void;
   error?(message: string): void;
-  connection?(state: Connection, reason: string): void;
+  connection?(state: Reached, reason: string): void;
 }
 
 const RETRY_MS = [250, 500, 1000, 2000, 4000];
@@ -47,7 +48,7 @@ const SILENCE_MS = 4000, LOOK_MS = 500, LEAST_BYTES_A_MS = 100;
 const KEPT_VIEWS = 256;
 
 export class Session {
-  private socket: WebSocket | null = null;
+  private stream: Stream | null = null;
   private seq = 0;
   private attempts = 0;
   private timer = 0;
@@ -59,24 +60,25 @@ export class Session {
   private lookedAt = 0;
   private readonly looking: number;
 
-  constructor(private readonly token: string, private readonly events: SessionEvents) {
+  constructor(private readonly api: Api, private readonly events: SessionEvents) {
     this.connect();
     this.looking = setInterval(() => this.look(), LOOK_MS);
     addEventListener("online", this.retryNow);
     document.addEventListener("visibilitychange", this.retryNow);
+    api.ended.addEventListener("abort", this.end);
   }
 
   // The latest view wins; one that equals the last one is not sent.
   show(view: View, inputAt = performance.now()): void {
     this.wanted = view;
-    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    if (!this.stream?.isOpen) return;
     const text = JSON.stringify(view);
     if (text === this.lastSent) return;
     this.lastSent = text;
     const seq = ++this.seq;
     this.sent.set(seq, { ...view, seq, inputAt });
     if (this.sent.size > KEPT_VIEWS) this.sent.delete(this.sent.keys().next().value as number);
-    this.socket.send(JSON.stringify({ type: "view", seq, ...view }));
+    this.stream.send(JSON.stringify({ type: "view", seq, ...view }));
   }
 
   // The same view, of a dataset that has another time now.
@@ -85,17 +87,18 @@ export class Session {
     if (this.wanted) this.show(this.wanted);
   }
 
-  end(): void {
+  readonly end = (): void => {
     this.ended = true;
     clearTimeout(this.timer);
     clearInterval(this.looking);
     removeEventListener("online", this.retryNow);
     document.removeEventListener("visibilitychange", this.retryNow);
-    this.socket?.close();
-  }
+    this.api.ended.removeEventListener("abort", this.end);
+    this.stream?.close();
+  };
 
   private readonly retryNow = (): void => {
-    if (this.ended || document.hidden || this.socket) return;
+    if (this.ended || document.hidden || this.stream) return;
     clearTimeout(this.timer);
     this.connect();
   };
@@ -106,32 +109,27 @@ export class Session {
   private look(): void {
     const now = performance.now(), late = now - this.lookedAt > 4 * LOOK_MS;
     this.lookedAt = now;
-    const { socket } = this;
-    if (!socket || now < this.silentAt) return;
+    const { stream } = this;
+    if (!stream || now < this.silentAt) return;
     if (late) { this.silentAt = now + 2 * LOOK_MS; return; }
-    this.lose(socket, "");
-    socket.close();
+    this.lose(stream, "");
+    stream.close();
   }
 
-  private lose(socket: WebSocket, reason: string): void {
-    if (this.socket !== socket) return;
-    this.socket = null;
+  private lose(stream: Stream, reason: string): void {
+    if (this.stream !== stream) return;
+    this.stream = null;
     if (this.ended) return;
     this.events.connection?.("lost", reason);
     this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
   }
 
   private connect(): void {
-    const address = new URL("api/v1/view", location.href);
-    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-    address.hash = address.search = "";
     this.events.connection?.("connecting", "");
-    const socket = new WebSocket(address, ["slabstream.view.v1", `slabstream.token.${this.token}`]);
-    socket.binaryType = "arraybuffer";
-    this.socket = socket;
+    const stream = this.stream = this.api.connection.open();
     this.heard();
-    socket.onopen = () => {
-      if (this.socket !== socket) return;
+    stream.onopen = () => {
+      if (this.stream !== stream) return;
       this.heard();
       this.attempts = 0;
       this.seq = 0;
@@ -140,13 +138,13 @@ export class Session {
       this.events.connection?.("open", "");
       if (this.wanted) this.show(this.wanted);
     };
-    socket.onmessage = event => {
-      if (this.socket !== socket) return;
+    stream.onmessage = data => {
+      if (this.stream !== stream) return;
       this.heard();
-      if (typeof event.data === "string") this.onText(event.data);
-      else void this.onPicture(socket, event.data as ArrayBuffer);
+      if (typeof data === "string") this.onText(data);
+      else void this.onPicture(stream, data);
     };
-    socket.onclose = event => this.lose(socket, event.reason);
+    stream.onclose = reason => this.lose(stream, reason);
   }
 
   private onText(text: string): void {
@@ -157,17 +155,17 @@ export class Session {
     else if (message.type === "error" && message.seq === this.seq) this.events.error?.(message.error ?? "");
   }
 
-  private async onPicture(socket: WebSocket, message: ArrayBuffer): Promise<void> {
+  private async onPicture(stream: Stream, message: ArrayBuffer): Promise<void> {
     const n = new DataView(message).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, n))) as FrameHeader;
     const view = this.sent.get(header.seq);
     const empty = header.bounds[2] === 0;
     // The pixels as they are: no profile of the screen's colours, which would change them.
     const picture = empty ? null : await createImageBitmap(new Blob([new Uint8Array(message, 4 + n)], { type: header.type }), { colorSpaceConversion: "none" });
-    if (this.socket !== socket) return picture?.close();
+    if (this.stream !== stream) return picture?.close();
     for (const seq of this.sent.keys()) if (seq < header.seq) this.sent.delete(seq);
     if (view) this.events.frame({ header, view, picture });
     picture?.close();
-    if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ type: "ack", frame: header.frame }));
+    if (stream.isOpen) stream.send(JSON.stringify({ type: "ack", frame: header.frame }));
   }
 }

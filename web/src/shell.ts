@@ -1,11 +1,11 @@
-// The frame of the page: the bar above, the stage with the pictures, the panel beside it.
+// The frame of a viewer: the bar above, the stage with the pictures, the panel beside it.
 import type { Dataset } from "./api";
 import { button, choice, iconButton, menu, menuItem } from "./controls";
 import { h, put } from "./dom";
 
 export interface Actions {
   dataset(name: string): void; open(): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
-  copyLink(withToken: boolean): void; command(): void; screenshot(): void; movie(): void; projection(): void;
+  copyLink: ((withToken: boolean) => void) | null; command(): void; screenshot(): void; movie(): void; projection(): void;
 }
 
 // In the list of datasets: its name, and what is known of its size.
@@ -15,7 +15,7 @@ function entryText({ name, size, levels }: Dataset): string {
 }
 
 export class Shell {
-  readonly stage = h("main", { class: "stage", "aria-label": "Pictures" });
+  readonly stage: HTMLElement;
   readonly panes = h("div", { class: "panes" });
   readonly panel = h("aside", { class: "panel", "aria-label": "Settings", id: "panel" });
   private readonly datasets = choice("Dataset", [], name => this.actions.dataset(name));
@@ -24,8 +24,10 @@ export class Shell {
   private readonly panelButton: HTMLButtonElement;
   private names = "";
 
-  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, player: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
-    const views = iconButton("Views", "views", () => undefined);
+  // `isPage`: the viewer is all that the page has, so it has the page's landmarks.
+  constructor(element: HTMLElement, isPage: boolean, private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, player: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
+    this.stage = h(isPage ? "main" : "div", { class: "stage", role: isPage ? null : "group", "aria-label": "Pictures" });
+    const { copyLink } = actions, views = iconButton("Views", "views", () => undefined);
     const share = button("Share", "link", () => undefined, "share");
     this.layoutButtons = [iconButton("One picture", "single", () => actions.layout(false), "L"), iconButton("With slices", "quad", () => actions.layout(true), "L")];
     this.machineButton = iconButton("Machine panel", "machine", actions.machine, "M");
@@ -33,18 +35,18 @@ export class Shell {
     for (const each of this.layoutButtons) each.classList.add("layout-button"); // a narrow page has them in menus
     this.machineButton.classList.add("machine-button");
     this.panelButton.setAttribute("aria-controls", "panel");
-    const header = h("header", { class: "bar" }, h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element, iconButton("Open a file", "open", actions.open, "F"),
+    const header = h(isPage ? "header" : "div", { class: "bar" }, isPage && h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element, iconButton("Open a file", "open", actions.open, "F"),
       h("div", { class: "group", role: "group", "aria-label": "View" },
         menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection), menuItem("Slices beside the picture", "L", () => actions.layout(this.panes.dataset["layout"] !== "quad")), menuItem("Machine panel", "M", actions.machine)]),
         iconButton("Reset the view", "reset", actions.reset, "R")),
       h("div", { class: "group", role: "group", "aria-label": "Layout" }, ...this.layoutButtons, this.machineButton),
       h("span", { class: "space" }), readout, status,
       h("div", { class: "group", role: "group", "aria-label": "Page" },
-        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie), menuItem("Help", "?", actions.help)]),
+        menu(share, "Share", () => [...(copyLink ? [menuItem("Copy link", "C", () => copyLink(false)), menuItem("Copy link with access", "", () => copyLink(true))] : []), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie), menuItem("Help", "?", actions.help)]),
         iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
     this.datasets.element.classList.add("dataset");
     this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, sending, messages), player, machine);
-    document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
+    element.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
   }
 
   showDatasets(list: readonly Dataset[], current: string): void {
@@ -66,21 +68,5 @@ export class Shell {
   setPanel(open: boolean): void {
     this.panel.hidden = !open;
     this.panelButton.setAttribute("aria-expanded", String(open));
-    document.body.dataset["panel"] = open ? "open" : "closed";
   }
-}
-
-// ---- light and dark
-
-const KEPT = "slabstream.theme";
-const kept = (): string | null => { try { return localStorage.getItem(KEPT); } catch { return null; } };
-
-export function applyTheme(): void {
-  const theme = kept() ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
-  document.documentElement.dataset["theme"] = theme;
-}
-
-export function switchTheme(): void {
-  try { localStorage.setItem(KEPT, document.documentElement.dataset["theme"] === "dark" ? "light" : "dark"); } catch { /* it holds for this visit */ }
-  document.documentElement.dataset["theme"] = document.documentElement.dataset["theme"] === "dark" ? "light" : "dark";
 }

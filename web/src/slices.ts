@@ -44,20 +44,20 @@ export class Slices {
   parts(): Part[] {
     const { state } = this.context.store;
     return this.slices.map(({ pane, plane, name }) => ({
-      name: plane, title: `${name} slice`, view: { picture: "slice", timeline: false, options: sliceOptions(state, plane, this.at()) },
+      name: plane, title: `${name} slice`, view: { picture: "slice", timeline: false, options: sliceOptions(this.context.offers, state, plane, this.at()) },
       marks: { marker: false, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: [], slice: this.plane(pane) },
     }));
   }
 
   private plane({ shown }: Pane): { at: Vec3; half: number } { return { at: this.at(), half: shown ? 0.51 * this.spacingAlong(shown.frame.header.geometry.forward) : 0 }; }
 
-  private end(): void {
+  end(): void {
     for (const { pane } of this.slices) pane.end();
     this.slices = [];
   }
 
   private make(plane: string, name: string): Slice {
-    const pane = new Pane(plane, `${name} slice. Arrow keys move the cross-hair, Page Up and Page Down the slice.`, this.context.api.token, {
+    const pane = new Pane(plane, `${name} slice. Arrow keys move the cross-hair, Page Up and Page Down the slice.`, this.context.api, {
       drawn: () => this.annotate(slice), resized: () => this.show(slice), error: message => this.context.say(`${name}: ${message}`, "error"),
     });
     const slice: Slice = { pane, plane, name };
@@ -68,7 +68,7 @@ export class Slices {
   }
 
   private show({ pane, plane }: Slice, inputAt?: number): void {
-    pane.show({ picture: "slice", timeline: false, options: sliceOptions(this.context.store.state, plane, this.at()) }, inputAt);
+    pane.show({ picture: "slice", timeline: false, options: sliceOptions(this.context.offers, this.context.store.state, plane, this.at()) }, inputAt);
   }
 
   private annotate({ pane }: Slice): void {
@@ -126,6 +126,7 @@ export class Slices {
     canvas.addEventListener("pointerleave", () => this.hover(null));
     canvas.addEventListener("contextmenu", event => event.preventDefault());
     canvas.addEventListener("wheel", event => {
+      if (!this.context.takesWheel()) return;
       event.preventDefault();
       if (pane.shown && event.deltaY !== 0) this.moveBy(pane.shown.frame.header.geometry.forward, Math.sign(event.deltaY), event.timeStamp);
     }, { passive: false });
@@ -144,7 +145,7 @@ export class Slices {
   // Window and level of the slices: dragging to the right widens, upwards brightens.
   private window(widen: number, raise: number): void {
     const { store } = this.context, volume = this.context.volume() as Volume, [low, high] = volume.range;
-    if (!takesFunction(store.state)) return this.ranges.window(widen, raise);
+    if (!takesFunction(this.context.offers, store.state)) return this.ranges.window(widen, raise);
     const window = store.state.window ?? (high - low) * 0.8, level = store.state.level ?? (low + high) / 2;
     store.update({ window: rounded(Math.max(window * Math.exp(2 * widen), (high - low) * 1e-3), 4), level: rounded(level - raise * window, 4) }, "slice window");
   }

@@ -3,13 +3,13 @@ import { takesFunction } from "./channels";
 import { type Context, follow } from "./context";
 import { choice, numberField, optionalField, section } from "./controls";
 import { h } from "./dom";
-import { namedWindows, words } from "./offers";
+import { words } from "./offers";
 import { AXES, AXIS_NAMES, clamp, withAxis } from "./vec";
 
 const AUTOMATIC = "auto", OWN = "own", NO_WINDOW = { window: null, level: null };
 
 export function slicesSection(context: Context): HTMLElement {
-  const { store } = context;
+  const { store, offers } = context;
   const at = AXES.map(axis => numberField(`Cross-hair, ${AXIS_NAMES[axis]}`, value => {
     const volume = context.volume();
     if (volume) store.update({ crosshair: withAxis(store.state.crosshair ?? volume.centre, axis, clamp(value, volume.low[axis], volume.high[axis])) });
@@ -18,7 +18,7 @@ export function slicesSection(context: Context): HTMLElement {
   const window = optionalField("Window of the slices", value => { if (value === null || value > 0) store.update(value === null ? NO_WINDOW : { window: value, level: store.state.level ?? (range()[0] + range()[1]) / 2 }, "slice window"); });
   const level = optionalField("Level of the slices", value => store.update(value === null ? NO_WINDOW : { level: value, window: store.state.window ?? Math.max(range()[1] - range()[0], 1e-6) }, "slice level"));
   const preset = choice("Window for", [], value => {
-    const chosen = namedWindows().find(each => each.name === value);
+    const chosen = offers.namedWindows.find(each => each.name === value);
     if (value !== OWN) store.update({ window: chosen?.width ?? null, level: chosen?.level ?? null }, "slice preset");
   });
   preset.element.title = "Hounsfield units, of CT";
@@ -29,10 +29,10 @@ export function slicesSection(context: Context): HTMLElement {
   const update = (): void => {
     const { state } = store, volume = context.volume();
     element.hidden = state.layout !== "quad" || !volume;
-    preset.element.hidden = windowFields.hidden = !takesFunction(state);
+    preset.element.hidden = windowFields.hidden = !takesFunction(offers, state);
     if (!volume) return;
-    const named = namedWindows().find(each => each.width === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
-    preset.fill([AUTOMATIC, ...namedWindows().map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
+    const named = offers.namedWindows.find(each => each.width === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
+    preset.fill([AUTOMATIC, ...offers.namedWindows.map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
     preset.set(named);
     at.forEach((each, i) => each.set((state.crosshair ?? volume.centre)[i] as number));
     window.set(state.window);

@@ -1,4 +1,4 @@
-// What the page shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
+// What a viewer shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
 import { PATIENT_START, type Viewpoint } from "./camera";
 import type { Measure } from "./measure";
 import type { ColorMap } from "./transfer";
@@ -65,7 +65,7 @@ export interface State extends Viewpoint {
   machine: boolean;
 }
 
-// `renderer`: the gateway's default.
+// `renderer`: the gateway's default stands in its place (link.ts).
 export const INITIAL: State = {
   dataset: "",
   ...PATIENT_START, roll: 0, zoom: 1, lookAt: null, projection: "orthographic",

@@ -1,7 +1,7 @@
 // The times of the dataset that is shown: which one a state means, and how it is called.
 import { type Dataset, NAMES, type Times } from "./api";
 import { shown } from "./dom";
-import { shownDataset } from "./offers";
+import type { Offers } from "./offers";
 import type { State, Store } from "./state";
 
 const REST_MS = 1200; // longer than a time shows while it is played
@@ -20,17 +20,16 @@ export function numberOf(time: string, dataset: Dataset): number | null {
   return Number.isInteger(number) && number >= 0 && number < count ? number : null;
 }
 
-export function timeOptions({ time }: State): Record<string, string> {
-  const dataset = shownDataset();
+export function timeOptions({ dataset }: Offers, { time }: State): Record<string, string> {
   if (time === "" || (dataset && timesOf(dataset).count < 2)) return {};
   const number = dataset && numberOf(time, dataset);
   return dataset && number === null ? {} : { [NAMES.time]: number === null ? time : String(number) };
 }
 
 // Tells when the time has stood still for a while: of times that are played nobody asks more than their picture.
-export function whenTimeRests(store: Store, tell: () => void): void {
+export function whenTimeRests({ store, ended }: { store: Store; ended: AbortSignal }, tell: () => void): void {
   let timer = 0;
-  store.subscribe(() => { clearTimeout(timer); timer = setTimeout(tell, REST_MS); }, ["time"]);
+  store.subscribe(() => { clearTimeout(timer); timer = setTimeout(() => { if (!ended.aborted) tell(); }, REST_MS); }, ["time"]);
 }
 
 // In the file's unit, or else its number.

@@ -7,7 +7,6 @@ import { copyText, download, h, put, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import type { Histograms } from "./histograms";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
-import { hasRegions, presetChoices, turnTo } from "./offers";
 import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { RegionEditor } from "./region_editor";
 import { LOOK } from "./state";
@@ -80,8 +79,8 @@ export class TransferEditor {
   }
 
   refresh(): void {
-    const { state } = this.context.store, map = this.source.current(), custom = state.map !== null, { pending } = this.source;
-    this.presets.fill([...presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
+    const { offers, store: { state } } = this.context, map = this.source.current(), custom = state.map !== null, { pending } = this.source;
+    this.presets.fill([...this.context.offers.presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
     this.presets.set(custom ? "" : state.preset);
     for (const part of [this.frame, this.pointFields, this.addButton, this.removeButton]) part.hidden = map.regions !== undefined;
     for (const part of [this.pointFields, this.stretchFields]) put(part, "data-pending", pending);
@@ -89,7 +88,7 @@ export class TransferEditor {
     else if (!map.regions) this.drawCurves(map);
     this.regions.refresh(map);
     this.regions.switch.hidden = pending;
-    this.note.textContent = pending ? "The function shows once the dataset is read." : this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : takesFunction(state) && !this.source.shows && channels()?.length ? "The channel has its colour. A function that you choose or change here takes its place." : "";
+    this.note.textContent = pending ? "The function shows once the dataset is read." : this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : takesFunction(offers, state) && !this.source.shows && channels(offers)?.length ? "The channel has its colour. A function that you choose or change here takes its place." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
     this.low.set(low);
@@ -123,7 +122,7 @@ export class TransferEditor {
     this.drawPoints(map, scale, stripY);
   }
 
-  private get histogram(): Histogram | null { return this.histograms.of(sourceOf(this.context.store.state)); }
+  private get histogram(): Histogram | null { return this.histograms.of(sourceOf(this.context.offers, this.context.store.state)); }
 
   private scale(map: ColorMap): Scale {
     const volume = this.context.volume(), [low, high] = rangeOf(map);
@@ -165,7 +164,7 @@ export class TransferEditor {
   // ---- changing
 
   private edit(map: ColorMap, gesture: string): void { if (!this.source.pending) this.source.edit(map, gesture); }
-  private rendererFor(regions: boolean): { renderer?: string } { return regions ? turnTo("regions", this.context.store.state.renderer) : {}; }
+  private rendererFor(regions: boolean): { renderer?: string } { return regions ? this.context.offers.turnTo("regions", this.context.store.state.renderer) : {}; }
 
   private moveTo(x: number | null, y: number | null): void {
     const map = this.source.current(), { kind, index } = this.selected, list = this.listOf(map, kind);
@@ -205,7 +204,7 @@ export class TransferEditor {
   }
 
   private choosePreset(preset: string): void {
-    if (preset) this.context.store.update({ preset, map: null, range: null, ...this.rendererFor(hasRegions(preset)) }, "preset");
+    if (preset) this.context.store.update({ preset, map: null, range: null, ...this.rendererFor(this.context.offers.hasRegions(preset)) }, "preset");
   }
 
   stretch(low: number, high: number): void {

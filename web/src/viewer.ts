@@ -9,7 +9,6 @@ import type { FunctionSource } from "./function_source";
 import { listenToGestures } from "./gestures";
 import type { Labels } from "./labels";
 import type { Measuring } from "./measuring";
-import { can } from "./offers";
 import { projectionOf, renderOptions } from "./options";
 import { Pane, type PaneEvents } from "./pane";
 import type { Pointed } from "./pointed";
@@ -29,7 +28,7 @@ export class Viewer {
   private changed = false; // since the last view was sent
 
   constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, private readonly measuring: Measuring, private readonly labels: Labels, private readonly ranges: ChannelRanges, events: PaneEvents) {
-    this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
+    this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api, {
       ...events, drawn: shown => { this.resolveFit(shown); this.annotate(); events.drawn?.(shown); }, resized: () => this.send(),
     });
     this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
@@ -44,6 +43,7 @@ export class Viewer {
     context.store.subscribe(() => this.later());
     context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "colorBar", "layout", "crosshair", "clipBox", "legend", "labels", "labelsShown", "labelOpacities"]); // else with the next picture
     listenToGestures(this.pane.canvas, {
+      takesWheel: context.takesWheel,
       state: () => context.store.state,
       pixelSize: () => this.pixelSize(),
       move: (patch, at) => this.move(patch, at),
@@ -51,7 +51,7 @@ export class Viewer {
       hover: (x, y) => pointed.atPixel(this.pane.shown, x, y, at => measuring.hover(at)),
       leave: () => pointed.clear(),
       place: (x, y) => { if (!measuring.tool) void this.place(x, y, crosshair => context.store.update({ crosshair, layout: "quad" })); },
-      click: (x, y) => { if (measuring.tool) void this.place(x, y, at => measuring.place(at)); },
+      click: (x, y) => { if (measuring.tool) void this.place(x, y, at => measuring.place(at)); else this.tell(x, y); },
     });
   }
 
@@ -78,11 +78,11 @@ export class Viewer {
   // function, such as clear air, moves with it.
   window(widen: number, raise: number, inputAt: number): void {
     const volume = this.context.volume();
-    if (volume && channels()?.length && !this.source.shows) {
+    if (volume && channels(this.context.offers)?.length && !this.source.shows) {
       this.inputAt ??= inputAt;
       return this.ranges.window(widen, raise);
     }
-    if (!volume || this.source.pending || !can("transfer", this.context.store.state.renderer)) return;
+    if (!volume || this.source.pending || !this.context.offers.can("transfer", this.context.store.state.renderer)) return;
     const [low, high] = this.source.range(), [from, to] = visibleRangeOf(this.source.current());
     const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], Number.MIN_VALUE);
     const width = Math.max((to - from) * Math.exp(1.5 * widen), least), middle = (from + to) / 2 - raise * (to - from);
@@ -108,7 +108,7 @@ export class Viewer {
   private send(): void {
     const { state } = this.context.store;
     if (!state.dataset) return;
-    this.pane.show({ picture: "render", timeline: state.machine, options: renderOptions(state) }, this.inputAt);
+    this.pane.show({ picture: "render", timeline: state.machine, options: renderOptions(this.context.offers, state) }, this.inputAt);
     this.inputAt = undefined;
   }
 
@@ -116,7 +116,7 @@ export class Viewer {
   private resolveFit({ frame: { header, view } }: Shown): void {
     const { state } = this.context.store, volume = this.context.volume();
     if (state.lookAt || !volume || view.options["fit"] !== true || view.options["dataset"] !== state.dataset || volume.name !== state.dataset) return;
-    if (view.options["projection"] !== projectionOf(state)) return;
+    if (view.options["projection"] !== projectionOf(this.context.offers, state)) return;
     const made = Number(view.options["zoom"] ?? 1);
     this.context.store.update({ lookAt: roundedPoint(header.geometry.target), zoom: rounded((zoomOf(header.geometry, header.size[0], header.size[1], volume.extent) * state.zoom) / made) });
   }
@@ -135,9 +135,15 @@ export class Viewer {
   // What the pane shows, for a file.
   part(): Part {
     return {
-      name: "3d", title: "3-D picture", view: { picture: "render", timeline: false, options: renderOptions(this.context.store.state) },
+      name: "3d", title: "3-D picture", view: { picture: "render", timeline: false, options: renderOptions(this.context.offers, this.context.store.state) },
       marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.legend(), bar: this.context.store.state.colorBar ? this.source.bar() : null },
     };
+  }
+
+  // Who embeds the viewer hears what was clicked at.
+  private tell(x: number, y: number): void {
+    const { picked } = this.context;
+    if (picked && this.pane.shown) this.pointed.pick(this.pane.shown, x, y).then(value => { if (value) picked(value); }).catch(() => undefined);
   }
 
   // Uses the point that a pixel shows.

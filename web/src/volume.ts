@@ -1,5 +1,5 @@
 // What the page knows of the dataset that it shows.
-import type { Dataset, Level } from "./api";
+import type { Api, Dataset, Level } from "./api";
 import { type Channel, channelsOf, hasOverlay, OVERLAY } from "./channels";
 import { Session } from "./session";
 import { add, rounded, scale, type Vec3 } from "./vec";
@@ -24,9 +24,9 @@ export function volumeOf(dataset: Dataset, centre: Vec3, world: string, unit: st
 }
 
 // Where the middle of a volume lies. The picture that tells it is small and not shown.
-export function centreOf(token: string, dataset: string): Promise<{ centre: Vec3; world: string; unit: string }> {
+export function centreOf(api: Api, dataset: string): Promise<{ centre: Vec3; world: string; unit: string }> {
   return new Promise((resolve, reject) => {
-    const session: Session = new Session(token, {
+    const session: Session = new Session(api, {
       frame: ({ header: { geometry } }) => { session.end(); resolve({ centre: geometry.target, world: geometry.world, unit: geometry.unit }); },
       error: message => { session.end(); reject(new Error(message)); },
     });
