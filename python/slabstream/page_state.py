@@ -30,6 +30,11 @@ _OF_PICTURES = {"size", "depth", "quality", "dpi", "title", "font_size"}
 _MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 _LOOKS = {"channel-transfer": "transfer", "channel-color": "color", "channel-range": "range", "channel-gamma": "gamma", "channel-opacity": "opacity"}
 
+#: What the page begins with, and so leaves out. What it leaves out is not said here either: it would correct it.
+_FIRST = {"roll": "0", "zoom": "1", "projection": "orthographic", "shading": "phong", "shadows": "0", "ambient-occlusion": "0", "transfer": "auto",
+          "opacity-distance": "1", "surfaces-alone": "1", "clip-mode": "keep", "label-tint": "0.5", "label-surface": "blocky", "overlay": "0",
+          "blend": "auto", "background": BACKGROUND, "legend": "1", "orientation-marker": "1", "scale-bar": "1", "color-bar": "0"}
+
 #: Of which names each property of a widget is made.
 PARTS: dict[str, tuple[str, ...]] = {
     "camera": tuple(name.replace("_", "-") for name in _CAMERA), "transfer": ("transfer", "function"), "scalar_range": ("scalar-range",),
@@ -184,7 +189,7 @@ def texts_of(draft: Draft, options: Mapping[str, Any]) -> Texts:
         found["background"] = _hex(*draft.format.background[:3])
     for name in given & set(_FLAGS):
         found[name.replace("_", "-")] = "0" if getattr(annotations, name) in (False, None) else "1"
-    return found
+    return {name: text for name, text in found.items() if _FIRST.get(name) != text}
 
 
 # ---- to options
@@ -300,7 +305,9 @@ def options_of(state: Mapping[str, str], dataset: Dataset | None = None) -> dict
             found.pop(name, None)
     elif "isovalue" in found:
         found.setdefault("transfer", "auto")
-    if found.get("label_mode", "off") == "off":
+    if found.get("label_mode", "off") != "off":
+        found.setdefault("label_tint", _FIRST["label-tint"])  # it is another one than the service's
+    else:
         for name in _LABELS:
             found.pop(name, None)
     own = {name: found[name] for name in _TRANSFER if name in found}

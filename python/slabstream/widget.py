@@ -6,15 +6,18 @@ channel (relay.py), so no second port is needed.
 from __future__ import annotations
 
 import base64
+import contextlib
 import dataclasses
 import functools
+import html
+import uuid
 from typing import Any, Callable, Mapping, Sequence
 
 import anywidget
 import traitlets
 from ipywidgets import CallbackDispatcher
 
-from .errors import InvalidArgument, SlabstreamError
+from .errors import InvalidArgument, SlabstreamError, warn
 from .frame import Frame
 from .gateway import Gateway
 from .image import Image
@@ -23,6 +26,7 @@ from .probe import Sample
 from .relay import Relay
 from .viewer import Viewer
 
+STILL = "{}: a still picture. Run the cell to turn it."
 _STILL_SECONDS = 10.0  # that a cell waits for its still picture
 _CAMERA_FIELDS = [field.name for field in dataclasses.fields(Camera)]
 
@@ -51,6 +55,7 @@ class Widget(anywidget.AnyWidget):
     """
 
     _esm = traitlets.Unicode().tag(sync=True)
+    _css = traitlets.Unicode().tag(sync=True)
     _address = traitlets.Unicode().tag(sync=True)
     _state = traitlets.Dict().tag(sync=True)
     _height = traitlets.Unicode().tag(sync=True)
@@ -70,7 +75,8 @@ class Widget(anywidget.AnyWidget):
         self._picked, self._failed = CallbackDispatcher(), CallbackDispatcher()
         self._relay = Relay(viewer.gateway, lambda message, buffers: self.send(message, list(buffers)), self._find_address)
         self._still = dict(viewer.first), self._begin_still(viewer.first)  # it is drawn while the gateway starts
-        super().__init__(_esm=_module_of(viewer.gateway()), _address=viewer.address, _state=dict(viewer.first), _panel=panel,
+        super().__init__(_anywidget_id=f"slabstream.{uuid.uuid4()}",  # whose style is the widget's own
+                         _esm=_module_of(viewer.gateway()), _address=viewer.address, _state=dict(viewer.first), _panel=panel,
                          _height=f"{height}px" if isinstance(height, int) else height)
         self.on_msg(self._hear)
 
@@ -147,15 +153,41 @@ class Widget(anywidget.AnyWidget):
         viewer = self._viewer
         return viewer.service.submit(**viewer.asked(state, {}) | {"deadline": _STILL_SECONDS})  # type: ignore[no-any-return]
 
-    def _repr_mimebundle_(self, **kwargs: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The view, and beside it a picture for saved notebooks and documents."""
-        data, more = super()._repr_mimebundle_(**kwargs) or ({}, {})
+    def _png(self) -> str:
+        """In base 64, of what it shows now."""
         if self._still[0] != self._state:
             self._still = dict(self._state), self._begin_still(self._state)
+        return base64.b64encode(self._still[1].result().png()).decode()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The view, and beside it a picture for documents."""
+        data, more = super()._repr_mimebundle_(**kwargs) or ({}, {})
+        with contextlib.suppress(SlabstreamError):
+            data = {**data, "image/png": self._png()}
+        return data, more
+
+    def _ipython_display_(self, **kwargs: Any) -> None:
+        """The view, and then a picture as an output of its own: JupyterLab shows nothing else of an output whose widget is gone. Pages that are
+        alive hide it."""
+        from IPython.display import display
+        data, more = super()._repr_mimebundle_(**kwargs) or ({}, {})
+        display(data, metadata=more, raw=True)
         try:
-            return {**data, "image/png": base64.b64encode(self._still[1].result().png()).decode()}, more
+            png = self._png()
         except SlabstreamError as error:
-            return {**data, "text/plain": f"{self!r}: there is no picture of it: {error}"}, more
+            warn(f"there is no still picture of {self.dataset}: {error}")
+            return
+        name = html.escape(self.dataset)
+        shown = f'<div class="{self._still_class}"><img alt="{name}" src="data:image/png;base64,{png}"><div>{STILL.format(name)}</div></div>'
+        display({"text/html": shown, "image/png": png, "text/plain": repr(self)}, raw=True)
+
+    @property
+    def _still_class(self) -> str:
+        return f"slabstream-still-{self.model_id}"
+
+    @traitlets.observe("channel")
+    def _hide_still(self, change: Any) -> None:
+        self._css = f".{self._still_class} {{ display: none; }}"
 
     def __repr__(self) -> str:
         return f"<slabstream.Widget of {self.dataset}>"

@@ -177,7 +177,7 @@ class Widgets(WithAService):
         self.assertEqual(seen, [ss.Camera(azimuth=47.5, elevation=-3, look_at=(1, 2, 3))])
         widget.camera = {"zoom": 2}
         self.assertEqual(page.updates.get(timeout=SECONDS)["_state"],
-                         {"dataset": "head", "azimuth": "47.5", "elevation": "-3", "look-at": "1,2,3", "zoom": "2", "transfer": "viridis"} | {"roll": "0", "projection": "orthographic"})
+                         {"dataset": "head", "azimuth": "47.5", "elevation": "-3", "look-at": "1,2,3", "zoom": "2", "transfer": "viridis"})
         widget.transfer = ss.TransferFunction([(0, (0, 0, 0)), (200, (1, 0.5, 0))], [(20, 0), (200, 1)])
         widget.scalar_range = 10, 180
         widget.channels = None
@@ -220,6 +220,7 @@ class Widgets(WithAService):
     def test_a_saved_notebook_has_a_picture(self) -> None:
         widget, _ = self.widget(azimuth=30, size=40)
         data, _ = widget._repr_mimebundle_()
+        self.assertEqual(widget._css, "")
         self.assertIn("application/vnd.jupyter.widget-view+json", data)
         wanted = self.service.render("head", size=40, azimuth=30, fit=True, background="#0d1014")
         np.testing.assert_array_equal(read_png(base64.b64decode(data["image/png"])), np.asarray(wanted))
