@@ -38,6 +38,13 @@ namespace asio = boost::asio;
 
 constexpr std::string_view kViewProtocol = "slabstream.view.v1", kTokenProtocol = "slabstream.token.";
 
+// Pages that may show the viewer and ask the gateway: those of this machine, such as notebooks, and those that --origin names.
+std::vector<std::string> PagesOf(const GatewayOptions& options) {
+  std::vector<std::string> pages = {"http://localhost:*", "http://127.0.0.1:*"};
+  pages.insert(pages.end(), options.pages.begin(), options.pages.end());
+  return pages;
+}
+
 }  // namespace
 
 class Gateway::Impl : public HttpApplication {
@@ -46,7 +53,7 @@ class Gateway::Impl : public HttpApplication {
       : context_(context),
         service_(std::move(service)),
         options_(std::move(options)),
-        rules_(options_.listen, options_.tls.has_value(), options_.proxy_origin),
+        rules_(options_.listen, options_.tls.has_value(), options_.proxy.origin, PagesOf(options_)),
         work_(asio::make_work_guard(io_)),
         traces_(options_.collector ? std::make_shared<TraceSender>(*options_.collector, ThisProcess("slabstream-gateway")) : nullptr),
         encoders_(std::max(2U, std::thread::hardware_concurrency())),
@@ -65,13 +72,13 @@ class Gateway::Impl : public HttpApplication {
   }
 
   Status Start() {
-    if (!options_.listen.loopback && !options_.tls && options_.proxy_origin.empty()) {
+    if (!options_.listen.loopback && !options_.tls && options_.proxy.origin.empty()) {
       return Status::InvalidArgument(
           fmt::format("--listen {} is not loopback: it needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
     }
     if (Status status = CheckToken(options_.token); !status.ok()) return status;
     HttpLimits limits = options_.limits;
-    if (!options_.proxy_origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
+    if (!options_.proxy.origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
     Result<std::unique_ptr<HttpServer>> server =
         HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, limits, *this);
     if (!server.ok()) return server.status();
@@ -100,20 +107,36 @@ class Gateway::Impl : public HttpApplication {
   std::string url(bool with_token) const {
     const std::string host = HostOf({.host = options_.listen.host, .port = server_->port()});
     const std::string own = fmt::format("{}://{}", options_.tls ? "https" : "http", host);
-    return (options_.proxy_origin.empty() ? own : options_.proxy_origin) + (with_token ? "/#token=" + options_.token : "/");
+    return (options_.proxy.origin.empty() ? own : options_.proxy.origin) + options_.proxy.path +
+           (with_token ? "/#token=" + options_.token : "/");
   }
 
   // ---- HttpApplication
 
   void Handle(HttpRequest request, ReplyFunction reply) override {
-    const auto counted = [this, reply = std::move(reply)](HttpReply answer) {
+    if (auto refusal = OriginRefusal(request)) {
+      metrics_.CountResponse(refusal->status);
+      return reply(*std::move(refusal));
+    }
+    const auto counted = [this, origin = request.origin, reply = std::move(reply)](HttpReply answer) {
       metrics_.CountResponse(answer.status);
+      if (origin) {
+        answer.headers.emplace_back("Access-Control-Allow-Origin", *origin);
+        answer.headers.emplace_back("Access-Control-Expose-Headers", "Slabstream-Renderer");
+      }
       reply(std::move(answer));
     };
-    if (auto refusal = OriginRefusal(request)) return counted(*std::move(refusal));
-    const Result<Target> target = ParseTarget(request.target);
+    Result<Target> target = ParseTarget(request.target);
     if (!target.ok()) return counted(Failure(target.status()));
+    const std::string& base = options_.proxy.path;
+    if (!base.empty() && target->path == base) {  // the page's addresses are relative: they need the slash
+      return counted({.status = 308, .body = {}, .headers = {{"Location", base + "/" + request.target.substr(base.size())}}});
+    }
+    target->path = BelowBase(target->path);
     const auto route = routes_.find(target->path);
+    if (request.method == "OPTIONS" && request.origin && (route != routes_.end() || FindAsset(target->path) != nullptr)) {
+      return counted(Preflight());
+    }
     if (route == routes_.end()) {
       if (const Asset* asset = FindAsset(target->path); asset != nullptr && (request.method == "GET" || request.method == "HEAD")) {
         return counted(AssetReply(*asset, request));
@@ -144,7 +167,7 @@ class Gateway::Impl : public HttpApplication {
     if (auto refusal = OriginRefusal(request)) return *std::move(refusal);
     const Result<Target> target = ParseTarget(request.target);
     if (!target.ok()) return Failure(target.status());
-    if (target->path != "/api/v1/view") return Failure(404, "the WebSocket is /api/v1/view");
+    if (BelowBase(target->path) != "/api/v1/view") return Failure(404, "the WebSocket is /api/v1/view");
     if (!MayAsk(request, *target)) return NoToken();
     if (std::ranges::find(request.subprotocols, kViewProtocol) == request.subprotocols.end()) {
       return Failure(400, fmt::format("the WebSocket needs the subprotocol {}", kViewProtocol));
@@ -161,16 +184,16 @@ class Gateway::Impl : public HttpApplication {
   }
 
   std::vector<std::pair<std::string, std::string>> CommonHeaders() const override {
-    std::string frames = "'self' http://localhost:* http://127.0.0.1:*";  // notebooks
-    for (const std::string& source : options_.frame_sources) frames += " " + source;
-    if (!options_.proxy_origin.empty()) frames += " " + options_.proxy_origin;
+    std::string frames = fmt::format("'self' {}", fmt::join(PagesOf(options_), " "));
+    if (!options_.proxy.origin.empty()) frames += " " + options_.proxy.origin;
     return {
         {"Content-Security-Policy",
          fmt::format("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; font-src "
                      "'self'; base-uri 'none'; form-action 'none'; frame-ancestors {}",
                      frames)},
         {"X-Content-Type-Options", "nosniff"},
-        {"Referrer-Policy", "no-referrer"}};
+        {"Referrer-Policy", "no-referrer"},
+        {"Vary", "Origin"}};
   }
 
   void CountRefusal(std::string_view reason) override { metrics_.CountRefusal(reason); }
@@ -265,8 +288,24 @@ class Gateway::Impl : public HttpApplication {
     return routes;
   }
 
+  // A proxy may leave the path of its address in requests, or take it away.
+  std::string BelowBase(const std::string& path) const {
+    const std::string& base = options_.proxy.path;
+    return path.starts_with(base + "/") ? path.substr(base.size()) : path;
+  }
+
+  // What a browser asks before it lets a page of another origin send a token or JSON.
+  static HttpReply Preflight() {
+    return {.status = 204,
+            .body = {},
+            .headers = {{"Access-Control-Allow-Methods", "GET, HEAD, POST"},
+                        {"Access-Control-Allow-Headers", "Authorization, Content-Type"},
+                        {"Access-Control-Max-Age", "600"}}};
+  }
+
   static HttpReply AssetReply(const Asset& asset, const HttpRequest& request) {
-    HttpReply reply{.type = std::string(asset.type), .body = {}, .headers = {{"Cache-Control", "no-cache"}, {"Vary", "Accept-Encoding"}}};
+    HttpReply reply{
+        .type = std::string(asset.type), .body = {}, .headers = {{"Cache-Control", "no-cache"}, {"Vary", "Accept-Encoding, Origin"}}};
     if (AcceptsGzip(request.accept_encoding)) {
       reply.body = GzippedBytes(asset);
       reply.headers.emplace_back("Content-Encoding", "gzip");

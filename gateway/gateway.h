@@ -32,10 +32,10 @@ namespace slabstream {
 struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
-  std::string proxy_origin;                // --behind-proxy, as ParseOrigin gives it; empty: there is no proxy
-  std::vector<std::string> frame_sources;  // origins whose pages may show the viewer in a frame, as ParseFrameSource gives them
-  std::string token;                       // CheckToken
-  std::optional<HttpUrl> collector;        // OpenTelemetry's collector, which gets traces of requests; none: there are no traces
+  ProxyAddress proxy;                // --behind-proxy; the page and the interface are below its path, too
+  std::vector<std::string> pages;    // those that may show the viewer in a frame and ask, as ParsePageSource gives them
+  std::string token;                 // CheckToken
+  std::optional<HttpUrl> collector;  // OpenTelemetry's collector, which gets traces of requests; none: there are no traces
   HttpLimits limits;
   int max_sessions = 64;
   int max_renders = 16;                           // pictures over HTTP under way

@@ -71,14 +71,15 @@ int Run(int argc, char** argv) {
   const Option key = app.AddText("--tls-key", options.tls.key, "Private key of the certificate (PEM)").TypeName("FILE");
   certificate.Needs(key);
   key.Needs(certificate);
-  AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
-            "Public address of a proxy that ends TLS, such as https://viewer.example.org")
-      .TypeName("ORIGIN");
-  AddParsedList(
-      app, "--frame-in", options.gateway.frame_sources, ParseFrameSource,
-      "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
-      "vscode-webview: for notebooks of VS Code")
-      .TypeName("ORIGIN");
+  AddParsed(app, "--behind-proxy", options.gateway.proxy, ParseProxyAddress,
+            "Public address of a proxy in front, with its path: https://viewer.example.org or https://example.org/render/. The proxy may "
+            "take the path away or leave it")
+      .TypeName("ADDRESS");
+  AddParsedList(app, "--origin", options.gateway.pages, ParsePageSource,
+                "Let pages of this origin show the viewer in a frame, and ask the gateway with a token: https://notebooks.example.org; or "
+                "all pages of a scheme, such as vscode-webview: for notebooks of VS Code")
+      .TypeName("ORIGIN")
+      .Default("http://localhost:* and http://127.0.0.1:*, which always may");
   AddParsed(app, "--max-upload", options.gateway.max_upload_bytes, ParseUploadLimit,
             "Largest file that a page may send to the service as a dataset; 0: none may")
       .TypeName("SIZE")

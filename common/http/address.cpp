@@ -61,6 +61,18 @@ std::optional<HostAndPort> Divide(std::string_view text) {
 
 std::string_view AfterScheme(std::string_view origin) { return origin.substr(origin.find("//") + 2); }
 
+constexpr std::string_view kAnyPort = ":*";
+
+// Whether `origin` is one of those that `source` names (ParsePageSource).
+bool IsOf(std::string_view source, std::string_view origin) {
+  if (source.ends_with(':')) return origin.starts_with(source) && origin.substr(source.size()).starts_with("//");
+  if (!source.ends_with(kAnyPort)) return origin == source;
+  source.remove_suffix(kAnyPort.size());
+  if (!origin.starts_with(source)) return false;
+  const std::string_view port = origin.substr(source.size());
+  return port.empty() || (port.front() == ':' && ParseNumber<std::uint16_t>(port.substr(1)).has_value());
+}
+
 }  // namespace
 
 Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_view text) {
@@ -83,11 +95,14 @@ Result<std::string> ParseOrigin(std::string_view option, std::string_view text) 
   const std::string origin = Lower(text);
   const bool scheme = origin.starts_with("https://") || origin.starts_with("http://");
   const std::string_view rest = scheme ? AfterScheme(origin) : "";
-  if (scheme && !rest.empty() && rest.find_first_of("/?#@ ") == std::string_view::npos && Divide(rest)) return origin;
+  if (scheme && !rest.empty() && rest.find_first_of("/?#@ ") == std::string_view::npos && Divide(rest)) {
+    const std::string_view usual = origin.starts_with("https") ? ":443" : ":80";
+    return origin.substr(0, origin.size() - (origin.ends_with(usual) ? usual.size() : 0));
+  }
   return Status::InvalidArgument(fmt::format("{} '{}' is not an origin such as https://viewer.example.org", option, text));
 }
 
-Result<std::string> ParseFrameSource(std::string_view option, std::string_view text) {
+Result<std::string> ParsePageSource(std::string_view option, std::string_view text) {
   const std::string lower = Lower(text);
   const auto belongs = [](unsigned char c) {
     return std::isalnum(c) != 0 || std::string_view("+-.").find(char(c)) != std::string_view::npos;
@@ -95,10 +110,34 @@ Result<std::string> ParseFrameSource(std::string_view option, std::string_view t
   const std::string_view scheme = std::string_view(lower).substr(0, lower.size() - std::min<std::size_t>(lower.size(), 1));
   const bool is_scheme = lower.ends_with(':') && !scheme.empty() && std::isalpha(static_cast<unsigned char>(scheme.front())) != 0 &&
                          std::ranges::all_of(scheme, belongs);
-  const auto ends_field = [](char c) { return c == ';' || c == ','; };
-  if (is_scheme || (ParseOrigin(option, text).ok() && std::ranges::none_of(lower, ends_field))) return lower;
+  if (is_scheme && (scheme == "http" || scheme == "https")) {
+    return Status::InvalidArgument(
+        fmt::format("{} '{}' is every page of the web: name origins, such as https://notebooks.example.org", option, text));
+  }
+  if (is_scheme) return lower;
+  const bool any_port = lower.ends_with(kAnyPort);
+  const Result<std::string> origin =
+      ParseOrigin(option, any_port ? std::string_view(lower).substr(0, lower.size() - kAnyPort.size()) : lower);
+  // Signs that end a field of the policy, or stand for many hosts there.
+  if (origin.ok() && origin->find_first_of(";,*'") == std::string::npos) return any_port ? lower : *origin;
   return Status::InvalidArgument(
       fmt::format("{} '{}' is neither an origin such as https://notebooks.example.org nor a scheme such as vscode-webview:", option, text));
+}
+
+Result<ProxyAddress> ParseProxyAddress(std::string_view option, std::string_view text) {
+  const std::size_t scheme = text.find("://"), slash = scheme == std::string_view::npos ? scheme : text.find('/', scheme + 3);
+  std::string_view path = slash == std::string_view::npos ? "" : text.substr(slash);
+  while (path.ends_with('/')) path.remove_suffix(1);
+  const auto belongs = [](unsigned char c) {
+    return std::isalnum(c) != 0 || std::string_view("/-._~%@:+").find(char(c)) != std::string_view::npos;
+  };
+  Result<std::string> origin = ParseOrigin(option, text.substr(0, slash));
+  // Parts that browsers and proxies take away would never match.
+  const std::string inside = fmt::format("{}/", path);
+  const bool plain =
+      inside.find("//") == std::string::npos && inside.find("/./") == std::string::npos && inside.find("/../") == std::string::npos;
+  if (origin.ok() && plain && std::ranges::all_of(path, belongs)) return ProxyAddress{*std::move(origin), std::string(path)};
+  return Status::InvalidArgument(fmt::format("{} '{}' is not an address such as https://viewer.example.org/render/", option, text));
 }
 
 Result<HttpUrl> ParseHttpUrl(std::string_view option, std::string_view text) {
@@ -129,8 +168,8 @@ std::string HostOf(const HttpUrl& url) {
 
 std::string ToString(const HttpUrl& url) { return fmt::format("http://{}{}", HostOf(url), url.target); }
 
-OriginRules::OriginRules(ListenAddress listen, bool tls, std::string proxy_origin)
-    : listen_(std::move(listen)), tls_(tls), proxy_origin_(std::move(proxy_origin)) {
+OriginRules::OriginRules(ListenAddress listen, bool tls, std::string proxy_origin, std::vector<std::string> pages)
+    : listen_(std::move(listen)), tls_(tls), proxy_origin_(std::move(proxy_origin)), pages_(std::move(pages)) {
   if (!proxy_origin_.empty()) proxy_host_ = AfterScheme(proxy_origin_);
 }
 
@@ -157,7 +196,9 @@ std::optional<std::string> OriginRules::Refusal(std::string_view host, std::opti
   const std::string from = Lower(*origin);
   if (!proxy_origin_.empty() && from == proxy_origin_) return std::nullopt;
   if (from == fmt::format("{}://{}", tls_ ? "https" : "http", asked)) return std::nullopt;
-  return fmt::format("Origin '{}' is another site", Printable(from.substr(0, 128)));
+  if (std::ranges::any_of(pages_, [&](const std::string& source) { return IsOf(source, from); })) return std::nullopt;
+  return fmt::format("Origin '{}' is another site{}", Printable(from.substr(0, 128)),
+                     pages_.empty() ? "" : "; --origin names those that may ask");
 }
 
 Result<std::string> MakeToken() {

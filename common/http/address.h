@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/status.h"
 
@@ -21,12 +22,22 @@ struct ListenAddress {
 // "HOST:PORT", "HOST", or "[::1]:8080"; a port of 0 or * is any. InvalidArgument.
 Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_view text);
 
-// "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
+// "https://viewer.example.org" or with a port; no path. As browsers write it: in lower case, without the scheme's own port.
+// InvalidArgument.
 Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
 
-// Whose pages may show this server's in a frame: an origin, as ParseOrigin takes it, or a scheme, "vscode-webview:". The text in lower
-// case, as the header Content-Security-Policy has it. InvalidArgument.
-Result<std::string> ParseFrameSource(std::string_view option, std::string_view text);
+// Pages that may show this server's in a frame, and ask it: those of an origin, as ParseOrigin takes it; of any port of a host,
+// "http://localhost:*"; or of a scheme, "vscode-webview:", but not of the whole web. As Content-Security-Policy has it. InvalidArgument.
+Result<std::string> ParsePageSource(std::string_view option, std::string_view text);
+
+// Where a proxy shows this server.
+struct ProxyAddress {
+  std::string origin;  // as ParseOrigin gives it; empty: there is no proxy
+  std::string path;    // "/render", without a slash at its end; empty: all of the host
+};
+
+// "https://viewer.example.org/render/"; the slash at the end may be left out. InvalidArgument.
+Result<ProxyAddress> ParseProxyAddress(std::string_view option, std::string_view text);
 
 // What a client asks, without TLS.
 struct HttpUrl {
@@ -44,8 +55,8 @@ std::string ToString(const HttpUrl& url);
 // Which requests are the server's own.
 class OriginRules {
  public:
-  // `proxy_origin`: of the proxy in front; empty: there is none.
-  OriginRules(ListenAddress listen, bool tls, std::string proxy_origin);
+  // `proxy_origin`: of the proxy in front; empty: there is none. `pages`: others that may ask, as ParsePageSource gives them.
+  OriginRules(ListenAddress listen, bool tls, std::string proxy_origin, std::vector<std::string> pages = {});
 
   // What is wrong with the headers Host and, if the request has one, Origin, in a line to the client. nullopt: nothing.
   std::optional<std::string> Refusal(std::string_view host, std::optional<std::string_view> origin) const;
@@ -55,6 +66,7 @@ class OriginRules {
   ListenAddress listen_;
   bool tls_;
   std::string proxy_origin_, proxy_host_;
+  std::vector<std::string> pages_;
 };
 
 // Random text of 128 bits, letters, digits, - and _. Unavailable: the system has no randomness.

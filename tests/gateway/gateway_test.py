@@ -39,6 +39,18 @@ def process_ended(pid):
         return True
 
 
+def listening_port(pid):
+    """Where the process listens: its own line of the table of sockets."""
+    own = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            own.add(os.readlink(descriptor))
+        except OSError:
+            continue
+    sockets = [line.split() for line in Path(f"/proc/{pid}/net/tcp").read_text().splitlines()[1:]]
+    return next(int(fields[1].split(":")[1], 16) for fields in sockets if fields[3] == "0A" and f"socket:[{fields[9]}]" in own)
+
+
 def wait_until(condition, what):
     limit = time.monotonic() + TIMEOUT
     while not condition():
@@ -593,7 +605,7 @@ class HttpTest(WithService):
                                      ("gzip;q=0", False), ("*, gzip ; q=0.000", False), ("", False), ("gzip;q=0.001", True)):
                 for method in ("GET", "HEAD"):
                     status, headers, body = self.gateway.request(path, method=method, headers={"Accept-Encoding": accepted})
-                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding", "gzip" if packed else None), accepted)
+                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding, Origin", "gzip" if packed else None), accepted)
                     if method == "GET":
                         self.assertEqual(len(body), int(headers["Content-Length"]))
                         self.assertEqual(gzip.decompress(body) if packed else body, whole_file)
@@ -617,7 +629,7 @@ class HttpTest(WithService):
             ({"Host": "127.0.0.1.evil.example"}, 403), ({"Host": f"127.0.0.1:{port}.evil.example"}, 403),
             ({"Host": "localhost:evil.example"}, 403), ({"Host": f"[::1]:{port}.evil.example"}, 403), ({"Host": "127.0.0.1:65536"}, 403),
             ({"Host": "[::1]:1"}, 200), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
-            ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403)]:
+            ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403), ({"Origin": "http://localhost:1"}, 200)]:
             self.assertEqual(self.gateway.request("/livez", headers=headers)[0], status, headers)
             if status == 200:
                 self.page(headers=headers).close()
@@ -631,6 +643,32 @@ class HttpTest(WithService):
             Page(self.gateway, protocols=["slabstream.view.v1"])
         with self.assertRaisesRegex(Refused, "400"):
             Page(self.gateway, protocols=["slabstream.token." + self.gateway.token])
+
+    def test_pages_of_other_origins_ask_as_browsers_want_it(self):
+        allowed = lambda answer: {name.lower(): value for name, value in answer[1].items() if name.lower().startswith("access-control-")}  # noqa: E731
+        wanted = {"Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization,content-type"}
+        for path in ("/api/v1/render.png", "/api/v1/upload", "/assets/page.js", "/"):
+            answer = self.gateway.request(path, method="OPTIONS", token=False, headers={"Origin": "http://localhost:5173", **wanted})
+            self.assertEqual((answer[0], answer[2], answer[1]["Vary"]), (204, b"", "Origin"), path)
+            self.assertEqual(allowed(answer), {"access-control-allow-origin": "http://localhost:5173", "access-control-allow-methods": "GET, HEAD, POST",
+                                               "access-control-allow-headers": "Authorization, Content-Type", "access-control-max-age": "600",
+                                               "access-control-expose-headers": "Slabstream-Renderer"})
+        mine, foreign = {"Origin": "http://127.0.0.1:5173"}, {"Origin": "https://evil.example"}
+        self.assertEqual(self.gateway.request("/nothing", method="OPTIONS", headers={**mine, **wanted})[0], 404)
+        self.assertEqual(self.gateway.request("/api/v1/status", method="OPTIONS")[0], 405)
+        # A page may read its answers, also those that refuse it.
+        for path, token, status in (("/api/v1/status", True, 200), ("/api/v1/status", False, 401), ("/api/v1/render.png?dataset=none", True, 404),
+                                    ("/assets/page.js", False, 200), ("/nothing", True, 404)):
+            answer = self.gateway.request(path, token=token, headers=mine)
+            self.assertEqual((answer[0], answer[1]["Access-Control-Allow-Origin"]), (status, mine["Origin"]), path)
+            self.assertIn("Origin", answer[1]["Vary"])
+            # Other pages get nothing, and caches keep what they got for nobody else.
+            for method in ("GET", "OPTIONS"):
+                answer = self.gateway.request(path, method=method, headers={**foreign, **wanted})
+                self.assertEqual((answer[0], allowed(answer), answer[1]["Vary"]), (403, {}, "Origin"), path)
+                self.assertEqual(json.loads(answer[2])["error"], "Origin 'https://evil.example' is another site; --origin names those that may ask")
+            self.assertEqual(allowed(self.gateway.request(path, token=token)), {})
+        self.page(headers=mine).close()
 
     def test_hostile_requests(self):
         host = f"Host: {self.gateway.authority}\r\n".encode()
@@ -1163,6 +1201,26 @@ class StartTest(unittest.TestCase):
         _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--listen", "127.0.0.1")
         self.assertEqual(gateway.authority, "viewer.example.org:8443")
 
+    def test_below_a_path(self):
+        child = self.programs.start("slabstream-gateway", "--behind-proxy", "https://viewer.example.org/render")
+        address, token = child.stdout.readline().split()[1].split("#token=")
+        self.assertEqual(address, "https://viewer.example.org/render/")
+        gateway = Gateway(f"http://127.0.0.1:{listening_port(child.pid)}/#token={token}")
+        # The proxy may leave the path in requests, or take it away.
+        for base in ("/render", ""):
+            for path, token, status in (("/", False, 200), ("/assets/page.js", False, 200), ("/livez", False, 200), ("/api/v1/options?a=b", False, 200),
+                                        ("/metrics", True, 200), ("/metrics", False, 401), ("/nothing", True, 404), ("//livez", True, 404)):
+                self.assertEqual(gateway.request(base + path, token=token)[0], status, base + path)
+            page = Page(gateway, target=base + "/api/v1/view", headers={"Host": "viewer.example.org", "Origin": "https://viewer.example.org"})
+            self.assertEqual(page.receive()["type"], "hello")
+            page.close()
+        status, headers, _ = gateway.request("/render?x=1", token=False)
+        self.assertEqual((status, headers["Location"]), (308, "/render/?x=1"), "the page's addresses are relative")
+        for path in ("/rende/livez", "/render2/livez", "/renderlivez", "/render/render/livez", "/RENDER/livez", "/x/render/livez"):
+            self.assertEqual(gateway.json(path), (404, {"error": f"there is nothing at '{path.removeprefix('/render') if path.startswith('/render/') else path}'"}))
+        for wrong in ("https://viewer.example.org/render?x", "/render/", "https://a/../b"):
+            self.assertEqual(self.refused("--behind-proxy", wrong)[0], 2, wrong)
+
     def test_a_token_of_a_file(self):
         file = self.programs.folder / "token"
         file.write_text("0123456789abcdef\n")
@@ -1177,12 +1235,21 @@ class StartTest(unittest.TestCase):
         self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
         self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/metrics")[0], 200)
 
-    def test_frames_of_other_pages(self):
-        _, gateway = self.programs.gateway("--frame-in", "vscode-webview:", "--frame-in", "https://Hub.example.org")
+    def test_pages_that_are_named_may_show_it_and_ask(self):
+        _, gateway = self.programs.gateway("--origin", "vscode-webview:", "--origin", "https://Hub.example.org:443")
         policy = gateway.request("/")[1]["Content-Security-Policy"]
         self.assertTrue(policy.endswith("frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview: https://hub.example.org"), policy)
-        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'"):
-            self.assertEqual(self.refused("--frame-in", wrong)[0], 2, wrong)
+        for origin, status in (("https://hub.example.org", 200), ("vscode-webview://0a1b", 200), ("http://localhost:8888", 200),
+                               ("https://hub.example.org.evil.example", 403), ("https://example.org", 403), ("null", 403)):
+            answer = gateway.request("/assets/page.js", token=False, headers={"Origin": origin})
+            self.assertEqual((answer[0], answer[1]["Access-Control-Allow-Origin"]), (status, origin if status == 200 else None), origin)
+            if status == 200:
+                Page(gateway, headers={"Origin": origin}).close()
+            else:
+                with self.assertRaisesRegex(Refused, "403"):
+                    Page(gateway, headers={"Origin": origin})
+        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'", "https:"):
+            self.assertEqual(self.refused("--origin", wrong)[0], 2, wrong)
 
     def test_view_with_a_port_and_a_token_that_stay(self):
         self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")

@@ -96,7 +96,46 @@ TEST(AddressTest, OnlyOwnHostsAndOriginsMayAsk) {
   const OriginRules one(*ParseListenAddress("--listen", "192.168.1.7:4000"), false, "");
   EXPECT_NE(one.Refusal("192.168.1.8:4000", std::nullopt), std::nullopt);
   for (const char* wrong : {"", "viewer", "https://", "https://a/b", "ftp://a", "https://a b"}) {
-    EXPECT_FALSE(ParseOrigin("--behind-proxy", wrong).ok()) << wrong;
+    EXPECT_FALSE(ParseOrigin("--origin", wrong).ok()) << wrong;
+  }
+}
+
+TEST(AddressTest, PagesOfNamedOriginsMayAsk) {
+  std::vector<std::string> pages;
+  for (const char* text : {"http://localhost:*", "https://Notebooks.example.org:443", "https://a.example:8443", "vscode-webview:"}) {
+    pages.push_back(*ParsePageSource("--origin", text));
+  }
+  EXPECT_EQ(pages[1], "https://notebooks.example.org");  // as browsers write it
+  const OriginRules rules({}, false, "", pages);
+  for (const char* origin : {"http://localhost", "http://localhost:1", "http://LOCALHOST:65535", "https://notebooks.example.org",
+                             "https://a.example:8443", "vscode-webview://0abc", "http://127.0.0.1:4000"}) {
+    EXPECT_EQ(rules.Refusal("127.0.0.1:4000", origin), std::nullopt) << origin;
+  }
+  for (const char* origin :
+       {"http://localhost.evil.example", "http://localhost:1.evil.example", "http://localhost:65536",
+        "http://localhost:", "https://localhost", "http://notebooks.example.org", "https://notebooks.example.org.evil.example",
+        "https://notebooks.example.org:8443", "https://a.example", "https://a.example:84430", "vscode-webview:evil",
+        "vscode-webviews://0abc", "http://127.0.0.1:4001", "null", ""}) {
+    EXPECT_NE(rules.Refusal("127.0.0.1:4000", origin), std::nullopt) << origin;
+  }
+  EXPECT_NE(rules.Refusal("notebooks.example.org", std::nullopt), std::nullopt) << "it is no name of this gateway";
+  for (const char* wrong : {"*", "https:", "http:", "null", "https://*", "https://a:*:*", "https://a:*/", "https://a;b", ":*", ""}) {
+    EXPECT_FALSE(ParsePageSource("--origin", wrong).ok()) << wrong;
+  }
+}
+
+TEST(AddressTest, AProxyMayShowTheServerBelowAPath) {
+  const auto parsed = [](const char* text) { return *ParseProxyAddress("--behind-proxy", text); };
+  EXPECT_EQ(parsed("https://Viewer.example.org").origin, "https://viewer.example.org");
+  EXPECT_EQ(parsed("https://viewer.example.org/").path, "");
+  for (const char* text : {"http://a:8000/user/Anna%40b.org/proxy/7", "http://a:8000/user/Anna%40b.org/proxy/7/"}) {
+    EXPECT_EQ(parsed(text).origin, "http://a:8000");
+    EXPECT_EQ(parsed(text).path, "/user/Anna%40b.org/proxy/7");
+  }
+  for (const char* wrong :
+       {"", "/render/", "viewer.example.org/render/", "https:///render/", "https://a/b?c", "https://a/b#c", "https://a/b c", "https://a//b",
+        "https://a/../b", "https://a/./b", "https://a/b/..", "https://a/\r\nX: y", "https://u@a/b"}) {
+    EXPECT_FALSE(ParseProxyAddress("--behind-proxy", wrong).ok()) << wrong;
   }
 }
 
