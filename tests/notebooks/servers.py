@@ -40,6 +40,9 @@ class Server:
         places = {name: str(folder / name.lower()) for name in ("HOME", "IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "XDG_CONFIG_HOME")}
         for place in places.values():
             pathlib.Path(place).mkdir(exist_ok=True)
+        pages = folder / "jupyter_config_dir" / "labconfig"
+        pages.mkdir(exist_ok=True)
+        (pages / "page_config.json").write_text(json.dumps({"disabledExtensions": {"@jupyterlab/apputils-extension:announcements": True}}))
         command = [sys.executable, *(argument.format(port=self.port, token=self.token) for argument in arguments)]
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(command, cwd=folder, env={**kept, **places, **environment}, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
@@ -64,8 +67,7 @@ class Server:
                 self.process.wait()
 
 
-_JUPYTER = ("--no-browser", "--ip=127.0.0.1", "--port={port}", "--ServerApp.port_retries=0", "--IdentityProvider.token={token}", "--allow-root",
-            "--LabApp.news_url=None", "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate")
+_JUPYTER = ("--no-browser", "--ip=127.0.0.1", "--port={port}", "--ServerApp.port_retries=0", "--IdentityProvider.token={token}", "--allow-root")
 
 
 def lab(folder: pathlib.Path, **environment: str) -> Server:
