@@ -82,13 +82,17 @@ class Browsed(unittest.TestCase):
 
     def check_picture(self, tab: JupyterTab, name: str = "widget", viewer: int = 0) -> np.ndarray:
         """What the canvas shows is what Python says of it."""
-        tab.final(viewer)
-        tab.until("(() => { const d = drawn[drawn.length - 1]; return performance.now() - d.at > 400; })()")  # the state has reached Python
-        pixels = tab.pixels(viewer)
-        height, width = pixels.shape[:2]
-        file = self.folder / "picture.npy"
-        tab.ask(f"np.save('{file}', np.asarray({name}.picture(size=({width}, {height}))))")
-        self.assertLessEqual(np.abs(pixels.astype(int) - np.load(file)).max(), 1)  # one of them rounds floats, the other what the service rounded
+        limit = time.monotonic() + pages.SECONDS
+        while True:  # until the state has reached Python, or the page
+            tab.final(viewer)
+            pixels = tab.pixels(viewer)
+            height, width = pixels.shape[:2]
+            file = self.folder / "picture.npy"
+            tab.ask(f"np.save('{file}', np.asarray({name}.picture(size=({width}, {height}))))")
+            apart = np.abs(pixels.astype(int) - np.load(file)).max()
+            if apart <= 1 or time.monotonic() > limit:  # 1: one of them rounds floats, the other what the service rounded
+                break
+        self.assertLessEqual(apart, 1, tab.ask(f"{name}.state"))
         self.assertGreater(pixels[..., 0].std(), 5)
         return pixels
 
