@@ -6,7 +6,7 @@ A page has this channel where it cannot reach the gateway itself. The messages a
     {"ask": id, "method": ..., "path": ...}  [body]        {"answer": id, "status": 200, "type": "image/png"}  [body]
     {"cancel": id}                                         (no answer)
     {"open": id}                                           {"opened": id}, or {"closed": id, "reason": ...}
-    {"send": id, "text": ...}                              {"heard": id, "text": ...} or {"heard": id}  [picture]
+    {"send": id, "text": ..., "more": [text, ...]}         {"heard": id, "text": ...} or {"heard": id}  [picture]
     {"close": id}                                          {"closed": id, "reason": ...}
     {"alive": [id, ...]}                                   (no answer)
 
@@ -89,7 +89,8 @@ class Relay:
                 if each in self._streams:
                     self._streams[each].silent = 0.0
         elif "send" in message and message["send"] in self._streams:
-            self._streams[message["send"]].send(str(message.get("text", "")))
+            for text in (message.get("text", ""), *message.get("more", ())):
+                self._streams[message["send"]].send(str(text))
         elif "close" in message and message["close"] in self._streams:
             self._streams[message["close"]].close("")
 
