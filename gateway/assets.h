@@ -1,4 +1,4 @@
-// The files of the page, which are part of the program. The table is made from a folder at build time (embed_assets.cmake).
+// The files of the viewer, which are part of the program. The table is made from a folder at build time (embed_assets.cmake).
 #pragma once
 
 #include <span>
@@ -9,7 +9,7 @@ namespace slabstream {
 
 struct Asset {
   std::string_view path;  // "/assets/page.js"
-  std::string_view type;  // "text/javascript; charset=utf-8"
+  std::string_view type;  // "text/javascript"
   std::string_view bytes;
 };
 

@@ -9,7 +9,7 @@ import urllib.parse
 
 
 class Proxy:
-    """Listens at 127.0.0.1:port. `answers` maps paths to functions of (fields, body) that return JSON, or the status of an error. With
+    """Listens at 127.0.0.1:port. `answers` maps paths to functions of (fields, body) that return JSON, a text that is a web page, or the status of an error. With
     a `prefix` the gateway lies below that path, which the proxy takes away; `strays` are requests that lie elsewhere."""
 
     def __init__(self, host, port, delay=0.0, answers=None, prefix=""):
@@ -88,7 +88,9 @@ class Proxy:
         parts = urllib.parse.urlsplit(target)
         own = self.answers.get(parts.path)
         answer = own(dict(urllib.parse.parse_qsl(parts.query)), json.loads(body) if body else None) if own else None
-        if answer is not None:
+        if isinstance(answer, str):
+            status, kind, data, more = 200, "text/html; charset=utf-8", answer.encode(), []
+        elif answer is not None:
             status, answer = (answer, {"error": "as the test wants it"}) if isinstance(answer, int) else (200, answer)
             kind, data, more = "application/json", json.dumps(answer).encode(), []
         else:

@@ -35,7 +35,7 @@ class SlabView extends HTMLElement {
       if (!src) throw new Error();
       this.shadowRoot?.replaceChildren();
       this.viewer = mountViewer(this.shadowRoot as ShadowRoot, gatewayAt(src, this.getAttribute("token") ?? ""), fields, {
-        isPage: false, panel: this.hasAttribute("panel"), theme: themeAround(this),
+        isPage: false, panel: this.hasAttribute("panel"), theme: () => themeAround(this),
         changed: () => this.told.call(), picked: value => this.tell("slab-pick", value), error: message => this.tell("slab-error", message),
       });
     } catch {

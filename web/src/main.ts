@@ -30,7 +30,7 @@ function open(): void {
     showInAddress(viewer.state, token);
   };
   const viewer = mountViewer(document.body, new GatewayConnection(new URL(location.href), token), fieldsInAddress(), {
-    isPage: true, panel: true, theme,
+    isPage: true, panel: true, theme: () => theme,
     keepTheme: chosen => { try { localStorage.setItem(KEPT_THEME, chosen); } catch { /* it holds for this visit */ } },
     changed: () => { if (timer === 0) show(); clearTimeout(timer); timer = setTimeout(show, ADDRESS_MS); },
     link: withToken => linkOf(viewer.state, withToken ? token : ""),

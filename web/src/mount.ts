@@ -52,7 +52,7 @@ export type Theme = "light" | "dark";
 export interface Host {
   isPage: boolean; // there is nothing else in the document: the viewer has the focus at once, and hears all keys
   panel: boolean; // whether the settings show at first, where there is room for them
-  theme: Theme;
+  theme(): Theme; // asked for when the viewer begins, and once its place is in the document
   keepTheme?(theme: Theme): void;
   changed?(): void; // the state
   link?(withToken: boolean): string; // to what shows; without this no link can be copied
@@ -381,11 +381,13 @@ export interface MountedViewer {
 
 // Places a viewer in `root`, which needs the style of page.css. Viewers share nothing, so there can be many.
 export function mountViewer(root: HTMLElement | ShadowRoot, connection: Connection, initial: Fields, host: Host): MountedViewer {
-  const end = new AbortController(), api = new Api(connection, end.signal), element = h("div", { class: "viewer", "data-theme": host.theme });
+  const end = new AbortController(), api = new Api(connection, end.signal), element = h("div", { class: "viewer", "data-theme": host.theme() });
   const showAlone = (text: string): void => element.replaceChildren(h(host.isPage ? "main" : "div", { class: "empty" }, h(host.isPage ? "h1" : "p", {}, text)));
   let fields = initial, assembly: Assembly | null = null, timer = 0;
   const start = (): void => void Offers.load(api).then(offers => {
-    if (!end.signal.aborted) assembly = new Assembly(element, api, offers, fields, host);
+    if (end.signal.aborted) return;
+    put(element, "data-theme", host.theme());
+    assembly = new Assembly(element, api, offers, fields, host);
   }).catch((error: unknown) => {
     if (end.signal.aborted) return;
     const message = `The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`;

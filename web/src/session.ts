@@ -95,6 +95,7 @@ export class Session {
     document.removeEventListener("visibilitychange", this.retryNow);
     this.api.ended.removeEventListener("abort", this.end);
     this.stream?.close();
+    this.stream = null;
   };
 
   private readonly retryNow = (): void => {

@@ -26,9 +26,10 @@ async function reached(address: string): Promise<Connection | null> {
   }
 }
 
-// Traits: _address, _state, _height, _panel, and `channel`, which says how the gateway is reached.
+// Traits: _address, _state, _height, _panel, and `channel`, which says how the gateway is reached. JupyterLab hears keys before any element, so an
+// attribute tells it which are not its own.
 function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
-  const place = el.appendChild(h("div")), root = styledRoot(place);
+  const place = el.appendChild(h("div", { "data-lm-suppress-shortcuts": "true" })), root = styledRoot(place);
   let viewer: MountedViewer | null = null, kernel: KernelConnection | null = null, left: Fields | null = null, starts = 0;
   const wanted = (): Fields => (model.get("_state") ?? {}) as Fields;
   const written = atMostEach(STATE_MS, () => {
@@ -51,7 +52,7 @@ function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
     model.set("channel", gateway ? "gateway" : "kernel");
     model.save_changes();
     viewer = mountViewer(root, gateway ?? (kernel = new KernelConnection(model)), left ?? wanted(), {
-      isPage: false, panel: model.get("_panel") === true, theme: themeAround(el),
+      isPage: false, panel: model.get("_panel") === true, theme: () => themeAround(el),
       changed: () => written.call(), picked: value => model.send({ picked: value }), error: message => model.send({ error: message }),
     });
   };

@@ -1,0 +1,288 @@
+#!/usr/bin/env python3
+"""The viewer in other pages than its own, in Chromium: as <slab-view> and as a notebook's widget, over the gateway and over a kernel's channel.
+
+    widget_test.py FOLDER_OF_PROGRAMS FOLDER_FOR_SCREENSHOTS CHROMIUM CHROMEDRIVER [unittest arguments]
+"""
+import gzip
+import sys
+import unittest
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "gateway"))
+from gateway_test import Programs, wait_until  # noqa: E402
+from page import png_pixels  # noqa: E402
+
+import browser  # noqa: E402
+from browser import Viewer  # noqa: E402
+from page_test import SIZE, ball, write_nrrd  # noqa: E402
+from proxy import Proxy  # noqa: E402
+
+SHOTS, CHROMIUM, CHROMEDRIVER = Path(sys.argv[2]), sys.argv[3], sys.argv[4]
+MOST_BYTES = 150_000
+
+# Runs before the page: keeps what viewers hold outside of their elements, and pictures by the element that shows them.
+WATCH = """
+window.kept = new Set(); window.pictures = []; window.told = []; window.pressed = [];
+const lasts = (what, signal) => { kept.add(what); signal?.addEventListener('abort', () => kept.delete(what)); };
+for (const target of [window, document]) {
+  const add = target.addEventListener, remove = target.removeEventListener, held = new WeakMap();
+  target.addEventListener = (type, listener, options) => { const what = {listens: type}; held.set(listener, what); lasts(what, options?.signal); add.call(target, type, listener, options); };
+  target.removeEventListener = (type, listener, options) => { kept.delete(held.get(listener)); remove.call(target, type, listener, options); };
+  target.theirs = add;
+}
+for (const [begin, end, repeats] of [['setTimeout', 'clearTimeout', false], ['setInterval', 'clearInterval', true]]) {
+  const start = window[begin], stop = window[end], held = new Map();
+  window[begin] = (run, ms) => { const what = {timer: begin, ms}, id = start(() => { if (!repeats) kept.delete(what); run(); }, ms); held.set(id, what); kept.add(what); return id; };
+  window[end] = id => { kept.delete(held.get(id)); stop(id); };
+}
+window.WebSocket = class extends WebSocket { constructor(...given) { super(...given); const what = {socket: given[0].href}; kept.add(what); this.addEventListener('close', () => kept.delete(what)); } };
+document.theirs('slabstream:drawn', e => { pictures.push({...e.detail, of: e.target.id}); if (pictures.length > 400) pictures.shift(); });
+for (const type of ['slab-state', 'slab-pick', 'slab-error']) document.theirs(type, e => told.push({type, of: e.target.id, detail: e.detail}));
+document.theirs('keydown', e => pressed.push(e.key));
+"""
+
+STYLE = "<style>body { margin: 8px; height: 2000px; background: #fff; } slab-view { width: 470px; height: 320px; float: left; margin-right: 8px; }</style>"
+TWO = f"""<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Two volumes</title><script type="module" src="assets/widget.js"></script>{STYLE}</head>
+<body><input id="field"><br><slab-view id="one" src="." token="TOKEN" dataset="patient" azimuth="200" renderer="raycast"></slab-view>
+<slab-view id="two" src="./api/v1#token=TOKEN" dataset="sphere" orientation-marker="0"></slab-view></body></html>"""
+
+# A kernel as the Python client has it: relays to the gateway at this page's address. `answers`: whether it does.
+KERNEL = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>A notebook</title><style>body { background: #111; }</style></head><body><div id="cell"></div><script type="module">
+import widget from './assets/widget.js';
+class Model {
+  constructor(traits) { this.traits = traits; this.listeners = []; this.sent = []; this.sockets = new Map(); this.answers = true; this.saves = 0; }
+  get(name) { return this.traits[name]; }
+  set(name, value) { this.traits[name] = value; this.fire(`change:${name}`); }
+  save_changes() { this.saves++; }
+  on(event, listener) { this.listeners.push([event, listener]); }
+  off(event, listener) { this.listeners = this.listeners.filter(([e, l]) => e !== event || l !== listener); }
+  fire(event, ...given) { for (const [of, listener] of [...this.listeners]) if (of === event) listener(...given); }
+  tell(message, bytes) { if (this.answers) this.fire('msg:custom', message, bytes ? [new DataView(bytes)] : []); }
+  send(message, callbacks, buffers = []) {
+    this.sent.push(message);
+    if (!this.answers) return;
+    if (message.ask !== undefined) void this.ask(message, buffers);
+    if (message.open !== undefined) this.open(message.open);
+    if (message.send !== undefined) this.sockets.get(message.send)?.send(message.text);
+    if (message.close !== undefined) this.sockets.get(message.close)?.close();
+  }
+  async ask({ask, method, path}, [body]) {
+    const answer = await fetch(`api/v1/${path}`, {method, body, headers: {Authorization: 'Bearer TOKEN'}});
+    this.tell({answer: ask, status: answer.status, type: answer.headers.get('Content-Type')}, await answer.arrayBuffer());
+  }
+  open(id) {
+    const socket = new WebSocket(new URL('api/v1/view', location.href.replace('http', 'ws')), ['slabstream.view.v1', 'slabstream.token.TOKEN']);
+    socket.binaryType = 'arraybuffer';
+    this.sockets.set(id, socket);
+    socket.onopen = () => this.tell({opened: id});
+    socket.onmessage = ({data}) => typeof data === 'string' ? this.tell({heard: id, text: data}) : this.tell({heard: id}, data);
+    socket.onclose = ({reason}) => { this.sockets.delete(id); this.tell({closed: id, reason}); };
+  }
+}
+window.start = traits => {
+  window.model = new Model({_address: '', _state: {}, _height: '300px', _panel: false, ...traits});
+  window.cell = document.querySelector('#cell');
+  window.stop = widget.render({model, el: cell});
+};
+</script></body></html>"""
+
+
+class WidgetTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.programs = Programs()
+        cls.addClassCleanup(cls.programs.close)
+        write_nrrd(cls.programs.folder / "p.nrrd", SIZE, ball)
+        cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
+        cls.service, cls.endpoint = cls.programs.up("--data", "patient=p.nrrd", "--data", "sphere=s.nrrd")
+        cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
+        wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
+        pages = {"/two": TWO, "/kernel": KERNEL}
+        cls.proxy = Proxy(cls.gateway.host, cls.gateway.port, answers={path: lambda fields, body, text=text: text.replace("TOKEN", cls.gateway.token) for path, text in pages.items()})
+        cls.addClassCleanup(cls.proxy.close)
+        cls.driver = browser.start(CHROMIUM, CHROMEDRIVER)
+        cls.addClassCleanup(cls.driver.quit)
+
+    def open(self, path):
+        tab = Viewer(self.driver, f"http://127.0.0.1:{self.proxy.port}{path}", script=WATCH)
+        self.addCleanup(tab.close)
+        return tab
+
+    def final(self, tab, of, condition="true", pane="3d"):
+        """The lossless picture of an element whose options `o` fulfil a condition; its pixels are those of the command line."""
+        drawn = tab.until(f"(d => {{ const o = d?.options; return d?.final && o['look-at'] && ({condition}) ? d : null; }})(pictures.filter(d => d.of === arguments[0] && d.pane === arguments[1]).pop())", of, pane)
+        shown = tab.js("""(c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return [c.width, c.height, [...d].map(b => b.toString(16).padStart(2, '0')).join('')]; })
+            (document.querySelector(arguments[0]).shadowRoot.querySelector('[data-pane="3d"] canvas'))""", f"#{of}" if of else "#cell > div")
+        options = {name: value for name, value in drawn["options"].items() if name != "dataset"}
+        self.programs.run("render", drawn["options"]["dataset"], "--endpoint", self.endpoint, "-o", "cli.png", *[f"--{name}" if value is True else f"--{name}={value}" for name, value in options.items()])
+        width, height, expected = png_pixels((self.programs.folder / "cli.png").read_bytes())
+        self.assertEqual(shown[:2], [width, height])
+        self.assertTrue(bytes.fromhex(shown[2]) == expected, "the pixels are those of the command line")
+        return drawn
+
+    def place(self, tab, of):
+        """The middle of the element's picture."""
+        return tab.js("(b => [b.left + b.width / 2, b.top + b.height / 2])(document.querySelector(arguments[0]).shadowRoot.querySelector('canvas').getBoundingClientRect())", of)
+
+    def mouse(self, tab, of, *places):
+        """Presses in the middle of the picture, moves to these places, which count from there, and lets go."""
+        x, y = self.place(tab, of)
+        tab.command("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
+        for dx, dy in places:
+            tab.command("Input.dispatchMouseEvent", type="mouseMoved", x=x + dx, y=y + dy, button="left", buttons=1)
+        dx, dy = places[-1] if places else (0, 0)
+        tab.command("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
+
+    def wheel(self, tab, of):
+        x, y = self.place(tab, of)
+        tab.command("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-100)
+
+    def key(self, tab, key):
+        for kind in ("keyDown", "keyUp"):
+            tab.command("Input.dispatchKeyEvent", type=kind, key=key, code=f"Key{key.upper()}", text=key if kind == "keyDown" else "")
+
+    def test_the_module_is_small(self):
+        status, headers, body = self.gateway.request("/assets/widget.js", headers={"Accept-Encoding": "gzip"})
+        self.assertEqual((status, headers["Content-Type"]), (200, "text/javascript"))
+        self.assertLessEqual(len(body), MOST_BYTES)
+        self.assertIn(b"slab-view", gzip.decompress(body))
+
+    def test_two_elements_in_a_page_are_apart(self):
+        tab = self.open("/two")
+        one, two = self.final(tab, "one"), self.final(tab, "two")
+        self.assertEqual((one["options"]["dataset"], two["options"]["dataset"]), ("patient", "sphere"))
+        self.assertEqual((one["options"]["azimuth"], two["options"]["azimuth"]), (200, 30), "of a link, and of the dataset")
+        tab.save(SHOTS, "elements")
+        self.assertTrue(tab.js("document.activeElement === document.body"), "nobody takes the focus")
+
+        # The hand turns one of them, and the page hears of it. A click picks.
+        tab.js("(pictures.length = 0, told.length = 0, true)")
+        self.mouse(tab, "#one", (20, 10), (50, 25))
+        turned = self.final(tab, "one", "o.azimuth !== 200")
+        self.assertAlmostEqual(turned["options"]["azimuth"], 180, places=3)
+        tab.until("told.some(t => t.type === 'slab-state' && t.of === 'one' && t.detail.azimuth === String(arguments[0]))", turned["options"]["azimuth"])
+        self.assertEqual(tab.js("document.querySelector('#one').state.azimuth"), str(turned["options"]["azimuth"]))
+        self.mouse(tab, "#one")
+        picked = tab.until("told.find(t => t.type === 'slab-pick')")
+        self.assertEqual((picked["of"], picked["detail"]["hit"]), ("one", True))
+        self.assertEqual(tab.js("pictures.filter(d => d.of === 'two').length"), 0, "the other one stands still")
+
+        # Keys are those of the viewer that has the focus, and nobody else's.
+        tab.js("(pressed.length = 0, true)")
+        self.key(tab, "l")
+        tab.until("document.querySelector('#one').shadowRoot.querySelectorAll('.pane').length === 4")
+        self.assertEqual(tab.js("[pressed, document.querySelector('#two').shadowRoot.querySelectorAll('.pane').length]"), [[], 1])
+        for pane in ("axial", "coronal", "sagittal"):
+            tab.until("pictures.some(d => d.of === 'one' && d.pane === arguments[0] && d.final)", pane)
+        tab.save(SHOTS, "elements-slices")
+        self.key(tab, "l")
+        tab.js("(document.querySelector('#field').focus(), true)")
+        self.key(tab, "m")
+        self.assertEqual(tab.js("[document.querySelector('#field').value, pressed.join('')]"), ["m", "m"])
+        self.assertTrue(tab.js("document.querySelector('#one').shadowRoot.querySelector('.machine').hidden"))
+
+        # So is the wheel: elsewhere it scrolls the page.
+        zoom = tab.js("document.querySelector('#two').state.zoom")
+        tab.js("(window.scrolled = 0, addEventListener('wheel', e => { scrolled += e.defaultPrevented ? 0 : 1; }), true)")
+        self.wheel(tab, "#two")
+        tab.until("scrolled === 1")
+        self.assertEqual(tab.js("document.querySelector('#two').state.zoom"), zoom)
+
+        # Attributes move the view, and so does the property.
+        tab.js("(document.querySelector('#two').setAttribute('azimuth', '80'), document.querySelector('#two').setAttribute('elevation', '-10'), true)")
+        self.final(tab, "two", "o.azimuth === 80 && o.elevation === -10")
+        tab.js("(document.querySelector('#two').state = {dataset: 'sphere', roll: '45', azimuth: '10'}, true)")
+        self.final(tab, "two", "o.roll === 45 && o.azimuth === 10 && o.elevation === 0")
+        tab.js("(document.querySelector('#two').setAttribute('dataset', 'patient'), true)")
+        self.final(tab, "two", "o.dataset === 'patient'")
+
+    def test_an_element_that_is_removed_leaves_nothing(self):
+        tab = self.open("/two")
+        self.final(tab, "one")
+        self.final(tab, "two")
+        tab.js("(document.querySelector('#one').shadowRoot.querySelector('canvas').focus(), true)")
+        self.key(tab, "l")
+        tab.until("document.querySelector('#one').shadowRoot.querySelectorAll('.pane').length === 4")
+        self.key(tab, "k")
+        tab.until("document.querySelector('#one').shadowRoot.querySelector('dialog pre') !== null")
+        self.assertGreaterEqual(tab.js("[...kept].filter(k => k.socket).length"), 5)
+        tab.js("(document.querySelectorAll('slab-view').forEach(e => { (window.gone ??= []).push(new WeakRef(e), new WeakRef(e.shadowRoot.querySelector('.viewer'))); e.remove(); }), true)")
+        tab.until("kept.size === 0 || JSON.stringify([...kept]) === '[]'")
+        tab.until("(gc(), gone.every(g => g.deref() === undefined))")
+
+        # One that comes back shows what it showed; one that has no gateway says so.
+        tab.js("""(e => { e.id = 'three'; e.setAttribute('src', '.'); e.setAttribute('token', arguments[0]); e.setAttribute('dataset', 'sphere'); document.body.append(e); return true; })(document.createElement('slab-view'))""", self.gateway.token)
+        self.final(tab, "three", "o.azimuth === 30")
+        tab.js("(document.querySelector('#three').state = {azimuth: '70'}, true)")
+        self.final(tab, "three", "o.azimuth === 70")
+        tab.js("(pictures.length = 0, document.body.prepend(document.querySelector('#three')), true)")
+        self.final(tab, "three", "o.azimuth === 70")
+        tab.js("(document.querySelector('#three').removeAttribute('src'), true)")
+        tab.until("told.some(t => t.type === 'slab-error' && t.detail.includes('src is \"\"'))")
+        self.assertIn("must be the address of a gateway", tab.js("document.querySelector('#three').shadowRoot.textContent"))
+
+    def widget(self, traits=""):
+        tab = self.open("/kernel")
+        tab.until("window.start !== undefined")
+        tab.js(f"(start({{{traits}}}), true)")
+        return tab
+
+    def test_a_notebook_shows_it_over_the_kernel(self):
+        tab = self.widget("_state: {dataset: 'patient', azimuth: '200'}")
+        self.final(tab, "", "o.azimuth === 200")
+        tab.save(SHOTS, "widget")
+        self.assertEqual(tab.js("[model.get('channel'), cell.firstElementChild.clientHeight]"), ["kernel", 300])
+        self.assertEqual(tab.js("[...kept].filter(k => k.socket).length"), 1, "that of the kernel, in this test")
+
+        # The state goes both ways.
+        self.mouse(tab, "#cell > div", (25, 0), (50, 0))
+        self.final(tab, "", "o.azimuth !== 200")
+        tab.until("model.get('_state').azimuth === '180' && model.get('_state').dataset === 'patient'")
+        tab.js("(model.set('_state', {dataset: 'patient', azimuth: '90', elevation: '20'}), true)")
+        self.final(tab, "", "o.azimuth === 90 && o.elevation === 20")
+        tab.js("(model.set('_state', {dataset: 'sphere', ...model.get('_state'), dataset: 'sphere'}), true)")
+        self.final(tab, "", "o.dataset === 'sphere'")
+        tab.until("model.get('_state').dataset === 'sphere'")
+        tab.js("(model.set('_height', '420px'), true)")
+        self.final(tab, "", "o.size.endsWith('x372')")
+
+        # A click picks; errors are told.
+        self.mouse(tab, "#cell > div")
+        tab.until("model.sent.some(m => m.picked?.hit === true)")
+        tab.js("(model.set('_state', {dataset: 'sphere', renderer: 'nothing'}), true)")
+        tab.until("model.sent.some(m => m.error?.includes('nothing'))")
+        tab.js("(model.set('_state', {dataset: 'sphere', azimuth: '10'}), true)")
+        self.final(tab, "", "o.azimuth === 10")
+
+        # It says that it lives, and then that nobody answers; it goes on when somebody does.
+        stream = tab.js("model.sent.find(m => m.open !== undefined).open")
+        tab.until("model.sent.some(m => m.alive?.includes(arguments[0]))", stream)
+        tab.js("(model.answers = false, model.sent.length = 0, true)")
+        tab.until("cell.firstElementChild.shadowRoot.querySelector('.banner:not([hidden])')?.textContent.includes('no longer answers')")
+        tab.until("model.sent.some(m => m.open !== undefined && m.open !== arguments[0])", stream)
+        tab.save(SHOTS, "widget-alone")
+        tab.js("(model.answers = true, pictures.length = 0, true)")
+        tab.until("cell.firstElementChild.shadowRoot.querySelector('.banner').hidden")
+        tab.js("(model.set('_state', {...model.get('_state'), azimuth: '50'}), true)")
+        self.final(tab, "", "o.azimuth === 50")
+
+        # Nothing is left.
+        tab.js("(model.sent.length = 0, stop(), true)")
+        self.assertEqual(tab.js("[model.listeners.length, cell.childElementCount, model.sent.filter(m => m.close !== undefined).length]"), [0, 0, 1])
+        tab.until("(model.sockets.forEach(s => s.close()), kept.size === 0)")
+
+    def test_a_notebook_shows_it_over_the_gateway_where_that_answers(self):
+        tab = self.widget(f"_address: new URL('./#token={self.gateway.token}', location.href).href, _state: {{dataset: 'sphere'}}, _panel: true")
+        self.final(tab, "")
+        self.assertEqual(tab.js("[model.get('channel'), model.sent.length]"), ["gateway", 0])
+        # The gateway's place changes: to one that nobody reaches.
+        tab.js("(model.set('_state', {...model.get('_state'), azimuth: '60'}), model.set('_address', 'http://127.0.0.1:9/#token=x'), true)")
+        self.final(tab, "", "o.azimuth === 60")
+        tab.until("model.get('channel') === 'kernel'")
+        tab.js("(stop(), true)")
+        tab.until("(model.sockets.forEach(s => s.close()), kept.size === 0)")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[5:]])
