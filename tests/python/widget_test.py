@@ -10,6 +10,7 @@ import queue
 import signal
 import struct
 import sys
+import textwrap
 import threading
 import time
 import unittest
@@ -17,7 +18,7 @@ import unittest.mock
 
 import numpy as np
 
-from client_support import WithAService, read_png
+from client_support import ROOT, WithAService, read_png, volume_arrays
 
 try:
     import anywidget  # noqa: F401
@@ -239,6 +240,16 @@ class Widgets(WithAService):
                 thread.join(SECONDS)
                 self.assertFalse(thread.is_alive())
         self.assertEqual(len(self.service.datasets()), 1)
+
+    def test_the_tutorial_runs(self) -> None:
+        text = (ROOT / "docs" / "python.md").read_text()
+        section = text[text.index("## In a notebook") : text.index("## Pictures")]
+        code = textwrap.dedent(section[section.index("    import traitlets") : section.index("\n`camera`")])
+        names = {"ss": ss, "array": volume_arrays()[0], "spacing": (2, 1.5, 1.25)}
+        self.addCleanup(ss.shutdown)
+        exec(compile(code, "python.md", "exec"), names)
+        self.assertEqual(names["second"].camera, ss.Camera(azimuth=90, zoom=2))
+        self.assertGreater(np.asarray(names["image"])[..., :3].max(), 50)
 
     def test_what_is_no_message_is_ignored(self) -> None:
         _, page = self.widget()
