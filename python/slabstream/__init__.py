@@ -18,8 +18,9 @@ from .errors import (
 from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
 from .insitu import Owner
-from .loading import Volume, load, render, show
+from .loading import Volume, load, render, show, view
 from .local import shutdown
+from .page_state import Camera
 from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import Service, connect
@@ -31,9 +32,16 @@ from .viewer import Viewer
 __version__ = "0.2.0"
 
 __all__ = [
-    "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image",
+    "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image",
     "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter", "Progress",
     "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status",
-    "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open",
-    "presets", "render", "show", "shutdown",
+    "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Widget", "Worker", "connect", "load", "open",
+    "presets", "render", "show", "shutdown", "view",
 ]
+
+
+def __getattr__(name: str) -> type:
+    if name == "Widget":  # of packages that not everybody has
+        from .widget import Widget
+        return Widget
+    raise AttributeError(f"module 'slabstream' has no attribute '{name}'")

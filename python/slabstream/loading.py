@@ -7,7 +7,7 @@ import os
 import pathlib
 import tempfile
 import weakref
-from typing import Any, Callable, Iterator
+from typing import TYPE_CHECKING, Any, Callable, Iterator
 
 from .drafts import draft_of
 from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
@@ -15,10 +15,13 @@ from .frame import Frame
 from .image import Image
 from .local import lock, running
 from .options import takes_options_of
-from .service import Service
+from .service import Service, is_address
 from .viewer import VIEWER_OPTIONS, Viewer
 from .volumes import Grid, check_spacing, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
+
+if TYPE_CHECKING:
+    from .widget import Widget
 
 _TAKE_AWAY_SECONDS = 5.0
 
@@ -47,9 +50,11 @@ class Volume(contextlib.AbstractContextManager["Volume"]):
         return self.service.turntable(self.name, frames, **self._shows | options)
 
     @takes_options_of("render")
-    def show(self, **options: Any) -> Viewer:
-        """As Service.show."""
-        return self.service.show(self.name, keep=self, **self._shows | options)
+    def view(self, **options: Any) -> Widget | Viewer:
+        """As Service.view."""
+        return self.service.view(self.name, keep=self, **self._shows | options)
+
+    show = view  # its former name
 
     @takes_options_of("slice")
     def slice(self, **options: Any) -> Image:
@@ -79,8 +84,10 @@ def _is_path(volume: Any) -> bool:
 
 
 def path_text(path: Any, what: str) -> str:
-    """Absolute; options for reading may stand behind a question mark."""
+    """Absolute; options for reading may stand behind a question mark. Addresses ("https://host/scan.ome.zarr") are as they are."""
     text = str(os.fspath(path))
+    if is_address(text):
+        return text
     file = text if os.path.exists(text) else text.partition("?")[0]
     if what == "labels" and not os.path.exists(file):
         file = file.rpartition(":")[0] or file  # FILE:COLOURS
@@ -93,8 +100,8 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
 
-    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax, xarray.DataArray, an
-    image of nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
+    `volume` is a path of any format that slabstream reads, the address of a store, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax,
+    xarray.DataArray, an image of nibabel, SimpleITK, ITK or VTK, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.
@@ -178,9 +185,14 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
 
 
 @takes_options_of("render")
-def show(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
-         overlay: Any = None, service: Service | None = None, **options: Any) -> Viewer:
-    """The viewer of an array or a file, for a notebook: load() and show() in one. The volume stays as long as the viewer."""
+def view(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
+         overlay: Any = None, service: Service | None = None, **options: Any) -> Widget | Viewer:
+    """The viewer of an array or a file, for a notebook: load() and Volume.view() in one, with the arguments of Service.view(). `volume` may also
+    be a Volume. It stays loaded until the viewer is closed."""
     _check(options, VIEWER_OPTIONS)
-    return load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay,
-                service=service).show(**options)
+    loaded = volume if isinstance(volume, Volume) else load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels,
+                                                            overlay=overlay, service=service)
+    return loaded.view(**options)
+
+
+show = view  # its former name

@@ -33,6 +33,7 @@ class Option:
     path: str = ""                  # of the field in a FrameRequest, "view.zoom", or of a parameter, "parameters.kernel"; empty: it is no field
     default: str | None = None
     choices: tuple[str, ...] = ()
+    ability: str = ""               # that a renderer must have
     same_picture: bool = False      # it never changes the finished picture
     negatable: bool = False         # a flag that may be on by itself: False turns it off
     renderers: tuple[dict[str, Any], ...] = ()  # of the option renderer: name, title, purpose, abilities, and the default of each parameter

@@ -6,8 +6,9 @@ import contextlib
 import copy
 import dataclasses
 import os
+import re
 import sys
-from typing import Any, Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Sequence
 
 from . import probe, schema, values
 from .address import Address, find_service
@@ -22,8 +23,11 @@ from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .status import Dataset, Parameter, Simulation, Status, dataset_of, simulation_of, status_of
 from .transfer import TransferFunction, mapped
 from .uploads import upload_of
-from .viewer import Viewer
+from .viewer import Viewer, view
 from .volumes import layers_of, on_grid, volume_of
+
+if TYPE_CHECKING:
+    from .widget import Widget
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
@@ -31,6 +35,11 @@ _QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 _MOST_VIEWS = 1024  # of one question
+
+
+def is_address(path: str) -> bool:
+    """Of a store behind a web server or in a bucket."""
+    return re.match(r"[a-z][a-z0-9+]*://", path) is not None
 
 
 def _of(field: int | str | None, time: int | str | None) -> dict[str, str]:
@@ -146,15 +155,17 @@ class Service(contextlib.AbstractContextManager["Service"]):
         return self._connection.address
 
     @takes_options_of("render")
-    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None,
-             behind_proxy: str | None = None, keep: Any = None, **options: Any) -> Viewer:
-        """The viewer of a dataset, for a notebook: the value of a cell. It starts a gateway on this machine, which ends with this process. Where
-        the browser does not reach it (JupyterHub), or there is none, a picture with these options is shown; `embed=False` asks for it,
-        `embed=True` for the viewer. Where a page cannot be framed (Visual Studio Code), its address stands below the picture.
-        `behind_proxy`: the address of a proxy through which the browser reaches this machine, with {port} for the gateway's port. `keep`
-        stays as long as the viewer."""
-        draft_of(dataset, options)  # a wrong one is refused here
-        return Viewer(self, dataset, keep, width, height, embed, behind_proxy, options)
+    def view(self, dataset: str, *, height: int | str = 512, panel: bool = False, behind_proxy: str | None = None, keep: Any = None,
+             **options: Any) -> Widget | Viewer:
+        """The viewer of a dataset, for a notebook: the value of a cell. It begins with these options. Where anywidget is missing, a still picture
+        takes its place. It starts a gateway on this machine, which ends with this process.
+
+        `height`: pixels, or a length of CSS. `panel`: the settings show at first. `behind_proxy`: the address of a proxy through which the
+        browser reaches this machine, with {port} for the gateway's port; without one, pictures come over the kernel. `keep` stays as long as
+        the viewer."""
+        return view(self, dataset, keep, height, panel, behind_proxy, options)
+
+    show = view  # its former name
 
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
@@ -222,8 +233,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         where the service has keys. Returns the catalogue."""
         texts = [*items, *(f"{name}={os.fspath(path)}" for name, path in named.items())]
         for text in texts:
-            name, equals, path = text.partition("=")
-            if not (path if equals else name).startswith("/"):
+            name, equals, path = ("", "=", text) if is_address(text) else text.partition("=")
+            where = path if equals else name
+            if not (where.startswith("/") or is_address(where)):
                 raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
         return self._order(schema.DATA_ACTION_ADD, texts, timeout)
 

@@ -571,7 +571,7 @@ class OwnService(InAFolder):
     def test_a_wrong_option_is_told_before_anything_is_started(self) -> None:
         ss.shutdown()
         with unittest.mock.patch("slabstream.loading.running", side_effect=AssertionError("it is started")):
-            for call in (ss.render, ss.show):
+            for call in (ss.render, ss.view):
                 with self.assertRaisesRegex(ss.UnknownOption, "there is no option 'azimut'; did you mean 'azimuth'"):
                     call(volume_arrays()[0], azimut=3)
                 with self.assertRaisesRegex(ss.InvalidArgument, "zoom 0 is out of range"):

@@ -1,0 +1,238 @@
+"""What a widget's page asks over the notebook kernel's channel, handed on to the gateway beside the kernel; and the way back.
+
+A page has this channel where it cannot reach the gateway itself. The messages are those of web/src/kernel_connection.ts:
+
+    from the page                                          to the page
+    {"ask": id, "method": ..., "path": ...}  [body]        {"answer": id, "status": 200, "type": "image/png"}  [body]
+    {"cancel": id}                                         (no answer)
+    {"open": id}                                           {"opened": id}, or {"closed": id, "reason": ...}
+    {"send": id, "text": ..., "more": [text, ...]}         {"heard": id, "text": ...} or {"heard": id}  [picture]
+    {"close": id}                                          {"closed": id, "reason": ...}
+    {"alive": [id, ...]}                                   (no answer)
+
+A stream is a WebSocket of docs/http.md; ids are numbers that a page chooses at random. The kernel's threads never wait: each request and each
+stream has threads of its own. What waits for the page is bounded: a stream is read no further while the kernel has messages of it to send, and
+the gateway sends no picture before the page acknowledges the last one.
+"""
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import http.client
+import json
+import queue
+import socket
+import threading
+import time
+from typing import Any, Callable, Sequence
+
+import websockets.exceptions
+import websockets.sync.client
+import websockets.typing
+
+from .errors import SlabstreamError
+from .gateway import Gateway
+
+_ANSWER_SECONDS = 150.0  # longer than the gateway's own limit, which says why
+_OPEN_SECONDS = 10.0
+_MOST_ASKS = 64
+_MOST_TEXTS = 256   # of a stream, on their way to the gateway
+_MOST_MESSAGES = 4  # of a stream, on their way to the page
+_SILENT_SECONDS = 10.0  # that a stream's page may be, while the kernel is free
+_GAP_SECONDS = 2.0       # between messages of the gateway; what is longer is a kernel that was busy
+_LOOK_SECONDS = 5.0
+
+Say = Callable[[dict[str, Any], Sequence[bytes]], None]
+
+
+class _Here:
+    """The thread that a page's message came on, which also sends the answers: the kernel's own, or one of several (subshells). Without an event
+    loop, whichever thread has an answer sends it."""
+
+    def __init__(self) -> None:
+        self._context = contextvars.copy_context()  # by which kernels know whom they answer
+        try:
+            self._loop: asyncio.AbstractEventLoop | None = asyncio.get_running_loop()
+        except RuntimeError:
+            self._loop = None
+
+    def call(self, function: Callable[[], None]) -> None:
+        """Any thread."""
+        if self._loop is None:
+            function()
+        elif not self.has_ended():
+            self._loop.call_soon_threadsafe(function, context=self._context)
+
+    def has_ended(self) -> bool:
+        return self._loop is not None and (self._loop.is_closed() or not self._loop.is_running())
+
+
+class Relay:
+    """`gateway`: as gateway_of(), of one service. `say` sends a message to the pages. `restarted`: the gateway has another address now."""
+
+    def __init__(self, gateway: Callable[[Gateway | None], Gateway], say: Say, restarted: Callable[[], None]):
+        self._gateway, self.say, self._restarted = gateway, say, restarted
+        self._lock = threading.Lock()
+        self._asks: dict[int, http.client.HTTPConnection | None] = {}
+        self._streams: dict[int, _Stream] = {}
+
+    def hear(self, message: dict[str, Any], buffers: Sequence[Any]) -> None:
+        """A message of a page. What is none of the above is ignored."""
+        if "ask" in message:
+            self._ask(message["ask"], str(message.get("method", "GET")), str(message.get("path", "")), bytes(buffers[0]) if buffers else None)
+        elif "cancel" in message:
+            self._cancel(message["cancel"])
+        elif "open" in message and message["open"] not in self._streams:
+            self._streams[message["open"]] = _Stream(self, message["open"])
+        elif "alive" in message:
+            for each in message["alive"]:
+                if each in self._streams:
+                    self._streams[each].silent = 0.0
+        elif "send" in message and message["send"] in self._streams:
+            for text in (message.get("text", ""), *message.get("more", ())):
+                self._streams[message["send"]].send(str(text))
+        elif "close" in message and message["close"] in self._streams:
+            self._streams[message["close"]].close("")
+
+    def close(self) -> None:
+        for stream in list(self._streams.values()):
+            stream.close("the widget is closed")
+        for ask in list(self._asks):
+            self._cancel(ask)
+
+    def connected(self, here: _Here, connect: Callable[[Gateway], Any]) -> Any:
+        """What `connect` makes of the gateway. One that is gone is started again."""
+        gateway = self._gateway(None)
+        try:
+            return connect(gateway)
+        except ConnectionRefusedError:
+            gateway = self._gateway(gateway)
+        here.call(self._restarted)
+        return connect(gateway)
+
+    # ---- requests
+
+    def _ask(self, ask: int, method: str, path: str, body: bytes | None) -> None:
+        with self._lock:
+            full = len(self._asks) >= _MOST_ASKS
+            if not full:
+                self._asks[ask] = None
+        if full:
+            self.say({"answer": ask, "status": 429, "type": "application/json"}, [_error(f"{_MOST_ASKS} requests are under way, no more are taken")])
+        else:
+            threading.Thread(target=self._fetch, args=(_Here(), ask, method, path, body), name="slabstream ask", daemon=True).start()
+
+    def _fetch(self, here: _Here, ask: int, method: str, path: str, body: bytes | None) -> None:
+        def request(gateway: Gateway) -> http.client.HTTPConnection:
+            connection = http.client.HTTPConnection(gateway.host, gateway.port, timeout=_ANSWER_SECONDS)
+            connection.connect()
+            with self._lock:
+                if ask in self._asks:
+                    self._asks[ask] = connection
+            connection.request(method, f"/api/v1/{path}", body, {"Authorization": f"Bearer {gateway.token}"})
+            return connection
+
+        try:
+            connection = self.connected(here, request)
+            try:
+                response = connection.getresponse()
+                status, kind, found = response.status, response.getheader("Content-Type", ""), response.read()
+            finally:
+                connection.close()
+        except (OSError, ValueError, http.client.HTTPException, SlabstreamError) as error:
+            status, kind, found = 503, "application/json", _error(str(error) or type(error).__name__)
+        with self._lock:
+            wanted = ask in self._asks
+            self._asks.pop(ask, None)
+        if wanted:
+            here.call(lambda: self.say({"answer": ask, "status": status, "type": kind}, [found]))
+
+    def _cancel(self, ask: int) -> None:
+        with self._lock:
+            connection = self._asks.pop(ask, None)
+        if connection is not None and connection.sock is not None:
+            try:
+                connection.sock.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass  # the answer has come
+
+    def end(self, stream: int) -> None:
+        self._streams.pop(stream, None)
+
+
+def _error(text: str) -> bytes:
+    return json.dumps({"error": text}).encode()
+
+
+class _Stream:
+    """A WebSocket to the gateway. One thread reads it, one writes to it."""
+
+    def __init__(self, relay: Relay, number: int):
+        self.silent = 0.0  # seconds since the page named it
+        self._said_at = time.monotonic()
+        self._relay, self._number, self._here = relay, number, _Here()
+        self._texts: queue.Queue[str | None] = queue.Queue(_MOST_TEXTS)
+        self._room = threading.Semaphore(_MOST_MESSAGES)
+        self._reason: str | None = None  # why the page or the kernel has closed it
+        threading.Thread(target=self._read, name="slabstream stream", daemon=True).start()
+
+    def send(self, text: str | None) -> None:
+        try:
+            self._texts.put_nowait(text)
+        except queue.Full:  # the gateway takes nothing; the writer looks at the reason
+            self._reason = self._reason or f"{_MOST_TEXTS} messages wait for the gateway"
+
+    def close(self, reason: str) -> None:
+        """It ends soon after."""
+        self._reason = reason
+        self._room.release()
+        self.send(None)
+
+    def _read(self) -> None:
+        try:
+            with self._relay.connected(self._here, _open) as opened:
+                threading.Thread(target=self._write, args=(opened,), name="slabstream stream out", daemon=True).start()
+                self._tell({"opened": self._number})
+                for message in opened:
+                    text, picture = ({"text": message}, []) if isinstance(message, str) else ({}, [message])
+                    self._tell({"heard": self._number, **text}, picture)
+                    if self._reason is not None:
+                        break
+                reason = opened.close_reason or ""
+        except (OSError, websockets.exceptions.WebSocketException, SlabstreamError) as error:
+            reason = str(error) or type(error).__name__
+        self.send(None)
+        self._relay.end(self._number)
+        said = reason if self._reason is None else self._reason
+        self._here.call(lambda: self._relay.say({"closed": self._number, "reason": said}, []))
+
+    def _tell(self, message: dict[str, Any], buffers: Sequence[bytes] = ()) -> None:
+        """Waits while the kernel has several messages to send: it may be busy."""
+        while not self._room.acquire(timeout=_LOOK_SECONDS):
+            if self._here.has_ended():
+                raise ConnectionError("the page has gone")
+        self._here.call(lambda: self._say(message, buffers))
+
+    def _say(self, message: dict[str, Any], buffers: Sequence[bytes]) -> None:
+        now = time.monotonic()
+        self.silent += min(now - self._said_at, _GAP_SECONDS)
+        self._said_at = now
+        self._room.release()
+        if self.silent > _SILENT_SECONDS:
+            self.close("the page has gone")
+        elif self._reason is None:
+            self._relay.say(message, buffers)
+
+    def _write(self, opened: websockets.sync.client.ClientConnection) -> None:
+        try:
+            while self._reason is None and (text := self._texts.get()) is not None:
+                opened.send(text)
+        except websockets.exceptions.ConnectionClosed:
+            pass  # the reader says so
+        opened.close()
+
+
+def _open(gateway: Gateway) -> websockets.sync.client.ClientConnection:
+    protocols = [websockets.typing.Subprotocol(name) for name in ("slabstream.view.v1", f"slabstream.token.{gateway.token}")]
+    return websockets.sync.client.connect(f"ws://{gateway.host}:{gateway.port}/api/v1/view", subprotocols=protocols, compression=None,
+                                          open_timeout=_OPEN_SECONDS, max_size=None, proxy=None)
