@@ -22,7 +22,7 @@ from .loading import Volume, load, render, show
 from .local import shutdown
 from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
-from .service import Service, connect
+from .service import AsyncService, Service, connect, connect_async
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
@@ -31,9 +31,9 @@ from .viewer import Viewer
 __version__ = "0.2.0"
 
 __all__ = [
-    "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image",
-    "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter", "Progress",
-    "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status",
-    "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open",
-    "presets", "render", "show", "shutdown",
+    "AsyncService", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram",
+    "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter",
+    "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source",
+    "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect",
+    "connect_async", "load", "open", "presets", "render", "show", "shutdown",
 ]

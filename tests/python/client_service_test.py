@@ -18,13 +18,11 @@ import unittest.mock
 
 import numpy as np
 
-from client_support import PROGRAM, PROGRAMS, START_SECONDS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
+from client_support import HEAVY, PROGRAM, PROGRAMS, START_SECONDS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
 from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
 from slabstream.programs import find_program  # noqa: E402
-
-HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)
 
 
 class AtAService(WithAService):

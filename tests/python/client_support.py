@@ -25,6 +25,7 @@ PROGRAM = str(PROGRAMS / "slabstream")
 from slabstream import volumes  # noqa: E402
 
 START_SECONDS = 60
+HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)  # options of a frame that takes seconds
 
 
 def volume_arrays() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
