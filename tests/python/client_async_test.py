@@ -102,6 +102,7 @@ class Async(WithAService, unittest.IsolatedAsyncioTestCase):
         await asyncio.wait([dropped])
         slow.allowed.set()
         self.assertEqual([each.name for each in await self.service.datasets()], ["head"])
+        self.assertEqual(self.service._connection._loop.requests._questions, {}, "nobody waits for the answer")
 
     async def idle(self) -> bool:
         status = await self.service.status()
