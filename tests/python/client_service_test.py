@@ -392,7 +392,9 @@ class Addresses(InAFolder):
 class Keys(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="slabstream-test-")))
+        made = tempfile.TemporaryDirectory(prefix="slabstream-test-")
+        cls.addClassCleanup(made.cleanup)
+        cls.folder = pathlib.Path(made.name)
         cls.keys = cls.folder / "keys"
         cls.running = RunningService(cls.folder, "--data", write_volumes(cls.folder), "--keys", str(cls.keys), listen="tcp://127.0.0.1:*")
         cls.addClassCleanup(cls.running.end)
