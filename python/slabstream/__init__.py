@@ -23,7 +23,7 @@ from .local import shutdown
 from .page_state import Camera
 from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
-from .service import Service, connect
+from .service import AsyncService, Service, connect, connect_async
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
@@ -32,11 +32,11 @@ from .viewer import Viewer
 __version__ = "0.2.0"
 
 __all__ = [
-    "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry", "Histogram", "Image",
-    "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter", "Progress",
-    "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status",
-    "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Widget", "Worker", "connect", "load", "open",
-    "presets", "render", "show", "shutdown", "view",
+    "AsyncService", "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry",
+    "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner",
+    "Parameter", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
+    "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Widget",
+    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "show", "shutdown", "view",
 ]
 
 

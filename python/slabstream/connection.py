@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
+import functools
 import math
 import os
 import queue
@@ -9,14 +11,15 @@ import struct
 import threading
 import time
 import weakref
-from typing import Any, Callable, Iterable
+from typing import Any, Callable, Iterator
 
 import zmq
 
 from . import schema
 from .address import Address
-from .errors import InvalidArgument, SlabstreamError, Unavailable
+from .errors import InvalidArgument, Unavailable
 from .requests import Observer, Requests
+from .waiting import Changes, Front
 
 CONNECT_SECONDS = 4.0
 ANSWER_SECONDS = 5.0
@@ -82,11 +85,18 @@ class _Loop:
 
     def call(self, function: Callable[[], None]) -> None:
         """Has the thread run `function`."""
+        self.check_process()  # before the lock, which a thread of the parent may hold in a forked child for ever
         with self.lock:
-            if self.ends or os.getpid() != self.process:  # a forked child has no thread that would do it
+            if self.ends:
                 raise Unavailable(f"the connection to the service at {self.endpoint} is closed")
             self.calls.put(function)
             self._wake()
+
+    def check_process(self) -> None:
+        """Unavailable: in a forked child, which has no thread that would answer."""
+        if os.getpid() != self.process:
+            raise Unavailable(f"process {os.getpid()} was forked, and the connection to the service at {self.endpoint} is that of process "
+                              f"{self.process}: connect in each process")
 
     def stop(self) -> None:
         if os.getpid() != self.process:
@@ -164,20 +174,27 @@ class _Loop:
 
 
 class Connection:
-    """Any thread. Unavailable: nobody answers within `timeout` seconds, or the service refuses the key."""
+    """Any thread. Whoever waits does so as `front` has it."""
 
-    def __init__(self, address: Address, timeout: float = CONNECT_SECONDS):
-        self.address, self.endpoint = address, address.endpoint
+    def __init__(self, address: Address, front: Front):
+        self.address, self.endpoint, self.front = address, address.endpoint, front
         try:
             self._loop = _Loop(address)
         except zmq.ZMQError as error:
             raise Unavailable(f'endpoint "{address.endpoint}": {error.strerror}') from None
         self.close = weakref.finalize(self, self._loop.stop)
+
+    async def greet(self, timeout: float) -> None:
+        """Unavailable: nobody answers within `timeout` seconds, or the service refuses the key. The connection is closed then."""
         try:
-            self.ask("client_ping", schema.ClientPing(), timeout)
-        except SlabstreamError:
-            self.close()
+            await self.ask("client_ping", schema.ClientPing(), timeout)
+        except BaseException:
+            await self.front.do(self.close)
             raise
+
+    def check_process(self) -> None:
+        """Unavailable: in a forked child."""
+        self._loop.check_process()
 
     def submit(self, frame: Any, deadline_seconds: float, observer: Observer) -> int:
         """The request's number."""
@@ -190,54 +207,47 @@ class Connection:
         """`number`: of submit()."""
         self._loop.call(lambda: self._loop.requests.cancel(number))
 
-    def upload(self, order: Any, parts: Iterable[memoryview]) -> Any:
+    async def upload(self, order: Any, parts: Iterator[memoryview]) -> Any:
         """Sends a volume: an AddVolume, then its bytes in parts of at most MOST_PART_BYTES, which are asked for as the service takes them.
         The DataReply."""
-        answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        changed = threading.Condition()
+        changes = Changes()
         allowed, sent = 0, 0
-        requests = self._loop.requests
-        nonce = next(requests.numbers)
 
         def credited(most: int) -> None:
             nonlocal allowed
-            with changed:
-                allowed = most
-                changed.notify()
+            allowed = most
+            changes.tell()
 
-        def ended(_: Any) -> None:
-            with changed:
-                changed.notify()
-
-        def send(begin: int, part: memoryview) -> None:
-            self._loop.call(lambda: requests.send_part(nonce, begin, part))
-
-        answer.add_done_callback(ended)
-        self._loop.call(lambda: requests.ask(nonce, "add_volume", order, answer, time.monotonic(), credited))
-        try:
-            for part in parts:
-                with changed:
-                    changed.wait_for(lambda: answer.done() or allowed >= sent + part.nbytes)
+        with self._asked("add_volume", order, credited) as (nonce, answer):
+            answer.add_done_callback(lambda _: changes.tell())
+            while (part := await self.front.do(lambda: next(parts, None))) is not None:
+                end = sent + part.nbytes
+                await changes.until(self.front, lambda: answer.done() or allowed >= end)
                 if answer.done():
                     break
-                send(sent, part)
-                sent += part.nbytes
+                self._loop.call(functools.partial(self._loop.requests.send_part, nonce, sent, part))
+                sent = end
+            await self.front.wait(answer)
             return answer.result()
-        except BaseException:
-            if not answer.done():
-                self._loop.call(lambda: requests.forget(nonce))
-            raise
 
-    def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
+    async def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
         """The answer to a question or an order, or the service's refusal as an exception."""
+        with self._asked(kind, message) as (_, answer):
+            if not await self.front.wait(answer, timeout):
+                raise Unavailable(f"no service answers at {self.endpoint} within {round(1000 * timeout)} ms")
+            return answer.result()
+
+    @contextlib.contextmanager
+    def _asked(self, kind: str, message: Any, credited: Callable[[int], None] | None = None,
+               ) -> Iterator[tuple[int, concurrent.futures.Future[Any]]]:
+        """A question or an order: its number, and its answer. After the block nobody waits for it: the time was over, or whoever waited was
+        interrupted."""
         answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
         requests = self._loop.requests
         nonce = next(requests.numbers)
-        self._loop.call(lambda: requests.ask(nonce, kind, message, answer, time.monotonic()))
+        self._loop.call(lambda: requests.ask(nonce, kind, message, answer, time.monotonic(), credited))
         try:
-            return answer.result(timeout)
-        except concurrent.futures.TimeoutError:
-            if answer.done():
-                raise  # the service's own
-            self._loop.call(lambda: requests.forget(nonce))
-            raise Unavailable(f"no service answers at {self.endpoint} within {round(1000 * timeout)} ms") from None
+            yield nonce, answer
+        finally:
+            if not answer.done():
+                self._loop.call(lambda: requests.forget(nonce))

@@ -2,11 +2,11 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import logging
-import threading
 import time
-from typing import Any, Callable, Iterator
+from typing import Any, AsyncGenerator, AsyncIterator, Callable, Generator, Iterator
 
 from . import schema
 from .annotations import key_of
@@ -15,6 +15,7 @@ from .drafts import Draft
 from .errors import DataLoss, DeadlineExceeded, SlabstreamError
 from .image import Image, compose, geometry_of, statistics_of
 from .runs import read_runs
+from .waiting import ASYNCIO, BLOCKING, Changes, Front, each, run
 
 _log = logging.getLogger("slabstream")
 
@@ -37,14 +38,13 @@ class _Waiting:
         self.on_progress, self.on_preview = on_progress, on_preview
         self.end: concurrent.futures.Future[Image] = concurrent.futures.Future()
         self.end.set_running_or_notify_cancel()  # from now on nobody but the service ends it
-        self.changed = threading.Condition()
+        self.changed = Changes()
         self.progress: Progress | None = None
         self.preview: Image | None = None
         self.submitted = time.monotonic()
 
     def progressed(self, progress: Any) -> None:
-        with self.changed:
-            self.progress = schema.read(Progress, progress, phase=schema.word(progress, "phase", "running"))
+        self.progress = schema.read(Progress, progress, phase=schema.word(progress, "phase", "running"))
         if self.on_progress is not None:
             _tell(self.on_progress, self.progress)
 
@@ -61,21 +61,17 @@ class _Waiting:
         image = Image(rgba, depth, format=format, geometry=geometry_of(reply.geometry),
                       statistics=None if preview else statistics_of(reply.statistics, latency), preview=preview)
         if preview:
-            with self.changed:
-                self.preview = image
-                self.changed.notify_all()
+            self.preview = image
+            self.changed.tell()
             if self.on_preview is not None:
                 _tell(self.on_preview, image)
         else:
-            self._finish(lambda: self.end.set_result(image))
+            self.end.set_result(image)
+            self.changed.tell()
 
     def failed(self, error: SlabstreamError) -> None:
-        self._finish(lambda: self.end.set_exception(error))
-
-    def _finish(self, finish: Callable[[], None]) -> None:
-        finish()
-        with self.changed:
-            self.changed.notify_all()
+        self.end.set_exception(error)
+        self.changed.tell()
 
 
 def _tell(callback: Callable[[Any], None], value: Any) -> None:
@@ -86,7 +82,9 @@ def _tell(callback: Callable[[Any], None], value: Any) -> None:
 
 
 class Frame:
-    """Made by submit(). Like a concurrent.futures.Future; any thread."""
+    """Made by submit(). Like a concurrent.futures.Future; any thread. With asyncio, `await frame` is the picture, and
+    `async for image in frame` has what previews() has. If whoever waits is interrupted, by Ctrl-C or as a task that is cancelled, so is the
+    frame."""
 
     def __init__(self, connection: Connection, draft: Draft, deadline: float, on_progress: Callable[[Progress], None] | None,
                  on_preview: Callable[[Image], None] | None):
@@ -96,19 +94,33 @@ class Frame:
 
     def result(self, timeout: float | None = None) -> Image:
         """The picture. Raises why there is none; DeadlineExceeded, which is a TimeoutError, if it is not there after `timeout` seconds."""
-        error = self.exception(timeout)
-        if error is not None:
-            raise error
-        return self._waiting.end.result()
+        return run(picture_of(self, BLOCKING, timeout))
+
+    def __await__(self) -> Generator[Any, None, Image]:
+        return picture_of(self, ASYNCIO).__await__()
 
     def exception(self, timeout: float | None = None) -> SlabstreamError | None:
         """Why there is no picture, or None. Waits as result() does."""
-        try:
-            error = self._waiting.end.exception(timeout)
-        except concurrent.futures.TimeoutError:
-            raise DeadlineExceeded(f"the frame is not finished after {timeout:g} s") from None
+        run(self._until_done(BLOCKING, timeout))
+        error = self._waiting.end.exception()
         assert error is None or isinstance(error, SlabstreamError)
         return error
+
+    async def _until_done(self, front: Front, timeout: float | None = None) -> None:
+        with self._cancelled_if_interrupted():
+            done = await front.wait(self._waiting.end, timeout)
+        if not done:
+            raise DeadlineExceeded(f"the frame is not finished after {timeout:g} s")
+
+    @contextlib.contextmanager
+    def _cancelled_if_interrupted(self) -> Iterator[None]:
+        if not self.done():
+            self._connection.check_process()
+        try:
+            yield
+        except BaseException:
+            self.cancel()
+            raise
 
     def done(self) -> bool:
         return self._waiting.end.done()
@@ -124,7 +136,7 @@ class Frame:
 
     @property
     def future(self) -> concurrent.futures.Future[Image]:
-        """For concurrent.futures.wait and asyncio.wrap_future. Its cancel() does nothing here: use Frame's."""
+        """For concurrent.futures.wait. Its cancel() does nothing here: use Frame's."""
         return self._waiting.end
 
     @property
@@ -134,17 +146,28 @@ class Frame:
 
     def previews(self) -> Iterator[Image]:
         """Previews while they come, then the picture: always the newest, each once. Needs submit(previews=True)."""
+        return each(self._shown(BLOCKING))
+
+    def __aiter__(self) -> AsyncIterator[Image]:
+        return self._shown(ASYNCIO)
+
+    async def _shown(self, front: Front) -> AsyncGenerator[Image, None]:
         seen: Image | None = None
         while True:
-            with self._waiting.changed:
-                self._waiting.changed.wait_for(lambda: self.done() or self._waiting.preview is not seen)
-                newest = self._waiting.preview
+            with self._cancelled_if_interrupted():
+                await self._waiting.changed.until(front, lambda: self.done() or self._waiting.preview is not seen)
             if self.done():
-                yield self.result()
+                yield self._waiting.end.result()
                 return
-            assert newest is not None
-            yield newest
-            seen = newest
+            seen = self._waiting.preview
+            assert seen is not None
+            yield seen
 
     def __repr__(self) -> str:
         return f"<slabstream.Frame of '{self._waiting.draft.frame.dataset}', {'done' if self.done() else 'open'}>"
+
+
+async def picture_of(frame: Frame, front: Front, timeout: float | None = None) -> Image:
+    """As Frame.result(), but waits as `front` has it."""
+    await frame._until_done(front, timeout)
+    return frame.future.result()

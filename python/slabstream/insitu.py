@@ -92,9 +92,10 @@ class Owner:
         self._handle, self._process = ctypes.c_void_p(), os.getpid()
         self._maker: _Maker | None = None
         boxes = [[(0, side) for side in shape]] if boxes is None else boxes
+        for what, given in (("held", held), ("strides", strides)):
+            if given is not None and len(given) != len(boxes):
+                raise InvalidArgument(f"{what} has {len(given)} boxes, must be {len(boxes)}")
         held = boxes if held is None else held
-        if len(held) != len(boxes):
-            raise InvalidArgument(f"held has {len(held)} boxes, must be {len(boxes)}")
         self._held = [tuple(end - begin for begin, end in box) for box in held]
         if strides is None:
             item = self.dtype.itemsize
@@ -110,7 +111,7 @@ class Owner:
                        service.encode() if service else None, ",".join(fields).encode() or None, field)
         _call("open", ctypes.byref(self._handle), ctypes.byref(about))
         try:
-            for owned, around, steps in zip(boxes, held, self._strides, strict=True):
+            for owned, around, steps in zip(boxes, held, self._strides):
                 ends = [_xyz(ctypes.c_int32, [pair[i] for pair in box], "box") for box in (owned, around) for i in (0, 1)]
                 _call("add_box", self._handle, *ends, _xyz(ctypes.c_int64, [step // self.dtype.itemsize for step in steps], "strides"))
             for name, (least, most, value) in (parameters or {}).items():

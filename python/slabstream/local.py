@@ -11,7 +11,6 @@ import threading
 from typing import Any
 
 from .address import Address
-from .connection import Connection
 from .errors import SlabstreamError, Unavailable
 from .programs import Kept, find_program
 from .service import Service
@@ -34,7 +33,7 @@ class LocalService:
             self.program = Kept([program, "up", "--listen", endpoint], f"rm -rf -- {shlex.quote(str(self.folder))}", stderr=errors,
                                 env={**os.environ, "XDG_RUNTIME_DIR": str(self.folder)})
         try:
-            self.service = Service(Connection(Address(self._endpoint())))
+            self.service = Service(Address(self._endpoint()))
         except BaseException:
             self.end()
             raise

@@ -1,21 +1,21 @@
-"""Service: a connected service. All of it may be used by several threads at once."""
+"""AsyncService and Service: a connected service, for asyncio and for everybody else. All of it may be used by several threads at once."""
 from __future__ import annotations
 
 import collections
 import contextlib
 import copy
-import dataclasses
+import functools
 import os
 import re
 import sys
-from typing import TYPE_CHECKING, Any, Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, AsyncGenerator, Callable, Coroutine, Generator, Iterator, Sequence, TypeVar
 
 from . import probe, schema, values
 from .address import Address, find_service
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
 from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
-from .frame import Frame, Progress
+from .frame import Frame, Progress, picture_of
 from .image import Image, side_by_side
 from .moves import ball_around, cameras_of, times_of, turned_views
 from .options import COMMANDS, takes_options_of
@@ -25,9 +25,7 @@ from .transfer import TransferFunction, mapped
 from .uploads import upload_of
 from .viewer import Viewer, view
 from .volumes import layers_of, on_grid, volume_of
-
-if TYPE_CHECKING:
-    from .widget import Widget
+from .waiting import ASYNCIO, BLOCKING, Front, each, run
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
@@ -61,28 +59,40 @@ def _with_views(draft: Draft, views: Iterator[Any], times: Sequence[str]) -> Ite
         yield moved
 
 
-class Service(contextlib.AbstractContextManager["Service"]):
-    """Made by connect(). A context manager: leaving it closes the connection, which cancels what is open."""
+class AsyncService:
+    """Made by connect_async(): a service for asyncio. It has the methods of Service, as coroutines, which never block the event loop. Any
+    number of tasks, of any loops, may use it. If a task is cancelled, the service gives up what the task waits for. An async context
+    manager: leaving it closes the connection."""
 
-    def __init__(self, connection: Connection):
-        self._connection = connection
+    def __init__(self, address: Address, timeout: float, front: Front = ASYNCIO):
+        self._connection, self._timeout = Connection(address, front), timeout
+
+    async def __aenter__(self) -> AsyncService:
+        await self._connection.greet(self._timeout)
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self.close()
+
+    def __await__(self) -> Generator[Any, None, AsyncService]:
+        return self.__aenter__().__await__()
 
     @property
     def endpoint(self) -> str:
         return self._connection.endpoint
 
     @takes_options_of("render")
-    def render(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
+    async def render(self, /, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """A picture of a dataset, by its name in the service's catalogue. Waits for it, at most `deadline` seconds.
 
         Raises InvalidArgument, NotFound, Unavailable, ResourceExhausted or DeadlineExceeded with the service's sentence.
         """
-        return self._wait_for(self.submit(dataset, deadline=deadline, **options))
+        return await picture_of(await self.submit(dataset, deadline=deadline, **options), self._connection.front)
 
     @takes_options_of("render")
-    def submit(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, previews: bool = False,
-               on_progress: Callable[[Progress], None] | None = None, on_preview: Callable[[Image], None] | None = None,
-               **options: Any) -> Frame:
+    async def submit(self, /, dataset: str, *, deadline: float = DEADLINE_SECONDS, previews: bool = False,
+                     on_progress: Callable[[Progress], None] | None = None, on_preview: Callable[[Image], None] | None = None,
+                     **options: Any) -> Frame:
         """Asks for a picture and returns at once.
 
         `previews`, or an `on_preview`: a picture of coarse voxels first, if the others take long to read, then one after each group of
@@ -90,55 +100,64 @@ class Service(contextlib.AbstractContextManager["Service"]):
         service. `deadline` is in seconds, up to a day.
         """
         draft = draft_of(dataset, options)
-        self._settle([draft])
+        await self._settle([draft])
         draft.frame.previews = previews or on_preview is not None
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
     @takes_options_of("render")
-    def turntable(self, dataset: str, frames: int | None = None, *, turns: int = 1, path: Any = None, in_flight: int = 2,
-                  deadline: float = DEADLINE_SECONDS, **options: Any) -> Iterator[Image]:
+    def turntable(self, /, dataset: str, frames: int | None = None, *, turns: int = 1, path: Any = None, in_flight: int = 2,
+                  deadline: float = DEADLINE_SECONDS, **options: Any) -> AsyncGenerator[Image, None]:
         """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
         the file of one (docs/movies.md). `time` may be several, "FIRST:LAST" or "FIRST:LAST:STEP": frames are spread evenly over them, and there is
         one for each if `frames` is left out. `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
         that are open when the iterator is closed are cancelled."""
         several = times_of(options.get("time"))
-        frames = values.integer("frames", len(several) if frames is None and several else frames, 1, _MOST_FRAMES)
+        count = values.integer("frames", len(several) if frames is None and several else frames, 1, _MOST_FRAMES)
         turns = values.integer("turns", turns, 0, _MOST_TURNS)
         in_flight = values.integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, {**options, "time": None} if several else options)
-        times = [several[i * len(several) // frames] if several else draft.frame.time for i in range(frames)]
+        times = [several[i * len(several) // count] if several else draft.frame.time for i in range(count)]
         if path is None:
             if draft.frame.view.HasField("eye") and turns > 0:
                 raise InvalidArgument(
                     "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
                 )
-            views = turned_views(self._whole_view(draft, times), frames, turns)
+
+            async def views() -> Iterator[Any]:
+                return turned_views(await self._whole_view(draft, times), count, turns)
         else:
             for name, value in options.items():
                 if value is not None and name in COMMANDS["render"]["camera"].excludes + ("camera",):
                     raise InvalidArgument(f"path excludes {name}")
             seconds, cameras = cameras_of(path)
-            drafts = [camera_draft_of(dataset, {**options, "time": None}, i, camera) for i, camera in enumerate(cameras)]
-            views = self._views_along(seconds, [self._whole_view(each, times) for each in drafts], draft, frames)
-        self._settle([draft])
-        return self._pipelined(_with_views(draft, views, times), in_flight, deadline)
+            stops = [camera_draft_of(dataset, {**options, "time": None}, i, camera) for i, camera in enumerate(cameras)]
 
-    def _whole_view(self, draft: Draft, times: Sequence[str]) -> Any:
+            async def views() -> Iterator[Any]:
+                return await self._views_along(seconds, [await self._whole_view(each, times) for each in stops], draft, count)
+
+        async def drafts() -> Iterator[Draft]:
+            moved = await views()
+            await self._settle([draft])
+            return _with_views(draft, moved, times)
+
+        return self._pipelined(drafts, in_flight, deadline)
+
+    async def _whole_view(self, draft: Draft, times: Sequence[str]) -> Any:
         """The view of pictures at these times, with what its options leave to the volume: it frames what shows in any of them."""
         query = schema.ViewQuery(frame=draft.frame)
         framed = None
         for time in dict.fromkeys(times):
             query.frame.time = time
-            reply = self._connection.ask("view_query", query, _QUESTION_SECONDS)
+            reply = await self._connection.ask("view_query", query, _QUESTION_SECONDS)
             if reply.HasField("framed"):
                 framed = reply.framed if framed is None else ball_around(framed, reply.framed)
         if framed is not None and times[0] != times[-1]:
             query.frame.time = times[0]
             query.framed.CopyFrom(framed)
-            reply = self._connection.ask("view_query", query, _QUESTION_SECONDS)
+            reply = await self._connection.ask("view_query", query, _QUESTION_SECONDS)
         return reply.view
 
-    def _views_along(self, seconds: Sequence[float], cameras: Sequence[Any], draft: Draft, frames: int) -> Iterator[Any]:
+    async def _views_along(self, seconds: Sequence[float], cameras: Sequence[Any], draft: Draft, frames: int) -> Iterator[Any]:
         """Those of frames that are spread evenly over the path of these cameras, which are complete. `draft`: of the dataset."""
         path = [schema.PathCamera(seconds=at, view=view) for at, view in zip(seconds, cameras)]
         length = seconds[-1] - seconds[0]
@@ -147,12 +166,244 @@ class Service(contextlib.AbstractContextManager["Service"]):
         replies = []
         for begin in range(0, frames, _MOST_VIEWS):
             query.at[:] = wanted[begin:begin + _MOST_VIEWS]
-            replies.append(self._connection.ask("view_query", query, _QUESTION_SECONDS))
+            replies.append(await self._connection.ask("view_query", query, _QUESTION_SECONDS))
         return (view for reply in replies for view in reply.path)
 
     @property
     def address(self) -> Address:
         return self._connection.address
+
+    @takes_options_of("slice")
+    async def slice(self, /, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
+        """Planes or thick slabs of a volume; several are put side by side."""
+        drafts = slice_drafts_of(dataset, options)
+
+        async def settled() -> Iterator[Draft]:
+            await self._settle(drafts)
+            return iter(drafts)
+
+        return side_by_side([image async for image in self._pipelined(settled, 3, deadline)])
+
+    async def histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
+                        timeout: float = _QUESTION_SECONDS) -> Histogram:
+        """How often which value occurs in a dataset. `field`: a channel's number or name (usually the first one that is shown); `time`: as the
+        option of that name takes it (usually that of the file)."""
+        return probe.histogram_of(await self._summary(dataset, timeout, **_of(field, time)))
+
+    async def joint_histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
+                              timeout: float = _QUESTION_SECONDS) -> JointHistogram:
+        """How often which value occurs together with which slope, for two-dimensional transfer functions. `field`, `time`: as of histogram()."""
+        query = schema.JointHistogramQuery(dataset=dataset, **_of(field, time))
+        return probe.joint_histogram_of(await self._connection.ask("joint_histogram_query", query, timeout))
+
+    async def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
+        """The labels that occur in a dataset, by value; empty: it has no labels."""
+        return probe.labels_of(await self._summary(dataset, timeout))
+
+    async def label_statistics(self, dataset: str, *, clip_box: Any = None, field: int | str | None = None, time: int | str | None = None,
+                               timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
+        """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
+        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it. `field`, `time`: as of
+        histogram()."""
+        box = values.clip_box("clip_box", ":,:,:" if clip_box is None else clip_box)
+        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box, **_of(field, time))
+        return probe.label_statistics_of(await self._connection.ask("statistics_query", query, timeout))
+
+    async def value(self, dataset: str, at: Any, *, field: int | str | Sequence[int | str] | None = None, time: int | str | None = None,
+                    timeout: float = _QUESTION_SECONDS) -> Sample | None:
+        """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume. `field`, `time`: as of
+        histogram(), but there may be several fields; None: the first one that shows, and the overlay."""
+        named = field if isinstance(field, (list, tuple)) else [] if field is None else [field]
+        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], channels=[_of(each, None)["field"] for each in named],
+                                   **_of(None, time))
+        return probe.sample_of((await self._connection.ask("sample_query", query, timeout)).samples[0])
+
+    @takes_options_of("render")
+    async def pick(self, /, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
+        """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
+        shows nothing there. docs/rendering.md says which point of the ray that is."""
+        draft = draft_of(dataset, options)
+        await self._settle([draft])
+        frame = draft.frame
+        query = schema.PickQuery(frame=frame, x=values.number("x", x, 0, frame.size.width), y=values.number("y", y, 0, frame.size.height))
+        reply = await self._connection.ask("pick_query", query, timeout)
+        return probe.sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
+
+    async def status(self, timeout: float = ANSWER_SECONDS) -> Status:
+        """Workers, datasets and counts of frames."""
+        return status_of(await self._connection.ask("status_query", schema.StatusQuery(), timeout), self.endpoint)
+
+    async def datasets(self, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """The service's catalogue."""
+        return await self._order(schema.DATA_ACTION_LIST, [], timeout)
+
+    async def add_data(self, /, *items: str, timeout: float = _ORDER_SECONDS, **named: str | os.PathLike[str]) -> list[Dataset]:
+        """Adds volumes or folders, for as long as the coordinator runs: add_data(head="/data/head.nii.gz"), or texts as `slabstream data add`
+        takes them ("head=/data/head.nii.gz,labels=/data/atlas.nii.gz"). Paths are absolute, on the coordinator's host. Needs the role admin
+        where the service has keys. Returns the catalogue."""
+        texts = [*items, *(f"{name}={os.fspath(path)}" for name, path in named.items())]
+        for text in texts:
+            name, equals, path = ("", "=", text) if is_address(text) else text.partition("=")
+            where = path if equals else name
+            if not (where.startswith("/") or is_address(where)):
+                raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
+        return await self._order(schema.DATA_ACTION_ADD, texts, timeout)
+
+    async def add(self, name: str, volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None,
+                  labels: Any = None, overlay: Any = None) -> Dataset:
+        """Sends an array to the service, wherever it runs, as a dataset that every client sees: add("name", array, spacing=(dz, dy, dx)). It stays
+        until remove_data(), or until the coordinator ends. Arrays as load() takes them, layers on the same grid; dask and zarr arrays are sent
+        chunk by chunk. Needs the role admin where the service has keys."""
+
+        def prepared() -> tuple[Any, Iterator[memoryview]]:
+            checked = volume_of(volume, spacing, origin, direction, world)
+            layers = [None if layer is None else on_grid(layer, checked.grid) for layer in layers_of(labels, overlay)]
+            return upload_of(name, checked, *layers)
+
+        reply = await self._connection.upload(*await self._connection.front.do(prepared))
+        return next(dataset_of(dataset) for dataset in reply.datasets if dataset.name == name)
+
+    async def remove_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """Removes datasets, or watched folders, from the catalogue. Files stay."""
+        return await self._order(schema.DATA_ACTION_REMOVE, names, timeout)
+
+    async def reload_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
+        """Makes the next frame read the files again, even if they seem unchanged."""
+        return await self._order(schema.DATA_ACTION_RELOAD, names, timeout)
+
+    async def steer(self, dataset: str, /, **changes: float) -> Simulation:
+        """Changes parameters of the simulation that holds a dataset: steer("rho", feed=0.03). All of them, or none if one is refused. Its next
+        steps have them. Without any: how far it is."""
+        most = sys.float_info.max
+        steered = [schema.SteeredValue(name=name, value=values.number(name, value, -most, most)) for name, value in changes.items()]
+        return simulation_of((await self._connection.ask("steer_dataset", schema.SteerDataset(dataset=dataset, values=steered))).simulation)
+
+    async def parameters(self, dataset: str) -> dict[str, Parameter]:
+        """The parameters of the simulation that holds a dataset, by name, as they are now."""
+        return {each.name: each for each in (await self.steer(dataset)).parameters}
+
+    async def close(self) -> None:
+        """Ends the connection, which cancels what is open."""
+        await self._connection.front.do(self._connection.close)
+
+    def __repr__(self) -> str:
+        return f"<slabstream.AsyncService at {self.endpoint}>"
+
+    async def _summary(self, dataset: str, timeout: float, **of: str) -> Any:
+        transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
+        return await self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer, **of), timeout)
+
+    async def _settle(self, drafts: list[Draft]) -> None:
+        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans."""
+        draft = drafts[0]
+        if draft.colors is not None:
+            preset = (await self._transfer_of(draft)).transfer
+            ends = preset.colors[0].value, preset.colors[-1].value
+            # Where nothing lies behind, colours are as they are (ResolveLook in the service).
+            opacities = TransferFunction(opacities=[(ends[0], 1)]).message().opacities if draft.frame.clipping.HasField("slab") else preset.opacities
+            for each in drafts:
+                each.frame.transfer.function.CopyFrom(mapped(draft.colors, *ends, opacities))
+                each.frame.transfer.ClearField("scalar_range")
+
+    async def _transfer_of(self, draft: Draft) -> Any:
+        """The dataset's summary under the transfer function of the draft."""
+        frame = draft.frame
+        query = schema.SummaryQuery(dataset=frame.dataset, transfer=frame.transfer, field=frame.channels[0] if frame.channels else "", time=frame.time,
+                                    looks=frame.fields, flat=frame.clipping.HasField("slab"))
+        if query.transfer.WhichOneof("choice") is None:
+            query.transfer.preset = "auto"
+        if not query.transfer.HasField("opacity_distance"):
+            query.transfer.opacity_distance = 1
+        return await self._connection.ask("summary_query", query, _QUESTION_SECONDS)
+
+    async def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
+        if len(items) > _MOST_ITEMS:
+            raise InvalidArgument(f"{len(items)} datasets at a time, at most {_MOST_ITEMS} can be named")
+        order = schema.DataOrder(action=action, items=[os.fsencode(item) for item in items])
+        return [dataset_of(dataset) for dataset in (await self._connection.ask("data_order", order, timeout)).datasets]
+
+    async def _pipelined(self, drafts: Callable[[], Coroutine[Any, Any, Iterator[Draft]]], in_flight: int,
+                         deadline: float) -> AsyncGenerator[Image, None]:
+        open_frames: collections.deque[Frame] = collections.deque()
+        try:
+            for draft in await drafts():
+                open_frames.append(Frame(self._connection, draft, deadline, None, None))
+                if len(open_frames) == in_flight:
+                    image = await picture_of(open_frames[0], self._connection.front)
+                    open_frames.popleft()
+                    yield image
+            while open_frames:
+                image = await picture_of(open_frames[0], self._connection.front)
+                open_frames.popleft()
+                yield image
+        finally:
+            for frame in open_frames:
+                frame.cancel()
+
+
+if TYPE_CHECKING:
+    from .widget import Widget
+    from typing_extensions import Concatenate, ParamSpec  # in typing from Python 3.10 on
+
+    _Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
+
+
+def _blocking(method: Callable[Concatenate[AsyncService, _Given], Coroutine[Any, Any, _Result]],
+              ) -> Callable[Concatenate[Service, _Given], _Result]:
+    @functools.wraps(method)
+    def call(service: Service, /, *args: _Given.args, **kwargs: _Given.kwargs) -> _Result:
+        return run(method(service._asking, *args, **kwargs))
+
+    return call
+
+
+def _blocking_each(method: Callable[Concatenate[AsyncService, _Given], AsyncGenerator[_Result, None]],
+                   ) -> Callable[Concatenate[Service, _Given], Iterator[_Result]]:
+    @functools.wraps(method)
+    def call(service: Service, /, *args: _Given.args, **kwargs: _Given.kwargs) -> Iterator[_Result]:
+        return each(method(service._asking, *args, **kwargs))
+
+    return call
+
+
+class Service(contextlib.AbstractContextManager["Service"]):
+    """Made by connect(). A context manager: leaving it closes the connection, which cancels what is open. Ctrl-C cancels what is waited
+    for. The methods that ask are those of AsyncService."""
+
+    def __init__(self, address: Address, timeout: float = CONNECT_SECONDS):
+        self._asking = AsyncService(address, timeout, BLOCKING)
+        run(self._asking)
+
+    @property
+    def endpoint(self) -> str:
+        return self._asking.endpoint
+
+    @property
+    def address(self) -> Address:
+        return self._asking.address
+
+    render = _blocking(AsyncService.render)
+    submit = _blocking(AsyncService.submit)
+    turntable = _blocking_each(AsyncService.turntable)
+    slice = _blocking(AsyncService.slice)
+    histogram = _blocking(AsyncService.histogram)
+    joint_histogram = _blocking(AsyncService.joint_histogram)
+    labels = _blocking(AsyncService.labels)
+    label_statistics = _blocking(AsyncService.label_statistics)
+    value = _blocking(AsyncService.value)
+    pick = _blocking(AsyncService.pick)
+    status = _blocking(AsyncService.status)
+    datasets = _blocking(AsyncService.datasets)
+    add_data = _blocking(AsyncService.add_data)
+    add = _blocking(AsyncService.add)
+    remove_data = _blocking(AsyncService.remove_data)
+    reload_data = _blocking(AsyncService.reload_data)
+    steer = _blocking(AsyncService.steer)
+    parameters = _blocking(AsyncService.parameters)
+    close = _blocking(AsyncService.close)
+
+    _settle = _blocking(AsyncService._settle)
 
     @takes_options_of("render")
     def view(self, dataset: str, *, height: int | str = 512, panel: bool = False, behind_proxy: str | None = None, keep: Any = None,
@@ -167,174 +418,11 @@ class Service(contextlib.AbstractContextManager["Service"]):
 
     show = view  # its former name
 
-    @takes_options_of("slice")
-    def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
-        """Planes or thick slabs of a volume; several are put side by side."""
-        drafts = slice_drafts_of(dataset, options)
-        self._settle(drafts)
-        return side_by_side(list(self._pipelined(iter(drafts), 3, deadline)))
-
-    def histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
-                  timeout: float = _QUESTION_SECONDS) -> Histogram:
-        """How often which value occurs in a dataset. `field`: a channel's number or name (usually the first one that is shown); `time`: as the
-        option of that name takes it (usually that of the file)."""
-        return probe.histogram_of(self._summary(dataset, timeout, **_of(field, time)))
-
-    def joint_histogram(self, dataset: str, *, field: int | str | None = None, time: int | str | None = None,
-                        timeout: float = _QUESTION_SECONDS) -> JointHistogram:
-        """How often which value occurs together with which slope, for two-dimensional transfer functions. `field`, `time`: as of histogram()."""
-        query = schema.JointHistogramQuery(dataset=dataset, **_of(field, time))
-        return probe.joint_histogram_of(self._connection.ask("joint_histogram_query", query, timeout))
-
-    def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
-        """The labels that occur in a dataset, by value; empty: it has no labels."""
-        return probe.labels_of(self._summary(dataset, timeout))
-
-    def label_statistics(self, dataset: str, *, clip_box: Any = None, field: int | str | None = None, time: int | str | None = None,
-                         timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
-        """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
-        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it. `field`, `time`: as of
-        histogram()."""
-        box = values.clip_box("clip_box", ":,:,:" if clip_box is None else clip_box)
-        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box, **_of(field, time))
-        return probe.label_statistics_of(self._connection.ask("statistics_query", query, timeout))
-
-    def value(self, dataset: str, at: Any, *, field: int | str | Sequence[int | str] | None = None, time: int | str | None = None,
-              timeout: float = _QUESTION_SECONDS) -> Sample | None:
-        """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume. `field`, `time`: as of
-        histogram(), but there may be several fields; None: the first one that shows, and the overlay."""
-        named = field if isinstance(field, (list, tuple)) else [] if field is None else [field]
-        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], channels=[_of(each, None)["field"] for each in named],
-                                   **_of(None, time))
-        return probe.sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
-
-    @takes_options_of("render")
-    def pick(self, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
-        """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
-        shows nothing there. docs/rendering.md says which point of the ray that is."""
-        draft = draft_of(dataset, options)
-        self._settle([draft])
-        frame = draft.frame
-        query = schema.PickQuery(frame=frame, x=values.number("x", x, 0, frame.size.width), y=values.number("y", y, 0, frame.size.height))
-        reply = self._connection.ask("pick_query", query, timeout)
-        return probe.sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
-
-    def status(self, timeout: float = ANSWER_SECONDS) -> Status:
-        """Workers, datasets and counts of frames."""
-        return status_of(self._connection.ask("status_query", schema.StatusQuery(), timeout), self.endpoint)
-
-    def datasets(self, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
-        """The service's catalogue."""
-        return self._order(schema.DATA_ACTION_LIST, [], timeout)
-
-    def add_data(self, *items: str, timeout: float = _ORDER_SECONDS, **named: str | os.PathLike[str]) -> list[Dataset]:
-        """Adds volumes or folders, for as long as the coordinator runs: add_data(head="/data/head.nii.gz"), or texts as `slabstream data add`
-        takes them ("head=/data/head.nii.gz,labels=/data/atlas.nii.gz"). Paths are absolute, on the coordinator's host. Needs the role admin
-        where the service has keys. Returns the catalogue."""
-        texts = [*items, *(f"{name}={os.fspath(path)}" for name, path in named.items())]
-        for text in texts:
-            name, equals, path = ("", "=", text) if is_address(text) else text.partition("=")
-            where = path if equals else name
-            if not (where.startswith("/") or is_address(where)):
-                raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
-        return self._order(schema.DATA_ACTION_ADD, texts, timeout)
-
-    def add(self, name: str, volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None,
-            labels: Any = None, overlay: Any = None) -> Dataset:
-        """Sends an array to the service, wherever it runs, as a dataset that every client sees: add("name", array, spacing=(dz, dy, dx)). It stays
-        until remove_data(), or until the coordinator ends. Arrays as load() takes them, layers on the same grid; dask and zarr arrays are sent
-        chunk by chunk. Needs the role admin where the service has keys."""
-        checked = volume_of(volume, spacing, origin, direction, world)
-        layers = [None if layer is None else on_grid(layer, checked.grid) for layer in layers_of(labels, overlay)]
-        order, parts = upload_of(name, checked, *layers)
-        reply = self._connection.upload(order, parts)
-        return next(dataset_of(dataset) for dataset in reply.datasets if dataset.name == name)
-
-    def remove_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
-        """Removes datasets, or watched folders, from the catalogue. Files stay."""
-        return self._order(schema.DATA_ACTION_REMOVE, names, timeout)
-
-    def reload_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
-        """Makes the next frame read the files again, even if they seem unchanged."""
-        return self._order(schema.DATA_ACTION_RELOAD, names, timeout)
-
-    def steer(self, dataset: str, /, **changes: float) -> Simulation:
-        """Changes parameters of the simulation that holds a dataset: steer("rho", feed=0.03). All of them, or none if one is refused. Its next
-        steps have them. Without any: how far it is."""
-        most = sys.float_info.max
-        steered = [schema.SteeredValue(name=name, value=values.number(name, value, -most, most)) for name, value in changes.items()]
-        return simulation_of(self._connection.ask("steer_dataset", schema.SteerDataset(dataset=dataset, values=steered)).simulation)
-
-    def parameters(self, dataset: str) -> dict[str, Parameter]:
-        """The parameters of the simulation that holds a dataset, by name, as they are now."""
-        return {each.name: each for each in self.steer(dataset).parameters}
-
-    def close(self) -> None:
-        self._connection.close()
-
     def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
         return f"<slabstream.Service at {self.endpoint}>"
-
-    def _summary(self, dataset: str, timeout: float, **of: str) -> Any:
-        transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
-        return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer, **of), timeout)
-
-    def _settle(self, drafts: list[Draft]) -> None:
-        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans."""
-        draft = drafts[0]
-        if draft.colors is not None:
-            preset = self._transfer_of(draft).transfer
-            ends = preset.colors[0].value, preset.colors[-1].value
-            # Where nothing lies behind, colours are as they are (ResolveLook in the service).
-            opacities = TransferFunction(opacities=[(ends[0], 1)]).message().opacities if draft.frame.clipping.HasField("slab") else preset.opacities
-            for each in drafts:
-                each.frame.transfer.function.CopyFrom(mapped(draft.colors, *ends, opacities))
-                each.frame.transfer.ClearField("scalar_range")
-
-    def _transfer_of(self, draft: Draft) -> Any:
-        """The dataset's summary under the transfer function of the draft."""
-        frame = draft.frame
-        query = schema.SummaryQuery(dataset=frame.dataset, transfer=frame.transfer, field=frame.channels[0] if frame.channels else "", time=frame.time,
-                                    looks=frame.fields, flat=frame.clipping.HasField("slab"))
-        if query.transfer.WhichOneof("choice") is None:
-            query.transfer.preset = "auto"
-        if not query.transfer.HasField("opacity_distance"):
-            query.transfer.opacity_distance = 1
-        return self._connection.ask("summary_query", query, _QUESTION_SECONDS)
-
-    def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
-        if len(items) > _MOST_ITEMS:
-            raise InvalidArgument(f"{len(items)} datasets at a time, at most {_MOST_ITEMS} can be named")
-        order = schema.DataOrder(action=action, items=[os.fsencode(item) for item in items])
-        return [dataset_of(dataset) for dataset in self._connection.ask("data_order", order, timeout).datasets]
-
-    @staticmethod
-    def _wait_for(frame: Frame) -> Image:
-        try:
-            return frame.result()
-        except KeyboardInterrupt:
-            frame.cancel()
-            raise
-
-    def _pipelined(self, drafts: Iterator[Draft], in_flight: int, deadline: float) -> Iterator[Image]:
-        open_frames: collections.deque[Frame] = collections.deque()
-        try:
-            for draft in drafts:
-                open_frames.append(Frame(self._connection, draft, deadline, None, None))
-                if len(open_frames) == in_flight:
-                    image = open_frames[0].result()
-                    open_frames.popleft()
-                    yield image
-            while open_frames:
-                image = open_frames[0].result()
-                open_frames.popleft()
-                yield image
-        finally:
-            for frame in open_frames:
-                frame.cancel()
 
 
 def connect(service: str | os.PathLike[str] | None = None, *, endpoint: str | None = None, timeout: float = CONNECT_SECONDS) -> Service:
@@ -347,4 +435,11 @@ def connect(service: str | os.PathLike[str] | None = None, *, endpoint: str | No
     Raises Unavailable if nobody answers within `timeout` seconds or the service refuses the key; InvalidArgument, NotFound: the file or the
     endpoint is wrong.
     """
-    return Service(Connection(find_service(service, endpoint), timeout))
+    return Service(find_service(service, endpoint), timeout)
+
+
+def connect_async(service: str | os.PathLike[str] | None = None, *, endpoint: str | None = None,
+                  timeout: float = CONNECT_SECONDS) -> AsyncService:
+    """As connect(), for asyncio: `async with connect_async(...) as service`, or `service = await connect_async(...)`, which
+    `await service.close()` ends."""
+    return AsyncService(find_service(service, endpoint), timeout)

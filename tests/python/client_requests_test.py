@@ -2,11 +2,9 @@
 from __future__ import annotations
 
 import concurrent.futures
-import pathlib
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
+import client_support  # noqa: F401  it finds the package
 
 import slabstream as ss  # noqa: E402
 from slabstream import schema  # noqa: E402

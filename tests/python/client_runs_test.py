@@ -1,14 +1,12 @@
 """Runs of pictures, as docs/wire.md section 4 has them: read back as they were written, and refused if they are damaged."""
 from __future__ import annotations
 
-import pathlib
 import random
-import sys
 import unittest
 
 import numpy as np
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
+import client_support  # noqa: F401  it finds the package
 
 import slabstream as ss  # noqa: E402
 from slabstream import schema  # noqa: E402

@@ -18,13 +18,11 @@ import unittest.mock
 
 import numpy as np
 
-from client_support import PROGRAM, PROGRAMS, START_SECONDS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
+from client_support import HEAVY, PROGRAM, PROGRAMS, START_SECONDS, InAFolder, RunningService, WithAService, volume_arrays, write_cells, write_volumes
 from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
 from slabstream.programs import find_program  # noqa: E402
-
-HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)
 
 
 class AtAService(WithAService):
@@ -394,7 +392,9 @@ class Addresses(InAFolder):
 class Keys(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="slabstream-test-")))
+        made = tempfile.TemporaryDirectory(prefix="slabstream-test-")
+        cls.addClassCleanup(made.cleanup)
+        cls.folder = pathlib.Path(made.name)
         cls.keys = cls.folder / "keys"
         cls.running = RunningService(cls.folder, "--data", write_volumes(cls.folder), "--keys", str(cls.keys), listen="tcp://127.0.0.1:*")
         cls.addClassCleanup(cls.running.end)

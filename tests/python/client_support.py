@@ -16,7 +16,8 @@ import zlib
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
+if "SLABSTREAM_INSTALLED" not in os.environ:  # else the package that this Python has (pythons.py)
+    sys.path.insert(0, str(ROOT / "python"))
 
 PROGRAMS = pathlib.Path(os.environ.get("SLABSTREAM_PROGRAMS", ROOT / "build" / "bin"))
 os.environ["SLABSTREAM_PROGRAMS"] = str(PROGRAMS)
@@ -25,6 +26,7 @@ PROGRAM = str(PROGRAMS / "slabstream")
 from slabstream import volumes  # noqa: E402
 
 START_SECONDS = 60
+HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)  # options of a frame that takes seconds
 
 
 def volume_arrays() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -106,6 +108,17 @@ class RunningService:
         if done.returncode != 0:
             raise RuntimeError(done.stderr)
         return read_png((self.folder / "picture.png").read_bytes())
+
+
+@contextlib.contextmanager
+def working_in(folder: pathlib.Path):
+    """As contextlib.chdir of Python 3.11."""
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
 
 
 class InAFolder(unittest.TestCase):

@@ -10,7 +10,7 @@ import unittest
 
 import numpy as np
 
-from client_support import PROGRAM, ROOT, InAFolder, RunningService, volume_arrays, write_volumes
+from client_support import PROGRAM, ROOT, InAFolder, RunningService, volume_arrays, working_in
 
 import slabstream as ss  # noqa: E402
 from slabstream.volumes import volume_of, write_nrrd  # noqa: E402
@@ -56,7 +56,7 @@ class Documents(InAFolder):
         self.assertEqual(code.count(printed), 4)
         names: dict = {}
         said = io.StringIO()
-        with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
+        with working_in(self.folder), contextlib.redirect_stdout(said):
             exec(compile(code.replace(printed, running.endpoint), "python.md", "exec"), names)
         self.assertIn("zoom 0 is out of range [0.001, 10000]", said.getvalue())
         self.assertEqual(len(list(self.folder.glob("turn_*.png"))), 12)
