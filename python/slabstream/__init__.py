@@ -27,6 +27,7 @@ from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
 from .viewer import Viewer
+from .vtk import to_pyvista
 
 __version__ = "0.2.0"
 
@@ -35,5 +36,5 @@ __all__ = [
     "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner", "Parameter", "Progress",
     "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning", "Source", "Statistics", "Status",
     "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Worker", "connect", "load", "open",
-    "presets", "render", "show", "shutdown",
+    "presets", "render", "show", "shutdown", "to_pyvista",
 ]
