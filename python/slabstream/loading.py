@@ -79,8 +79,10 @@ def _is_path(volume: Any) -> bool:
 
 
 def path_text(path: Any, what: str) -> str:
-    """Absolute; options for reading may stand behind a question mark."""
+    """Absolute, or an address; options for reading may stand behind a question mark."""
     text = str(os.fspath(path))
+    if "://" in text:
+        return text
     file = text if os.path.exists(text) else text.partition("?")[0]
     if what == "labels" and not os.path.exists(file):
         file = file.rpartition(":")[0] or file  # FILE:COLOURS
@@ -93,9 +95,9 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
 
-    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax, xarray.DataArray, an
-    image of nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
-    as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
+    `volume` is a path or an address of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax,
+    xarray.DataArray, an image of nibabel, ITK, SimpleITK or VTK, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or
+    `spacing` one number for all axes; row i of `direction` is where the array's axis i points to, as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.
     """

@@ -223,7 +223,8 @@ class Service(contextlib.AbstractContextManager["Service"]):
         texts = [*items, *(f"{name}={os.fspath(path)}" for name, path in named.items())]
         for text in texts:
             name, equals, path = text.partition("=")
-            if not (path if equals else name).startswith("/"):
+            where = path if equals else name
+            if not where.startswith("/") and "://" not in where:
                 raise InvalidArgument(f"{text}: the path must be absolute, since it is a path on the coordinator's host")
         return self._order(schema.DATA_ACTION_ADD, texts, timeout)
 

@@ -125,7 +125,7 @@ def _in_front(service: Service, dataset: str, options: dict[str, Any], whole: Im
     if options.get("clip_mode") == "cut-away":
         raise InvalidArgument("clip_mode 'cut-away' has no picture in front of a mesh: must be 'keep'")
     given = options.get("clip_plane") or []
-    planes = [given] if isinstance(given, str) or numpy.shape(given) == (4,) else list(given)
+    planes = [given] if isinstance(given, str) or (given and isinstance(given[0], (int, float))) else list(given)
     geometry = whole.geometry
     assert geometry is not None
     forward = numpy.array(geometry.forward)
