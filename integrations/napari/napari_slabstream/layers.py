@@ -17,6 +17,7 @@ from slabstream.moves import ball_of
 
 _POINTS = 65  # of a colour map in a transfer function
 _DENSE = 0.25  # opacity of a voxel length at the upper contrast limit, in modes that add up opacities
+_BESIDE = 1 / 4096  # of the contrast limits: what has another opacity than the limit itself
 _UPRIGHT = 1e-3  # by which axes may miss right angles, and sides their lengths
 _LEAST_ZOOM, _MOST_ZOOM = 0.001, 10000.0
 _LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees
@@ -54,8 +55,12 @@ class Camera:
     mirrored: bool     # right is not forward x up, in napari's order of axes
 
 
+def camera_model(viewer: Any) -> Any:
+    return getattr(viewer, "scene", viewer).camera  # napari 0.9 moved it
+
+
 def camera_of(viewer: Any, height: int, width: int) -> Camera:
-    camera = viewer.camera
+    camera = camera_model(viewer)
     handedness = str(getattr(camera, "handedness", "left"))
     return Camera(int(width), int(height), float(camera.zoom), float(camera.perspective), tuple(map(float, camera.center)),
                   tuple(map(float, camera.view_direction)), tuple(map(float, camera.up_direction)), "left" in handedness.lower())
@@ -205,10 +210,11 @@ def camera_options(camera: Camera, place: Place, source: Source, scale: float) -
 def look_options(layer: Any) -> dict[str, Any]:
     """Renderer and transfer function: the colour map over the contrast limits, with gamma."""
     low, high = map(float, layer.contrast_limits)
+    high = max(high, low + 1e-6 * max(abs(low), 1))
     options = dict(_MODES[str(layer.rendering)])
     share = np.linspace(0, 1, _POINTS)
     rgba = np.asarray(layer.colormap.map(share**float(layer.gamma)), float).clip(0, 1)
-    values = (low + (max(high, np.nextafter(low, np.inf)) - low) * share).tolist()
+    values = (low + (high - low) * share).tolist()
     colors = list(zip(values, map(tuple, rgba[:, :3].tolist())))
     projects = options["renderer"] == "mip"
     if projects:
@@ -217,8 +223,14 @@ def look_options(layer: Any) -> dict[str, Any]:
         at = float(layer.iso_threshold)
         options["isovalue"] = [(at, tuple(rgba[-1, :3].tolist()))]
         return options
-    opacities = rgba[:, 3] * (1 if projects else _DENSE * share ** float(layer.gamma))
-    options["transfer"] = ss.TransferFunction(colors, list(zip(values, opacities.tolist())))
+    opacities = list(zip(values, (rgba[:, 3] * (1 if projects else _DENSE * share ** float(layer.gamma))).tolist()))
+    if str(layer.blending).startswith("translucent"):  # then napari leaves out what lies beyond one of the limits
+        beside = (high - low) * _BESIDE
+        if str(layer.rendering).endswith("mip"):
+            opacities[:1] = [(low, 0.0), (low + beside, opacities[0][1])]
+        elif str(layer.rendering) == "minip":
+            opacities[-1:] = [(high - beside, opacities[-1][1]), (high, 0.0)]
+    options["transfer"] = ss.TransferFunction(colors, opacities)
     return options
 
 

@@ -21,7 +21,8 @@ class Shown:
     """A layer in a view."""
 
     layer: Any           # its data, name and source are read on the thread
-    data: Any            # layer.data, as it was
+    data: Any = dataclasses.field(compare=False)  # layer.data, as it was
+    data_id: int
     siblings: list[Any]  # layers of the same store, in order
     place: Place
     look: dict[str, Any]
@@ -38,20 +39,19 @@ class View:
 
 
 class Pictures:
-    """`tell(rgb, sharp, notes)` is called on the thread: height, width, 3 of float32 from 0 to 1, and by layer why it is not in the picture."""
+    """`tell(view, rgb, sharp, notes)` is called on the thread: height, width, 3 of float32 from 0 to 1, and by layer why the picture lacks it."""
 
-    def __init__(self, tell: Callable[[Any, bool, dict[Any, str]], None]):
+    def __init__(self, tell: Callable[[View, Any, bool, dict[Any, str]], None]):
         self._tell = tell
         self._changed = threading.Condition()
         self._wanted: View | None = None
         self._ended = False
-        self._sources: dict[Any, Source | NotShown] = {}  # what was shown last comes last
+        self._sources: dict[Any, tuple[Any, Source | NotShown]] = {}  # what was shown last comes last
         self._done: dict[Any, Any] = {}  # sharp pictures of the last view, by what they show
         stated = any(os.environ.get(name) for name in ("SLABSTREAM_SERVICE", "SLABSTREAM_ENDPOINT"))
         self._connect: Callable[[], ss.Service | None] = ss.connect if stated else lambda: None
         self._service: ss.Service | None = None
-        self._thread = threading.Thread(target=self._run, name="slabstream-napari", daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._run, name="slabstream-napari", daemon=True).start()
 
     def want(self, view: View | None) -> None:
         """None: nothing more. Any thread."""
@@ -66,37 +66,33 @@ class Pictures:
             self._done.clear()
 
     def end(self) -> None:
+        """Does not wait for what is on its way. Volumes are taken away from the service."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()
-        self._thread.join()
-        self._sources.clear()
 
     def _run(self) -> None:
         view: View | None = None
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._ended or self._wanted is not view)
-                if self._ended:
-                    return
                 view = self._wanted
-            if view is None:
-                continue
-            for sharp in (False, True):
-                if sharp and self._newer(view, _STILL):
+                if self._ended:
                     break
-                self._show(view, sharp)
+            if view is not None:
+                self._show(view, sharp=False)
+                if not self._newer(view, _STILL):
+                    self._show(view, sharp=True)
+        self._sources.clear()
 
     def _newer(self, view: View, seconds: float = 0) -> bool:
         with self._changed:
             return self._changed.wait_for(lambda: self._ended or self._wanted is not view, seconds)
 
     def _source(self, shown: Shown) -> Source:
-        key = (id(shown.layer), id(shown.data), shown.place.index, shown.place.spacing)
-        found = self._sources.pop(key, None)
-        if found is None:
-            found = self._bring(shown)
-        self._sources[key] = found  # a layer that is not shown keeps its reason
+        key = (id(shown.layer), shown.data_id, shown.place.index, shown.place.spacing)
+        data, found = self._sources.pop(key, None) or (shown.data, self._bring(shown))
+        self._sources[key] = data, found  # with the data, so that no others get their id; a layer that is not shown keeps its reason
         for old in list(self._sources)[:-_MOST_SOURCES]:
             del self._sources[old]
         if isinstance(found, NotShown):
@@ -151,7 +147,8 @@ class Pictures:
                 notes[shown.layer] = str(error)
         if sharp:
             self._done = done
-        self._tell(np.ascontiguousarray(below, np.float32), sharp, notes)
+        if not self._ended:
+            self._tell(view, np.ascontiguousarray(below, np.float32), sharp, notes)
 
     def _wake(self, _: ss.Frame) -> None:
         with self._changed:

@@ -9,7 +9,7 @@ from qtpy.QtWidgets import QCheckBox, QLabel, QPushButton, QVBoxLayout, QWidget
 from vispy.scene.visuals import Image
 from vispy.visuals.transforms import STTransform
 
-from .layers import NotShown, camera_of, is_volume, look_options, place_of
+from .layers import NotShown, camera_model, camera_of, is_volume, look_options, place_of
 from .pictures import Pictures, Shown, View
 
 _BEHIND = -1  # drawn before the scene, so that points, tracks and surfaces stand in front of the volumes
@@ -18,8 +18,8 @@ _BEHIND = -1  # drawn before the scene, so that points, tracks and surfaces stan
 class Volumes(QWidget):
     """Shows the volumes of all image layers by Slabstream while the viewer displays three dimensions. For Qt's thread."""
 
-    pictured = Signal(bool)  # a picture is on the canvas; True: the sharp one of the view
-    _came = Signal(object, bool, object)
+    pictured = Signal(bool)  # a picture is on the canvas; True: the sharp one of a view
+    _came = Signal(object, object, bool, object)
 
     def __init__(self, napari_viewer: Any):
         super().__init__()
@@ -36,16 +36,18 @@ class Volumes(QWidget):
             column.addWidget(part)
         column.addStretch()
         self._node: Any = None
-        self._view: View | None = None
+        self._view: View | None = None  # what the viewer shows
+        self._drawn: View | None = None  # whose sharp picture is on the canvas
         self._hidden: set[Any] = set()
         self._notes: dict[Any, str] = {}
         self._pictures = Pictures(self._came.emit)
+        self.destroyed.connect(self._pictures.end)  # a viewer that is closed closes no dock widget
         self._came.connect(self._draw)
         self._soon = QTimer(self, singleShot=True, interval=0)  # one look at the viewer for all its events of a moment
         self._soon.timeout.connect(self._look)
         self._on.toggled.connect(self._changed)
         again.clicked.connect(self._send_again)
-        self._watched = [self._viewer.camera.events, self._viewer.dims.events, self._viewer.layers.events,
+        self._watched = [camera_model(self._viewer).events, self._viewer.dims.events, self._viewer.layers.events,
                          self._canvas._scene_canvas.events.resize]
         for events in self._watched:
             events.connect(self._changed)
@@ -65,11 +67,11 @@ class Volumes(QWidget):
         notes: dict[Any, str] = {}
         view = self._view_now(notes) if self._on.isChecked() and self._viewer.dims.ndisplay == 3 else None
         drawn = {shown.layer for shown in view.layers} if view else set()
-        self._hide(drawn - set(self._notes))
+        self._hide(drawn - set(self._notes))  # of the last picture: a layer that was refused stays napari's
         if view is None and self._node is not None:
             self._node.visible = False
         if view != self._view or view is None:
-            self._view, self._notes = view, {}
+            self._view = view
             self._say(notes)
             self._pictures.want(view)
 
@@ -81,13 +83,14 @@ class Volumes(QWidget):
                 try:
                     path = layer.source.path
                     siblings = [other for other in layers if path is not None and other.source.path == path]
-                    shown.append(Shown(layer, layer.data, siblings, place_of(layer, self._viewer), look_options(layer), float(layer.opacity),
-                                       str(layer.blending)))
+                    shown.append(Shown(layer, layer.data, id(layer.data), siblings, place_of(layer, self._viewer), look_options(layer),
+                                       float(layer.opacity), str(layer.blending)))
                 except NotShown as why:
                     notes[layer] = str(why)
         height, width = self._canvas.size
         background = tuple(self._canvas._scene_canvas.bgcolor.rgb.tolist())
-        return View(tuple(shown), camera_of(self._viewer, height, width), background, self._canvas._scene_canvas.native.devicePixelRatioF()) if shown else None
+        ratio = self._canvas._scene_canvas.native.devicePixelRatioF()
+        return View(tuple(shown), camera_of(self._viewer, height, width), background, ratio) if shown else None
 
     def _hide(self, layers: set[Any]) -> None:
         """napari's own volumes of these layers; all others are as their layers say."""
@@ -99,9 +102,15 @@ class Volumes(QWidget):
             visuals[layer].node.visible = False
         self._hidden = layers
 
-    def _draw(self, rgb: Any, sharp: bool, notes: dict[Any, str]) -> None:
+    @property
+    def settled(self) -> bool:
+        """The canvas has the sharp picture of what the viewer shows."""
+        return self._drawn is self._view and not self._soon.isActive()
+
+    def _draw(self, view: View, rgb: Any, sharp: bool, notes: dict[Any, str]) -> None:
         if self._view is None:
             return
+        self._drawn = view if sharp else None
         if self._node is None:
             self._node = Image(parent=self._canvas.view, method="auto", interpolation="linear")
             self._node.order = _BEHIND
@@ -124,7 +133,7 @@ class Volumes(QWidget):
         for events in self._watched:
             events.disconnect(self._changed)
         self._soon.stop()
-        self._view = None
+        self._view = self._drawn = None
         self._pictures.end()
         self._hide(set())
         if self._node is not None:
