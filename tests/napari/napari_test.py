@@ -17,6 +17,7 @@ import unittest
 import dask.array as da
 import napari
 import numpy as np
+import zarr
 from qtpy.QtWidgets import QApplication
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -60,7 +61,7 @@ class OfNapari(unittest.TestCase):
         QApplication.processEvents()
 
     def open(self):
-        dock, self.widget = self.viewer.window.add_plugin_dock_widget("napari-slabstream")
+        self.dock, self.widget = self.viewer.window.add_plugin_dock_widget("napari-slabstream")
         self.widget.pictured.connect(lambda sharp: self.counts.append(sharp))
         self.counts = []
         QApplication.processEvents()
@@ -81,6 +82,7 @@ class OfNapari(unittest.TestCase):
     def both(self, name):
         """What the canvas shows by the plugin, and by napari alone."""
         self.settle()
+        self.assertEqual(self.widget._said.text(), "")
         ours = self.canvas(f"{name}-ours")
         self.widget._on.setChecked(False)
         QApplication.processEvents()
@@ -140,7 +142,7 @@ class Follows(OfNapari):
             self.layer.iso_threshold = 90
             self.settle()
             shown = self.canvas(mode).max(-1)
-            self.assertGreater((shown > 60).mean(), 0.01, mode)
+            self.assertGreater((shown > 60).mean(), 0.004, mode)
             self.assertEqual(shown[0, 0], 0)
 
     def test_several_layers(self):
@@ -156,7 +158,7 @@ class Follows(OfNapari):
             else:  # napari tests depths of the samples, and so a layer stands in the other
                 self.settle()
                 shown = self.canvas(f"two-{blending}")
-                self.assertGreater(min((shown[..., 0] > 60).sum(), (shown[..., 1] > 60).sum()), 1000)
+                self.assertGreater(min((shown[..., 0] > 60).sum(), (shown[..., 1] > 60).sum()), 150)
             self.viewer.layers.remove(other)
         self.same("one")
 
@@ -171,16 +173,15 @@ class Follows(OfNapari):
         self.assertFalse(node.visible)
         self.viewer.dims.ndisplay = 2
         QApplication.processEvents()
-        flat = self.canvas("flat")
         self.assertFalse(self.widget._node.visible)
+        self.assertGreater((self.canvas("flat") > 60).any(-1).mean(), 0.02)
         self.viewer.dims.ndisplay = 3
         self.settle()
-        self.widget.close()
+        self.viewer.window.remove_dock_widget(self.dock)
         QApplication.processEvents()
         self.assertTrue(self.widget._canvas.layer_to_visual[self.layer].node.visible)
-        self.viewer.dims.ndisplay = 2
-        QApplication.processEvents()
-        np.testing.assert_array_equal(self.canvas(), flat)
+        self.assertIsNone(self.widget._node.parent)
+        self.assertGreater((self.canvas("closed") > 60).any(-1).mean(), 0.02)
 
     def test_the_newest_view_wins(self):
         self.settle()
@@ -229,6 +230,11 @@ class Follows(OfNapari):
         self.assertEqual(self.widget._said.text(), "")
 
 
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
 class Data(OfNapari):
     def test_times(self):
         movie = np.stack([blobs(at) for at in (-0.5, 0, 0.5)])
@@ -250,9 +256,9 @@ class Data(OfNapari):
 
         array = da.map_blocks(part, chunks=((25, 15), (30, 30), (50,)), dtype=np.uint8, meta=np.empty((0, 0, 0), np.uint8))
         self.viewer.add_image(array, rendering="mip", contrast_limits=(20, 190))
-        self.open()
         most, plugin_layers._OWNED_BYTES = plugin_layers._OWNED_BYTES, 4096
         try:
+            self.open()
             self.same("dask")
         finally:
             plugin_layers._OWNED_BYTES = most
@@ -262,8 +268,6 @@ class Data(OfNapari):
 
     def store(self, folder):
         """An OME-Zarr of two channels and three levels, in which the programs look alike."""
-        source = pathlib.Path(folder) / "cells.npy"
-        import zarr
         both = np.stack([blobs(), blobs(0.5)])
         path = pathlib.Path(folder) / "cells.zarr"
         group = zarr.open_group(str(path), mode="w", zarr_format=2)
@@ -276,36 +280,51 @@ class Data(OfNapari):
         group.attrs["multiscales"] = [{"version": "0.4", "axes": axes, "datasets": levels}]
         group.attrs["omero"] = {"channels": [{"label": name, "color": "FF0000", "window": {"start": 0, "end": 200, "min": 0, "max": 255}}
                                              for name in ("DAPI", "Actin")]}
-        del source
         return path, [da.from_zarr(str(path), component=str(level)) for level in range(2)]
 
-    def test_stores_are_read_by_the_service(self):
+    def check_store(self, folder, address):
+        """By its address, and by value, it is the same picture."""
+        _, levels = self.store(folder)
+        added = self.viewer.add_image(levels, channel_axis=0, name=["DAPI", "Actin"], rendering="mip", contrast_limits=(20, 190), scale=(2, 1, 1),
+                                      colormap=["green", "red"], blending="additive", metadata={"slabstream": address})
+        self.open()
+        camera_model(self.viewer).angles = (20, 35, 10)
+        self.settle()
+        self.assertEqual(self.widget._said.text(), "")
+        sources = [source for _, source in self.widget._pictures._sources.values()]
+        self.assertEqual([source.options for source in sources], [{"channels": [0]}, {"channels": [1]}])
+        shown = self.canvas(f"store-{'http' in address}")
+        self.assertGreater(min((shown[..., 0] > 60).sum(), (shown[..., 1] > 60).sum()), 300)
+        for layer in added:
+            layer.metadata = {}
+        self.widget._send_again()
+        self.settle()
+        self.assertTrue(all(source.options == {} for _, source in self.widget._pictures._sources.values()))
+        self.assertLess(np.abs(self.canvas() - shown).max(), 4)
+
+    def test_a_store_is_read_by_the_service(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.check_store(folder, f"{folder}/cells.zarr")
+
+    def test_a_store_behind_an_address_is_read_by_the_service(self):
         with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as ends:
-            path, levels = self.store(folder)
-            handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
-            handler.log_message = lambda *_: None
-            server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), type("Quiet", (http.server.SimpleHTTPRequestHandler,), {
-                "__init__": lambda self, *given: http.server.SimpleHTTPRequestHandler.__init__(self, *given, directory=folder),
-                "log_message": lambda *_: None}))
+            server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder))
+            ends.callback(server.server_close)
             ends.callback(server.shutdown)
             threading.Thread(target=server.serve_forever, daemon=True).start()
-            for address in (str(path), f"http://127.0.0.1:{server.server_port}/cells.zarr"):
-                added = self.viewer.add_image(levels, channel_axis=0, name=["DAPI", "Actin"], rendering="mip", contrast_limits=(20, 190),
-                                              scale=(2, 1, 1), colormap=["green", "red"], blending="additive", metadata={"slabstream": address})
-                self.open()
-                self.settle()
-                sources = [source for _, source in self.widget._pictures._sources.values()]
-                self.assertEqual([source.options for source in sources], [{"channels": [0]}, {"channels": [1]}])
-                shown = self.canvas(f"store-{'http' in address}")
-                for layer, number in zip(added, (0, 1)):
-                    layer.metadata = {}
-                self.widget._send_again()
-                self.settle()
-                np.testing.assert_allclose(self.canvas(), shown, atol=3)  # the same, by value
-                self.assertTrue(all(source.options == {} for _, source in self.widget._pictures._sources.values()))
-                self.widget.close()
-                self.viewer.layers.clear()
+            self.check_store(folder, f"http://127.0.0.1:{server.server_port}/cells.zarr")
 
+    def test_a_store_that_napari_opens(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path, _ = self.store(folder)
+            (layer,) = self.viewer.open(str(path / "0"), plugin="napari", layer_type="image", rendering="mip", contrast_limits=(20, 190))
+            self.assertEqual(plugin_layers.address_of(layer), None)  # a folder of another name
+            os.symlink(path / "0", f"{folder}/array.zarr")
+            self.viewer.layers.clear()
+            (layer,) = self.viewer.open(f"{folder}/array.zarr", plugin="napari", layer_type="image", rendering="mip", contrast_limits=(20, 190))
+            self.assertEqual(plugin_layers.address_of(layer), f"{folder}/array.zarr")
+            self.open()
+            self.same("opened")
 
 if __name__ == "__main__":
     unittest.main()

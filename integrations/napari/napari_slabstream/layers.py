@@ -9,6 +9,7 @@ import dataclasses
 import itertools
 import math
 import os
+import time
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ _LEAST_ZOOM, _MOST_ZOOM = 0.001, 10000.0
 _LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees
 _OWNED_BYTES = 1 << 30  # larger arrays of dask stay where they are, and are computed chunk by chunk
 _MOST_BOXES = 4096
+_COME_SECONDS, _ASK_AGAIN_SECONDS = 20.0, 0.05
 _ADDRESSES = (".zarr", ".n5", ".ims")  # whose levels and channels a service reads itself
 
 #: Renderers by napari's mode of rendering.
@@ -117,8 +119,9 @@ def address_of(layer: Any) -> str | None:
 class Source:
     """A volume at a service."""
 
-    def __init__(self, volume: ss.Volume, shape: tuple[int, ...], kept: Any = None, **options: Any):
+    def __init__(self, volume: ss.Volume, shape: tuple[int, ...], unit: float = 1, kept: Any = None, **options: Any):
         self.volume, self.shape, self.options, self.kept = volume, shape, options, kept
+        self.unit = unit  # of the service's world, in the scene
         self.centre, self.radius = ball_of(volume.service, volume.name, options.get("time"))
 
 
@@ -132,10 +135,13 @@ def _channel_of(layer: Any, siblings: list[Any], fields: Any) -> int | None:
 
 
 def by_address(layer: Any, siblings: list[Any], address: str, place: Place, service: ss.Service | None) -> Source | None:
-    """None: what lies there is not this layer, as far as its shape tells."""
-    volume = ss.load(address, service=service, spacing=place.spacing)
+    """None: what lies there is not this layer, as far as shape and spacing tell."""
+    volume = ss.load(address, service=service)
     volume.render(size=16)  # loads what datasets() then tells of
     dataset = next(each for each in volume.service.datasets() if each.name == volume.name)
+    units = np.array(place.spacing) / np.array(dataset.spacing)
+    if units.max() - units.min() > _UPRIGHT * units.max():
+        return None
     shape = tuple(layer.level_shapes[0] if layer.multiscale else layer.data.shape)
     inner = tuple(side for side, number in zip(shape, place.index) if number is None)
     outer = [(side, number) for side, number in zip(shape, place.index) if number is not None and side > 1]
@@ -151,7 +157,7 @@ def by_address(layer: Any, siblings: list[Any], address: str, place: Place, serv
         channel = outer.pop(0)[1]
     if outer or channel is None:
         return None
-    return Source(volume, inner, channels=[channel], **options)
+    return Source(volume, inner, float(units.mean()), channels=[channel], **options)
 
 
 def by_value(layer: Any, place: Place, service: ss.Service | None) -> Source:
@@ -174,6 +180,11 @@ def _owned(array: Any, place: Place, service: ss.Service | None) -> Source:
     owner = ss.Owner(name, array.shape, array.dtype, boxes, spacing=place.spacing, service=endpoint, budget=_OWNED_BYTES,
                      make=lambda box, _: np.ascontiguousarray(array.blocks[blocks[box]].compute()))
     owner.publish(1)
+    end = time.monotonic() + _COME_SECONDS
+    while all(dataset.name != name for dataset in service.datasets()):
+        if time.monotonic() > end:
+            raise ss.Unavailable(f"the array's chunks are not known to the service after {_COME_SECONDS:g} s")
+        time.sleep(_ASK_AGAIN_SECONDS)
     return Source(ss.Volume(service, name, {}, []), tuple(array.shape), kept=owner)
 
 
@@ -182,27 +193,27 @@ _names = itertools.count(1)
 
 def camera_options(camera: Camera, place: Place, source: Source, scale: float) -> tuple[dict[str, Any], bool]:
     """Options of a picture `scale` times as large as the canvas, and whether it must be mirrored from left to right."""
-    spacing = np.array(place.spacing)
-    to_scene = (np.array(place.columns) / spacing[:, None]).T  # from z, y, x of the service; orthogonal
+    spacing, unit = np.array(place.spacing), source.unit
+    to_scene = (np.array(place.columns) / spacing[:, None]).T  # of directions as z, y, x of the service; orthogonal
     middle = np.array(place.origin) + to_scene @ (spacing * (np.array(source.shape) - 1) / 2)
 
     def there(vector: Any) -> Any:  # of the scene, as x, y, z of the service
         return (to_scene.T @ np.array(vector))[::-1]
 
     forward, up = there(camera.forward), there(camera.up)
-    look_at = np.array(source.centre) + there(np.array(camera.center) - middle)
+    look_at = np.array(source.centre) + there(np.array(camera.center) - middle) / unit
     right = there(np.cross(camera.forward, camera.up)) * (-1 if camera.mirrored else 1)
     shorter = min(camera.width, camera.height)
     options: dict[str, Any] = {"size": (max(round(camera.width * scale), 1), max(round(camera.height * scale), 1)), "look_at": tuple(look_at),
                                "up": tuple(up)}
     if camera.perspective == 0:
-        zoom = 2 * source.radius * camera.zoom / shorter
+        zoom = 2 * source.radius * unit * camera.zoom / shorter
         options.update(eye=tuple(look_at - 4 * source.radius * forward), zoom=min(max(zoom, _LEAST_ZOOM), _MOST_ZOOM))
     else:
         half = math.tan(math.radians(camera.perspective / 2))
         slope = half * shorter / camera.height
         fov = min(max(2 * math.degrees(math.atan(slope)), _LEAST_FOV), _MOST_FOV)
-        options.update(eye=tuple(look_at - camera.height / camera.zoom / (2 * half) * forward), projection="perspective", fov=fov,
+        options.update(eye=tuple(look_at - camera.height / (camera.zoom * unit * 2 * half) * forward), projection="perspective", fov=fov,
                        zoom=math.tan(math.radians(fov / 2)) / slope)
     return options, bool(np.cross(forward, up) @ right < 0)
 

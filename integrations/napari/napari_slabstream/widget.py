@@ -4,7 +4,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from qtpy.QtCore import QTimer, Signal
+from qtpy.QtCore import QEvent, QTimer, Signal
 from qtpy.QtWidgets import QCheckBox, QLabel, QPushButton, QVBoxLayout, QWidget
 from vispy.scene.visuals import Image
 from vispy.visuals.transforms import STTransform
@@ -20,6 +20,8 @@ class Volumes(QWidget):
 
     pictured = Signal(bool)  # a picture is on the canvas; True: the sharp one of a view
     _came = Signal(object, object, bool, object)
+
+    _docked = _stopped = False
 
     def __init__(self, napari_viewer: Any):
         super().__init__()
@@ -128,8 +130,22 @@ class Volumes(QWidget):
     def _say(self, notes: dict[Any, str]) -> None:
         self._said.setText("\n".join(f"{layer.name}: {note}" for layer, note in notes.items()))
 
+    def event(self, event: Any) -> bool:
+        if event.type() == QEvent.Type.ParentChange:
+            if self._docked and self.parent() is None:  # its dock was closed
+                self.stop()
+            self._docked = True
+        return bool(super().event(event))
+
     def closeEvent(self, event: Any) -> None:
-        """napari draws everything itself again."""
+        self.stop()
+        super().closeEvent(event)
+
+    def stop(self) -> None:
+        """napari draws everything itself again, for good."""
+        if self._stopped:
+            return
+        self._stopped = True
         for events in self._watched:
             events.disconnect(self._changed)
         self._soon.stop()
@@ -138,4 +154,3 @@ class Volumes(QWidget):
         self._hide(set())
         if self._node is not None:
             self._node.parent = None
-        super().closeEvent(event)
