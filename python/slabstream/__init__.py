@@ -28,6 +28,7 @@ from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
 from .viewer import Viewer
+from .vtk import to_pyvista
 
 __version__ = "0.2.0"
 
@@ -36,7 +37,7 @@ __all__ = [
     "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner",
     "Parameter", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
     "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Widget",
-    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "show", "shutdown", "view",
+    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "show", "shutdown", "to_pyvista", "view",
 ]
 
 

@@ -48,6 +48,14 @@ def ball_around(a: Any, b: Any) -> Any:
     return schema.Ball(centre=schema.Vec3(x=x, y=y, z=z), radius=radius)
 
 
+def ball_of(service: Any, dataset: str, time: Any = None) -> tuple[tuple[float, float, float], float]:
+    """The ball round a whole volume: its centre, x, y, z of the world, and its radius. At zoom 1 an orthographic picture shows it. A small
+    picture tells both."""
+    side = 16
+    geometry = service.render(dataset, size=side, fit=False, projection="orthographic", azimuth=0, elevation=0, time=time).geometry
+    return geometry.target, geometry.pixel_size * side / 2
+
+
 def cameras_of(path: Any) -> tuple[list[float], list[dict[str, Any]]]:
     """Times and cameras of a file, or of a list of cameras."""
     path = json_of("path", path)

@@ -2,12 +2,13 @@
 
 Arrays are z, y, x: array[z, y, x], as numpy has volumes in C order, and so are spacing, origin and directions. Taken are numpy arrays and
 whatever has shape, dtype and slices like one (dask, zarr, h5py, memory maps), what numpy can view (torch, jax), xarray.DataArray, images of
-nibabel, and datasets of pydicom. None of these packages is needed: an object is known by its attributes. Arrays are written slab by slab, so
-that one which is computed or read by chunks is never in memory as a whole.
+nibabel, ITK, SimpleITK and VTK, and datasets of pydicom. None of these packages is needed: an object is known by its attributes. Arrays are
+written slab by slab, so that one which is computed or read by chunks is never in memory as a whole.
 """
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import os
 import pathlib
 from typing import Any, Iterator, Sequence
@@ -58,6 +59,14 @@ def _is_nibabel(volume: Any) -> bool:
 
 def _is_dicom(volume: Any) -> bool:
     return hasattr(volume, "PixelData") and hasattr(volume, "Rows")
+
+
+def _is_vtk(volume: Any) -> bool:
+    return hasattr(volume, "GetDirectionMatrix") and hasattr(volume, "GetPointData")
+
+
+def _is_itk(volume: Any) -> bool:
+    return hasattr(volume, "GetOrigin") and hasattr(volume, "GetDirection")
 
 
 def _three(name: str, value: Any) -> Vector:
@@ -271,6 +280,40 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
     return Volume(numpy.stack(frames), Grid((x, y, z), tuple(map(float, at[0])), "patient"), rounds)  # type: ignore[arg-type]
 
 
+def _placed(samples: Any, spacing: Any, origin: Any, columns: Any, world: str) -> Volume:
+    """`samples` are z, y, x; all else is x, y, z: column i of `columns` is the direction of voxels along axis i."""
+    steps = (numpy.asarray(columns, numpy.float64) * numpy.asarray(spacing, numpy.float64)).T
+    x, y, z = (tuple(map(float, step)) for step in steps)
+    return Volume(samples, Grid((x, y, z), tuple(map(float, origin)), world))  # type: ignore[arg-type]
+
+
+def _from_vtk(image: Any) -> Volume:
+    """A vtkImageData, and so pyvista.ImageData. The active scalars of its points, or else of its cells, lie in VTK's world as they are."""
+    sizes, spacing, scalars = numpy.array(image.GetDimensions()), numpy.array(image.GetSpacing()), image.GetPointData().GetScalars()
+    matrix = image.GetDirectionMatrix()
+    columns = numpy.array([[matrix.GetElement(row, column) for column in range(3)] for row in range(3)])
+    first = numpy.array(image.GetExtent()[::2], numpy.float64)  # its number along each axis; the origin is that of number 0
+    if scalars is None:
+        scalars, sizes, first = image.GetCellData().GetScalars(), numpy.maximum(sizes - 1, 1), first + 0.5
+    if scalars is None:
+        raise InvalidArgument("the vtkImageData has no active scalars, of points or of cells: SetActiveScalars names an array")
+    if scalars.GetNumberOfComponents() != 1:
+        raise InvalidArgument(f"the scalars of the vtkImageData have {scalars.GetNumberOfComponents()} components, must have 1")
+    origin = numpy.array(image.GetOrigin()) + columns @ (spacing * first)
+    return _placed(numpy.asarray(memoryview(scalars)).reshape(sizes[::-1]), spacing, origin, columns, "scene")
+
+
+def _from_itk(image: Any) -> Volume:
+    """An image of ITK or SimpleITK. Its world is DICOM's."""
+    package = importlib.import_module(type(image).__module__.partition(".")[0])  # SimpleITK or itk: it made the image
+    view = getattr(package, "GetArrayViewFromImage", None) or getattr(package, "array_view_from_image")
+    dimension = len(tuple(image.GetSpacing()))
+    if dimension != 3:
+        raise InvalidArgument(f"the image of ITK has {dimension} dimensions, must have 3: extract one of its volumes")
+    columns = numpy.asarray(image.GetDirection()).reshape(3, 3)
+    return _placed(view(image), tuple(image.GetSpacing()), _to_ras(tuple(image.GetOrigin())), _to_ras(columns.T).T, "patient")
+
+
 def _as_numpy(volume: Any) -> Any:
     """What numpy can view: tensors of torch and others whose types or slices are not numpy's."""
     kind = f"{type(volume).__module__.partition('.')[0]}.{type(volume).__name__}"
@@ -317,6 +360,10 @@ def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: A
         found = _from_xarray(volume, places=spacing is None)
     elif _is_nibabel(volume):
         found = _from_nibabel(volume)
+    elif _is_vtk(volume):
+        found = _from_vtk(volume)
+    elif _is_itk(volume):
+        found = _from_itk(volume)
     elif _is_dicom(volume):
         found = _from_dicom([volume])
     elif isinstance(volume, (list, tuple)) and volume and all(map(_is_dicom, volume)):

@@ -1,0 +1,149 @@
+"""Pictures of volumes in which meshes of VTK and PyVista stand, and volumes for them.
+
+    import slabstream.vtk as sv
+
+    plotter.add_mesh(mesh)
+    with ss.load(array, spacing=spacing) as volume:
+        image = sv.compose(plotter, volume.service, volume.name, renderer="raycast", transfer="ct-bone")
+
+Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of the
+render window.
+"""
+from __future__ import annotations
+
+import importlib
+import math
+from typing import Any
+
+import numpy
+
+from .errors import InvalidArgument
+from .image import Image
+from .moves import ball_of
+from .options import takes_options_of
+from .runs import Floats
+from .service import Service
+from .values import integer
+from .volumes import slabs_of, volume_of
+
+_LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees, of the option fov
+_MOST_FRONTS = 64
+
+
+def to_pyvista(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None) -> Any:
+    """A pyvista.ImageData of whatever load() takes as an array, with the samples as its points' scalars "values"; in memory as a whole. Of a
+    patient it is in the world of the service: x to the right, y to anterior, z to superior.
+
+    Of an Image: its pixels as points, from the lower left one, with the scalars "rgba", and "depth" where it has depths."""
+    image_data = importlib.import_module("pyvista").ImageData
+    if isinstance(volume, Image):
+        found = image_data(dimensions=(*volume.size, 1))
+        if volume.depth is not None:
+            found.point_data["depth"] = volume.depth[::-1].ravel()
+        found.point_data["rgba"] = numpy.asarray(volume)[::-1].reshape(-1, 4)
+        found.set_active_scalars("rgba")
+        return found
+    checked = volume_of(volume, spacing, origin, direction)
+    steps = numpy.array(checked.grid.steps)
+    lengths = numpy.linalg.norm(steps, axis=1)
+    samples = numpy.concatenate([numpy.ravel(slab) for slab in slabs_of(checked)])
+    found = image_data(dimensions=checked.samples.shape[::-1], spacing=lengths, origin=checked.grid.origin,
+                       direction_matrix=(steps / lengths[:, None]).T)
+    found.point_data["values"] = samples
+    return found
+
+
+def camera_of(renderer: Any, radius: float) -> dict[str, Any]:
+    """The options of pictures with the camera and the size of a vtkRenderer that fills its window. `radius`: of the ball round the volume, for
+    parallel projections (ball_of)."""
+    camera, (width, height) = renderer.GetActiveCamera(), renderer.GetRenderWindow().GetSize()
+    shorter = min(width, height)
+    options = {"size": (width, height), "eye": camera.GetPosition(), "look_at": camera.GetFocalPoint(), "up": camera.GetViewUp()}
+    if camera.GetParallelProjection():
+        return {**options, "projection": "orthographic", "zoom": radius * height / (shorter * camera.GetParallelScale())}
+    slope = math.tan(math.radians(camera.GetViewAngle() / 2)) * shorter / (width if camera.GetUseHorizontalViewAngle() else height)
+    fov = min(max(2 * math.degrees(math.atan(slope)), _LEAST_FOV), _MOST_FOV)
+    return {**options, "projection": "perspective", "fov": fov, "zoom": math.tan(math.radians(fov / 2)) / slope}
+
+
+def _shown(plotter: Any) -> tuple[Any, Floats, Floats]:
+    """The renderer; what its window shows, red, green and blue from 0 to 1; and depths from the eye, along the direction of view."""
+    core, to_numpy = importlib.import_module("vtkmodules.vtkCommonCore"), importlib.import_module("vtkmodules.util.numpy_support").vtk_to_numpy
+    renderer = getattr(plotter, "renderer", plotter)
+    window = renderer.GetRenderWindow()
+    if tuple(renderer.GetViewport()) != (0, 0, 1, 1):
+        raise InvalidArgument(f"the renderer has the viewport {renderer.GetViewport()}, must fill its window: (0, 0, 1, 1)")
+    if hasattr(plotter, "screenshot"):
+        plotter.screenshot(return_img=True)  # PyVista places its camera before it renders
+    else:
+        window.Render()
+    width, height = window.GetSize()
+    codes, values = core.vtkUnsignedCharArray(), core.vtkFloatArray()
+    window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, codes)
+    window.GetZbufferData(0, 0, width - 1, height - 1, values)
+    rgb = to_numpy(codes).reshape(height, width, 4)[::-1, :, :3].astype(numpy.float32) / 255
+    z = to_numpy(values).reshape(height, width)[::-1].astype(numpy.float64)
+    near, far = renderer.GetActiveCamera().GetClippingRange()
+    parallel = renderer.GetActiveCamera().GetParallelProjection()
+    depth = near + z * (far - near) if parallel else near * far / (far - z * (far - near))
+    return renderer, rgb, numpy.where(z < 1, depth, numpy.inf)
+
+
+@takes_options_of("render")
+def compose(plotter: Any, service: Service, dataset: str, *, fronts: int = 16, **options: Any) -> Image:
+    """The picture of a dataset together with the opaque meshes that a pyvista.Plotter or a vtkRenderer shows, with its camera, size and
+    background.
+
+    A picture with depths (renderer="zbuffer") is exact: the nearer of both is seen at each pixel. Others have no depths, so the part of the
+    volume in front of the meshes is rendered up to `fronts` depths, 1 to 64, from the nearest to the farthest point of the meshes, and is
+    interpolated between them: as many pictures more. Those cut by planes, so options that cut something away are refused.
+    """
+    fronts = integer("fronts", fronts, 1, _MOST_FRONTS)
+    for name in ("background", "camera"):
+        if options.get(name) is not None:
+            raise InvalidArgument(f"{name} is given, but must be the plotter's own")
+    renderer, rgb, meshes = _shown(plotter)
+    options = camera_of(renderer, ball_of(service, dataset, options.get("time"))[1]) | options
+    whole = service.render(dataset, **options)
+    geometry = whole.geometry
+    assert geometry is not None
+    eye_depth = renderer.GetActiveCamera().GetDistance() - geometry.target_depth  # of the service's depth 0, under a parallel projection
+    meshes = meshes - eye_depth
+    front, depth = whole.rgba, None
+    if whole.depth is not None:
+        front = numpy.where((whole.depth < meshes)[..., None], whole.rgba, numpy.float32(0))
+        depth = numpy.minimum(whole.depth, meshes).astype(numpy.float32)
+    elif numpy.isfinite(meshes).any():
+        front = _in_front(service, dataset, options, whole, meshes, fronts)
+    alpha = front[..., 3:]
+    return Image(numpy.concatenate([front[..., :3] + (1 - alpha) * rgb, numpy.ones_like(alpha)], axis=2), depth, format=whole.format,
+                 geometry=geometry, statistics=whole.statistics)
+
+
+def _in_front(service: Service, dataset: str, options: dict[str, Any], whole: Image, meshes: Floats, fronts: int) -> Floats:
+    """Of each pixel, the part of the volume before the mesh."""
+    if options.get("clip_mode") == "cut-away":
+        raise InvalidArgument("clip_mode 'cut-away' has no picture in front of a mesh: must be 'keep'")
+    given = options.get("clip_plane") or []
+    planes = [given] if isinstance(given, str) or (given and isinstance(given[0], (int, float))) else list(given)
+    geometry = whole.geometry
+    assert geometry is not None
+    forward = numpy.array(geometry.forward)
+    seen = numpy.isfinite(meshes) & (whole.rgba[..., 3] > 0)
+    if not seen.any():
+        return whole.rgba
+    ends = numpy.unique(numpy.quantile(meshes[seen], numpy.linspace(0, 1, fronts)))
+    frames = []
+    for end in ends:
+        through = numpy.array(geometry.target) + (end - geometry.target_depth) * forward
+        cut_off: dict[str, Any] = {"clip_plane": [*planes, (*-forward, float(forward @ through))]}
+        frames.append(service.submit(dataset, **options | cut_off))
+    result = whole.rgba.copy()
+    before, before_end = numpy.zeros_like(result), -numpy.inf
+    for end, frame in zip(ends, frames):
+        cut = frame.result().rgba
+        here = seen & (meshes > before_end) & (meshes <= end)
+        share = (meshes[here] - before_end) / (end - before_end) if numpy.isfinite(before_end) else numpy.ones(here.sum())
+        result[here] = before[here] + share[:, None] * (cut[here] - before[here])
+        before, before_end = cut, end
+    return result
