@@ -58,7 +58,7 @@ export interface Host {
   link?(withToken: boolean): string; // to what shows; without this no link can be copied
   picked?(value: Value): void; // at a click in the 3-D picture
   error?(message: string): void; // one line, which the viewer shows, too
-  refused?(): void; // the gateway does not take the token
+  refused?(why: string): void; // the gateway does not take the token
   reached?(isOpen: boolean): void; // a stream of pictures has opened, or is lost
 }
 
@@ -254,8 +254,9 @@ class Assembly {
   private async checkToken(): Promise<void> {
     const answer = await this.api.connection.request("datasets", {}, {}).catch(() => null);
     if (answer?.status !== 401) return;
-    if (this.host.refused) this.host.refused();
-    else this.say("The gateway does not take the token.", "error");
+    const { error = "" } = (await answer.json().catch(() => ({}))) as { error?: string };
+    if (this.host.refused) this.host.refused(error);
+    else this.say(`The gateway refuses the token: ${error}.`, "error");
   }
 
   // ---- what can be done
