@@ -873,7 +873,7 @@ class TokenTest(WithService):
         claims = json.loads(base64.urlsafe_b64decode(token.split(".")[1] + "=="))
         self.assertAlmostEqual(claims["exp"], time.time() + 3600, delta=TIMEOUT)
         several = self.programs.run("token", "--for", "90s", "--dataset", "a,b", "--dataset", "c").stdout.splitlines()
-        self.assertEqual({each["name"] for each in Gateway(several[1] + "&").json("/api/v1/datasets")[1]["datasets"]}, {"a", "b", "c"})
+        self.assertEqual({each["name"] for each in Gateway(several[1]).json("/api/v1/datasets")[1]["datasets"]}, {"a", "b", "c"})
         for arguments, why in ((["--for", "0s"], "--for 0s is less than 1s"), (["--for", "500ms"], "--for 500ms is less than 1s"), (["--for", "day"], "is not a time"),
                                (["--for", "9000h"], "out of range"), ([], "--for"), (["--for", "1h", "--dataset", ""], "--dataset"),
                                (["--for", "1h", "--dataset", "x" * 300], "--dataset has 300 bytes, must have 1 to 256"),
