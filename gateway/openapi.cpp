@@ -71,7 +71,7 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
   Json responses = {{"200", {{"description", "As asked"}, {"content", {{type, {{"schema", schema}}}}}}}};
   if (takes_options) responses["400"] = failure("An option is wrong");
   if (!open) responses["401"] = failure("The token is missing or wrong");
-  responses["403"] = failure("Host or Origin is foreign");
+  responses["403"] = failure("Host or Origin is foreign, or the token does not give this");
   if (takes_options) responses["404"] = failure("There is no such dataset");
   if (takes_options) responses["429"] = failure("Too many pictures or questions are under way");
   responses["503"] = failure("The service does not answer, has no worker, or not enough memory");

@@ -606,7 +606,11 @@ class HttpTest(WithService):
                                      ("gzip;q=0", False), ("*, gzip ; q=0.000", False), ("", False), ("gzip;q=0.001", True)):
                 for method in ("GET", "HEAD"):
                     status, headers, body = self.gateway.request(path, method=method, headers={"Accept-Encoding": accepted})
-                    self.assertEqual((status, headers["Vary"], headers["Content-Encoding"]), (200, "Accept-Encoding, Origin", "gzip" if packed else None), accepted)
+                    self.assertEqual(
+                        (status, headers["Vary"], headers["Content-Encoding"]),
+                        (200, "Accept-Encoding, Origin", "gzip" if packed else None),
+                        accepted,
+                    )
                     if method == "GET":
                         self.assertEqual(len(body), int(headers["Content-Length"]))
                         self.assertEqual(gzip.decompress(body) if packed else body, whole_file)
@@ -646,20 +650,34 @@ class HttpTest(WithService):
             Page(self.gateway, protocols=["slabstream.token." + self.gateway.token])
 
     def test_pages_of_other_origins_ask_as_browsers_want_it(self):
-        allowed = lambda answer: {name.lower(): value for name, value in answer[1].items() if name.lower().startswith("access-control-")}  # noqa: E731
+        def allowed(answer):
+            return {name.lower(): value for name, value in answer[1].items() if name.lower().startswith("access-control-")}
+
         wanted = {"Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization,content-type"}
         for path in ("/api/v1/render.png", "/api/v1/upload", "/assets/page.js", "/"):
             answer = self.gateway.request(path, method="OPTIONS", token=False, headers={"Origin": "http://localhost:5173", **wanted})
             self.assertEqual((answer[0], answer[2], answer[1]["Vary"]), (204, b"", "Origin"), path)
-            self.assertEqual(allowed(answer), {"access-control-allow-origin": "http://localhost:5173", "access-control-allow-methods": "GET, HEAD, POST",
-                                               "access-control-allow-headers": "Authorization, Content-Type", "access-control-max-age": "600",
-                                               "access-control-expose-headers": "Slabstream-Renderer"})
+            self.assertEqual(
+                allowed(answer),
+                {
+                    "access-control-allow-origin": "http://localhost:5173",
+                    "access-control-allow-methods": "GET, HEAD, POST",
+                    "access-control-allow-headers": "Authorization, Content-Type",
+                    "access-control-max-age": "600",
+                    "access-control-expose-headers": "Slabstream-Renderer",
+                },
+            )
         mine, foreign = {"Origin": "http://127.0.0.1:5173"}, {"Origin": "https://evil.example"}
         self.assertEqual(self.gateway.request("/nothing", method="OPTIONS", headers={**mine, **wanted})[0], 404)
         self.assertEqual(self.gateway.request("/api/v1/status", method="OPTIONS")[0], 405)
         # A page may read its answers, also those that refuse it.
-        for path, token, status in (("/api/v1/status", True, 200), ("/api/v1/status", False, 401), ("/api/v1/render.png?dataset=none", True, 404),
-                                    ("/assets/page.js", False, 200), ("/nothing", True, 404)):
+        for path, token, status in (
+            ("/api/v1/status", True, 200),
+            ("/api/v1/status", False, 401),
+            ("/api/v1/render.png?dataset=none", True, 404),
+            ("/assets/page.js", False, 200),
+            ("/nothing", True, 404),
+        ):
             answer = self.gateway.request(path, token=token, headers=mine)
             self.assertEqual((answer[0], answer[1]["Access-Control-Allow-Origin"]), (status, mine["Origin"]), path)
             self.assertIn("Origin", answer[1]["Vary"])
@@ -667,7 +685,9 @@ class HttpTest(WithService):
             for method in ("GET", "OPTIONS"):
                 answer = self.gateway.request(path, method=method, headers={**foreign, **wanted})
                 self.assertEqual((answer[0], allowed(answer), answer[1]["Vary"]), (403, {}, "Origin"), path)
-                self.assertEqual(json.loads(answer[2])["error"], "Origin 'https://evil.example' is another site; --origin names those that may ask")
+                self.assertEqual(
+                    json.loads(answer[2])["error"], "Origin 'https://evil.example' is another site; --origin names those that may ask"
+                )
             self.assertEqual(allowed(self.gateway.request(path, token=token)), {})
         self.page(headers=mine).close()
 
@@ -753,8 +773,15 @@ class TokenTest(WithService):
     """What holders of tokens may do that expire, or that are for viewing or some datasets alone."""
 
     FIELDS = {"at": "1,1,1", "from": "0,0,0", "to": "1,1,1", "x": 3, "y": 3, "size": 16, "frames": 1, "file": "a.nrrd", "bytes": 10}
-    TAKEN = {"value": ["at"], "profile": ["from", "to"], "pick": ["x", "y", "size"], "upload": ["file", "bytes"], "render": ["size"], "slice": ["size"],
-             "turntable": ["size", "frames"]}
+    TAKEN = {
+        "value": ["at"],
+        "profile": ["from", "to"],
+        "pick": ["x", "y", "size"],
+        "upload": ["file", "bytes"],
+        "render": ["size"],
+        "slice": ["size"],
+        "turntable": ["size", "frames"],
+    }
 
     def ask(self, gateway, path, method, dataset, in_body=False):
         """The status of a request that is right but for the token, and its error."""
@@ -767,7 +794,9 @@ class TokenTest(WithService):
         return status, json.loads(answer)["error"] if status in (401, 403) else ""
 
     def test_every_request_wants_its_right(self):
-        known = {(method.upper(), path) for path, methods in self.gateway.json("/api/v1/openapi.json")[1]["paths"].items() for method in methods}
+        known = {
+            (method.upper(), path) for path, methods in self.gateway.json("/api/v1/openapi.json")[1]["paths"].items() for method in methods
+        }
         self.assertEqual(known - {(method, path) for method, path, _ in RIGHTS}, set(), "the test has every request")
         own, expired = self.gateway, self.gateway.holding(exp=int(time.time()))
         given = {own.holding(): {NONE, VIEW, STEER, WATCH, SEND}, own.holding(view_only=True): {NONE, VIEW, WATCH},
@@ -786,8 +815,11 @@ class TokenTest(WithService):
             if need in (VIEW, STEER) and path not in ("/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
                 for in_body in (False, True) if method == "POST" else (False,):
                     for other in ("b", "none"):  # whether there is one or not
-                        self.assertEqual(self.ask(own.holding(datasets=["a"]), path, method, other, in_body), (403, f"the token does not show dataset '{other}'"),
-                                         asked)
+                        self.assertEqual(
+                            self.ask(own.holding(datasets=["a"]), path, method, other, in_body),
+                            (403, f"the token does not show dataset '{other}'"),
+                            asked,
+                        )
         upload = own.json("/api/v1/upload?file=x.nrrd&bytes=1", method="POST", body=b"")[1]["upload"]
         drop = f"/api/v1/upload?upload={upload}&drop=true"
         self.assertEqual(own.holding(view_only=True).json(drop, method="POST", body=b""), (403, {"error": "the token is view-only"}))
@@ -801,7 +833,12 @@ class TokenTest(WithService):
             self.assertEqual((names(self.gateway, path) >= NAMES, names(holder, path)), (True, {"a"}), path)
         # The service's error would list its datasets.
         self.assertIn("the catalogue has a, b", self.gateway.json("/api/v1/histogram?dataset=gone")[1]["error"])
-        for path in ("histogram?dataset=gone", "render.png?dataset=gone&size=16", "pick?dataset=gone&x=1&y=1", "turntable.mp4?dataset=gone&size=16&frames=1"):
+        for path in (
+            "histogram?dataset=gone",
+            "render.png?dataset=gone&size=16",
+            "pick?dataset=gone&x=1&y=1",
+            "turntable.mp4?dataset=gone&size=16&frames=1",
+        ):
             self.assertEqual(holder.json("/api/v1/" + path), (404, {"error": "there is no such dataset"}), path)
         # No way to say it twice.
         for target, body in (("/api/v1/command?dataset=a&dataset=b", None), ("/api/v1/command?dataset=b", '{"dataset": "a"}'),
@@ -815,7 +852,11 @@ class TokenTest(WithService):
         self.addCleanup(page.close)
         self.assertEqual([each["name"] for each in page.text("status", lambda status: status["datasets"])["datasets"]], ["a"])
         page.final(page.view({"dataset": "a", "size": 16}))
-        for name, why in (("b", "the token does not show dataset 'b'"), ("none", "the token does not show dataset 'none'"), ("gone", "there is no such dataset")):
+        for name, why in (
+            ("b", "the token does not show dataset 'b'"),
+            ("none", "the token does not show dataset 'none'"),
+            ("gone", "there is no such dataset"),
+        ):
             seq = page.view({"dataset": name, "size": 16})
             error = page.text("error")
             self.assertEqual((error["seq"], error["error"]), (seq, why))
@@ -851,13 +892,30 @@ class TokenTest(WithService):
         self.assertEqual(asked(token)[0], 200)
         self.assertEqual(self.gateway.request("/api/v1/status?token=" + token, token=False)[0], 200)
         unsigned = token.rsplit(".", 1)[0]
-        for wrong in (unsigned, unsigned + ".", signed("x" * 22, {"exp": hour}), signed("", {"exp": hour}), token[:-1], token + "A", secret + "." + token,
-                      signed(secret, {"exp": hour}, {"alg": "none"}).rsplit(".", 1)[0] + "."):
+        for wrong in (
+            unsigned,
+            unsigned + ".",
+            signed("x" * 22, {"exp": hour}),
+            signed("", {"exp": hour}),
+            token[:-1],
+            token + "A",
+            secret + "." + token,
+            signed(secret, {"exp": hour}, {"alg": "none"}).rsplit(".", 1)[0] + ".",
+        ):
             self.assertEqual(asked(wrong), (401, {"error": missing}), wrong)
-        for claims, header, why in (({}, None, "no claim exp"), ({"exp": hour}, {"alg": "none"}, "HS256"), ({"exp": hour}, {"typ": "JWT"}, "HS256"), ([], None, "object"),
-                                    ({"exp": str(hour)}, None, "'exp'"), ({"exp": hour, "datasets": "a"}, None, "'datasets'"), ({"exp": hour, "datasets": [1]}, None, "'datasets'"),
-                                    ({"exp": hour, "view_only": 1}, None, "'view_only'"), ({"exp": hour, "nbf": hour}, None, "'nbf'"), ({"exp": -1}, None, "expired at 1970"),
-                                    ({"exp": 1e300, "datasets": None}, None, "'datasets'")):
+        for claims, header, why in (
+            ({}, None, "no claim exp"),
+            ({"exp": hour}, {"alg": "none"}, "HS256"),
+            ({"exp": hour}, {"typ": "JWT"}, "HS256"),
+            ([], None, "object"),
+            ({"exp": str(hour)}, None, "'exp'"),
+            ({"exp": hour, "datasets": "a"}, None, "'datasets'"),
+            ({"exp": hour, "datasets": [1]}, None, "'datasets'"),
+            ({"exp": hour, "view_only": 1}, None, "'view_only'"),
+            ({"exp": hour, "nbf": hour}, None, "'nbf'"),
+            ({"exp": -1}, None, "expired at 1970"),
+            ({"exp": 1e300, "datasets": None}, None, "'datasets'"),
+        ):
             status, answer = asked(signed(secret, claims, header))
             self.assertEqual((status, why in answer["error"], "\n" in answer["error"]), (401, True, False), answer)
         nothing = self.gateway.holding(datasets=[])
@@ -873,11 +931,17 @@ class TokenTest(WithService):
         claims = json.loads(base64.urlsafe_b64decode(token.split(".")[1] + "=="))
         self.assertAlmostEqual(claims["exp"], time.time() + 3600, delta=TIMEOUT)
         several = self.programs.run("token", "--for", "90s", "--dataset", "a,b", "--dataset", "c").stdout.splitlines()
-        self.assertEqual({each["name"] for each in Gateway(several[1] + "&").json("/api/v1/datasets")[1]["datasets"]}, {"a", "b", "c"})
-        for arguments, why in ((["--for", "0s"], "--for 0s is less than 1s"), (["--for", "500ms"], "--for 500ms is less than 1s"), (["--for", "day"], "is not a time"),
-                               (["--for", "9000h"], "out of range"), ([], "--for"), (["--for", "1h", "--dataset", ""], "--dataset"),
-                               (["--for", "1h", "--dataset", "x" * 300], "--dataset has 300 bytes, must have 1 to 256"),
-                               (["--for", "1h", "--token-file", "none"], "--token-file")):
+        self.assertEqual({each["name"] for each in Gateway(several[1]).json("/api/v1/datasets")[1]["datasets"]}, {"a", "b", "c"})
+        for arguments, why in (
+            (["--for", "0s"], "--for 0s is less than 1s"),
+            (["--for", "500ms"], "--for 500ms is less than 1s"),
+            (["--for", "day"], "is not a time"),
+            (["--for", "9000h"], "out of range"),
+            ([], "--for"),
+            (["--for", "1h", "--dataset", ""], "--dataset"),
+            (["--for", "1h", "--dataset", "x" * 300], "--dataset has 300 bytes, must have 1 to 256"),
+            (["--for", "1h", "--token-file", "none"], "--token-file"),
+        ):
             error = self.programs.run("token", *arguments, expect=2).stderr
             self.assertEqual((why in error, len(error.splitlines())), (True, 1), error)
 
@@ -1365,16 +1429,29 @@ class StartTest(unittest.TestCase):
         gateway = Gateway(f"http://127.0.0.1:{listening_port(child.pid)}/#token={token}")
         # The proxy may leave the path in requests, or take it away.
         for base in ("/render", ""):
-            for path, token, status in (("/", False, 200), ("/assets/page.js", False, 200), ("/livez", False, 200), ("/api/v1/options?a=b", False, 200),
-                                        ("/metrics", True, 200), ("/metrics", False, 401), ("/nothing", True, 404), ("//livez", True, 404)):
+            for path, token, status in (
+                ("/", False, 200),
+                ("/assets/page.js", False, 200),
+                ("/livez", False, 200),
+                ("/api/v1/options?a=b", False, 200),
+                ("/metrics", True, 200),
+                ("/metrics", False, 401),
+                ("/nothing", True, 404),
+                ("//livez", True, 404),
+            ):
                 self.assertEqual(gateway.request(base + path, token=token)[0], status, base + path)
-            page = Page(gateway, target=base + "/api/v1/view", headers={"Host": "viewer.example.org", "Origin": "https://viewer.example.org"})
+            page = Page(
+                gateway, target=base + "/api/v1/view", headers={"Host": "viewer.example.org", "Origin": "https://viewer.example.org"}
+            )
             self.assertEqual(page.receive()["type"], "hello")
             page.close()
         status, headers, _ = gateway.request("/render?x=1", token=False)
         self.assertEqual((status, headers["Location"]), (308, "/render/?x=1"), "the page's addresses are relative")
         for path in ("/rende/livez", "/render2/livez", "/renderlivez", "/render/render/livez", "/RENDER/livez", "/x/render/livez"):
-            self.assertEqual(gateway.json(path), (404, {"error": f"there is nothing at '{path.removeprefix('/render') if path.startswith('/render/') else path}'"}))
+            self.assertEqual(
+                gateway.json(path),
+                (404, {"error": f"there is nothing at '{path.removeprefix('/render') if path.startswith('/render/') else path}'"}),
+            )
         for wrong in ("https://viewer.example.org/render?x", "/render/", "https://a/../b"):
             self.assertEqual(self.refused("--behind-proxy", wrong)[0], 2, wrong)
 
@@ -1398,8 +1475,13 @@ class StartTest(unittest.TestCase):
         for name, text in (("kept", "Jb8fXqkz3mYw0nT5sVQy1A"), ("short", "0123456789abcdef")):
             (self.programs.folder / name).write_text(text + "\n")
             (self.programs.folder / name).chmod(0o600)
-        self.assertIn("has 16 characters; to sign others it needs at least 22", self.programs.run("token", "--for", "1h", "--token-file", "short", expect=2).stderr)
-        token, = self.programs.run("token", "--for", "1h", "--token-file", "kept").stdout.splitlines()  # no gateway of it runs: there is no link
+        self.assertIn(
+            "has 16 characters; to sign others it needs at least 22",
+            self.programs.run("token", "--for", "1h", "--token-file", "short", expect=2).stderr,
+        )
+        (token,) = self.programs.run(
+            "token", "--for", "1h", "--token-file", "kept"
+        ).stdout.splitlines()  # no gateway of it runs: there is no link
         for _ in range(2):
             child, _ = self.programs.gateway()  # another one
             kept = self.programs.start("slabstream-gateway", "--token-file", "kept", "--behind-proxy", "https://viewer.example.org/render/")
