@@ -26,7 +26,7 @@ from .probe import Sample
 from .relay import Relay
 from .viewer import Viewer
 
-STILL = "{}: a still picture. Run the cell to turn it."
+STILL = "A still picture of {}. Run the cell to turn it."
 _STILL_SECONDS = 10.0  # that a cell waits for its still picture
 _CAMERA_FIELDS = [field.name for field in dataclasses.fields(Camera)]
 
