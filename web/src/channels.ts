@@ -74,8 +74,8 @@ function looksOf(state: State, shown: readonly Channel[]): Record<string, string
   const each = LOOKS.map(look => [NAMES[look], shown.flatMap(channel => { const own = lookOf(state, channel, look); return own === null ? [] : [`${channel.key}=${own}`]; }).join(",")] as const);
   return Object.fromEntries([...each.filter(([, text]) => text !== ""), ...(state.blend === "auto" ? [] : [[NAMES.blend, state.blend] as const])]);
 }
-// Channels of which a state says something.
-const told = (state: State): Channel[] => [...new Set(LOOKS.flatMap(look => Object.keys(state[look])))].filter(key => key !== OVERLAY.key).map(key => ({ key, name: key, color: "", window: null, shown: true }));
+// Channels of which a state says something; in order, so that the same is asked once they are known.
+const told = (state: State): Channel[] => [...new Set(LOOKS.flatMap(look => Object.keys(state[look])))].filter(key => key !== OVERLAY.key).sort().map(key => ({ key, name: key, color: "", window: null, shown: true }));
 
 // `own`: options of the transfer function and the like. They count if they say something, and then the only channel has no other look.
 // `several`: the renderer shows more than one.

@@ -54,11 +54,12 @@ export interface Host {
   panel: boolean; // whether the settings show at first, where there is room for them
   theme(): Theme; // asked for when the viewer begins, and once its place is in the document
   keepTheme?(theme: Theme): void;
-  changed?(): void; // the state
+  changed?(): void; // the state; first when the viewer is there
   link?(withToken: boolean): string; // to what shows; without this no link can be copied
   picked?(value: Value): void; // at a click in the 3-D picture
   error?(message: string): void; // one line, which the viewer shows, too
-  refused?(): void; // the gateway does not take the token
+  refused?(why: string): void; // the gateway does not take the token
+  reached?(isOpen: boolean): void; // a stream of pictures has opened, or is lost
 }
 
 class Assembly {
@@ -113,7 +114,7 @@ class Assembly {
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
       drawn: ({ frame: { header, view } }) => { notices.onFrame(header.statistics.missing); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); host.error?.(message); },
-      connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
+      connection: (state, reason) => { notices.onConnection(state, reason); if (state !== "connecting") host.reached?.(state === "open"); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
     this.slices = new Slices(context, this.shell.panes, this.measuring, ranges, at => this.pointed.atPoint(at));
@@ -130,7 +131,6 @@ class Assembly {
     this.takesFiles(editor);
     this.shell.setPanel(host.panel && element.clientWidth > NARROW_PIXELS);
     this.show();
-    host.changed?.();
     if (isPage) this.viewer.pane.canvas.focus({ preventScroll: true });
     ended.addEventListener("abort", () => this.end());
   }
@@ -254,8 +254,9 @@ class Assembly {
   private async checkToken(): Promise<void> {
     const answer = await this.api.connection.request("datasets", {}, {}).catch(() => null);
     if (answer?.status !== 401) return;
-    if (this.host.refused) this.host.refused();
-    else this.say("The gateway does not take the token.", "error");
+    const { error = "" } = (await answer.json().catch(() => ({}))) as { error?: string };
+    if (this.host.refused) this.host.refused(error);
+    else this.say(`The gateway refuses the token: ${error}.`, "error");
   }
 
   // ---- what can be done
@@ -388,6 +389,7 @@ export function mountViewer(root: HTMLElement | ShadowRoot, connection: Connecti
     if (end.signal.aborted) return;
     put(element, "data-theme", host.theme());
     assembly = new Assembly(element, api, offers, fields, host);
+    host.changed?.();
   }).catch((error: unknown) => {
     if (end.signal.aborted) return;
     const message = `The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`;

@@ -5,9 +5,9 @@ import { defineElement } from "./element";
 import { atMostEach, gatewayAt, STATE_MS, styledRoot, themeAround } from "./embedding";
 import { KernelConnection, type Model } from "./kernel_connection";
 import type { Fields } from "./link";
-import { type MountedViewer, mountViewer } from "./mount";
+import { mountViewer } from "./mount";
 
-const REACH_MS = 1500;
+const REACH_MS = 1500, LOST_MS = 4000;
 
 const isThisMachine = (host: string): boolean => /^(localhost|127\..*|\[::1\])$/.test(host);
 const same = (a: Fields, b: Fields): boolean => JSON.stringify(Object.entries(a).sort()) === JSON.stringify(Object.entries(b).sort());
@@ -29,45 +29,59 @@ async function reached(address: string): Promise<Connection | null> {
 // Traits: _address, _state, _height, _panel, and `channel`, which says how the gateway is reached. JupyterLab hears keys before any element, so an
 // attribute tells it which are not its own.
 function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
-  const place = el.appendChild(h("div", { "data-lm-suppress-shortcuts": "true" })), root = styledRoot(place);
-  let viewer: MountedViewer | null = null, kernel: KernelConnection | null = null, left: Fields | null = null, starts = 0;
-  const wanted = (): Fields => (model.get("_state") ?? {}) as Fields;
-  const written = atMostEach(STATE_MS, () => {
-    if (!viewer || same(viewer.state, wanted())) return;
-    model.set("_state", viewer.state);
-    model.save_changes();
-  });
-  const stop = (): void => {
-    starts++;
-    written.cancel();
-    left = viewer?.state ?? left;
-    viewer?.dispose();
-    kernel?.end();
-    viewer = kernel = null;
-  };
-  const start = async (): Promise<void> => {
-    stop();
-    const turn = starts, gateway = await reached(String(model.get("_address") ?? ""));
-    if (turn !== starts) return;
+  const place = el.appendChild(h("div", { "data-lm-suppress-shortcuts": "true" })), kernel = new KernelConnection(model);
+  let gateway: Connection | null = null, tries = 0, lost = 0;
+  let known: Fields | null = null; // the state that the kernel knows, in the viewer's spelling; null: there is no viewer yet
+  const said = (): Fields => (model.get("_state") ?? {}) as Fields;
+
+  // The gateway where its address answers, else the kernel. Streams that are open stay.
+  const choose = async (address: unknown): Promise<void> => {
+    const turn = ++tries, found = await reached(String(address ?? ""));
+    if (turn !== tries) return;
+    gateway = found;
     model.set("channel", gateway ? "gateway" : "kernel");
     model.save_changes();
-    viewer = mountViewer(root, gateway ?? (kernel = new KernelConnection(model)), left ?? wanted(), {
-      isPage: false, panel: model.get("_panel") === true, theme: () => themeAround(el),
-      changed: () => written.call(), picked: value => model.send({ picked: value }), error: message => model.send({ error: message }),
-    });
   };
-  const follow = (): void => {
-    if (!viewer) left = null;
-    else if (!same(viewer.state, wanted())) viewer.update(wanted());
+  let chosen = choose(model.get("_address"));
+  const connection: Connection = {
+    request: async (path, query, init) => { await chosen; return (gateway ?? kernel).request(path, query, init); },
+    open: () => (gateway ?? kernel).open(),
   };
-  const resize = (): void => { place.style.height = String(model.get("_height") || ""); };
-  const listeners = { "change:_address": (): void => void start(), "change:_state": follow, "change:_height": resize };
+
+  const written = atMostEach(STATE_MS, () => {
+    const { state } = viewer;
+    if (!known || same(state, known)) return;
+    known = state;
+    model.set("_state", state);
+    model.save_changes();
+  });
+  const viewer = mountViewer(styledRoot(place), connection, said(), {
+    isPage: false, panel: model.get("_panel") === true, theme: () => themeAround(el),
+    changed: () => { known ??= viewer.state; written.call(); }, picked: value => model.send({ picked: value }), error: message => model.send({ error: message }),
+    reached: isOpen => {
+      if (!isOpen) { lost ||= setTimeout(() => { chosen = choose(""); }, LOST_MS); return; }
+      clearTimeout(lost);
+      lost = 0;
+    },
+  });
+  const listeners = {
+    "change:_address": () => { chosen = choose(model.get("_address")); },
+    "change:_state": () => {
+      if (same(viewer.state, said())) return;
+      viewer.update(said());
+      if (known) known = viewer.state;
+    },
+    "change:_height": () => { place.style.height = String(model.get("_height") || ""); },
+  };
   for (const [event, listener] of Object.entries(listeners)) model.on(event, listener);
-  resize();
-  void start();
+  listeners["change:_height"]();
   return () => {
     for (const [event, listener] of Object.entries(listeners)) model.off(event, listener);
-    stop();
+    tries++;
+    clearTimeout(lost);
+    written.cancel();
+    viewer.dispose();
+    kernel.end();
     place.remove();
   };
 }
