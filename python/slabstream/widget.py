@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import functools
 import html
+import importlib
 import uuid
 from typing import Any, Callable, Mapping, Sequence
 
@@ -26,7 +27,7 @@ from .probe import Sample
 from .relay import Relay
 from .viewer import Viewer
 
-STILL = "{}: a still picture. Run the cell to turn it."
+STILL = "A still picture of {}. Run the cell to turn it."
 _STILL_SECONDS = 10.0  # that a cell waits for its still picture
 _CAMERA_FIELDS = [field.name for field in dataclasses.fields(Camera)]
 
@@ -41,7 +42,8 @@ def _sample_of(picked: Mapping[str, Any]) -> Sample | None:
     if not picked.get("hit") or not picked.get("voxel"):
         return None
     label = picked.get("label") or {}
-    return Sample(at=tuple(picked["at"]), index=tuple(picked["voxel"][::-1]), value=picked.get("value"), label=label.get("value"),
+    (x, y, z), (column, row, layer) = picked["at"], picked["voxel"]
+    return Sample(at=(x, y, z), index=(layer, row, column), value=picked.get("value"), label=label.get("value"),
                   label_name=label.get("name", ""), fields=tuple((each["name"], each["value"]) for each in picked.get("fields", ())),
                   depth=picked.get("depth"))
 
@@ -73,7 +75,7 @@ class Widget(anywidget.AnyWidget):
     def __init__(self, viewer: Viewer, height: int | str = 512, panel: bool = False):
         self._viewer = viewer
         self._picked, self._failed = CallbackDispatcher(), CallbackDispatcher()
-        self._relay = Relay(viewer.gateway, lambda message, buffers: self.send(message, list(buffers)), self._find_address)
+        self._relay = Relay(viewer.gateway, self._say, self._find_address)
         self._still = dict(viewer.first), self._begin_still(viewer.first)  # it is drawn while the gateway starts
         super().__init__(_anywidget_id=f"slabstream.{uuid.uuid4()}",  # whose style is the widget's own
                          _esm=_module_of(viewer.gateway()), _address=viewer.address, _state=dict(viewer.first), _panel=panel,
@@ -144,6 +146,9 @@ class Widget(anywidget.AnyWidget):
         else:
             self._relay.hear(message, buffers)
 
+    def _say(self, message: dict[str, Any], buffers: Sequence[bytes]) -> None:
+        self.send(message, list(buffers))
+
     def _find_address(self) -> None:
         self._address = self._viewer.address
 
@@ -161,7 +166,7 @@ class Widget(anywidget.AnyWidget):
 
     def _repr_mimebundle_(self, **kwargs: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         """The view, and beside it a picture for documents."""
-        data, more = super()._repr_mimebundle_(**kwargs) or ({}, {})
+        data, more = super()._repr_mimebundle_(**kwargs)
         with contextlib.suppress(SlabstreamError):
             data = {**data, "image/png": self._png()}
         return data, more
@@ -169,8 +174,8 @@ class Widget(anywidget.AnyWidget):
     def _ipython_display_(self, **kwargs: Any) -> None:
         """The view, and then a picture as an output of its own: JupyterLab shows nothing else of an output whose widget is gone. Pages that are
         alive hide it."""
-        from IPython.display import display
-        data, more = super()._repr_mimebundle_(**kwargs) or ({}, {})
+        display: Any = importlib.import_module("IPython.display").display
+        data, more = super()._repr_mimebundle_(**kwargs)
         display(data, metadata=more, raw=True)
         try:
             png = self._png()

@@ -28,6 +28,7 @@ z, y, x = np.mgrid[-1:1:96j, -1:1:96j, -1:1:96j]
 array = np.uint8(255 * np.clip(1 - np.sqrt(x**2 + 2 * y**2 + 3 * z**2) + 0.6 * np.exp(-20 * ((x - 0.5) ** 2 + y**2 + z**2)), 0, 1))
 volume = ss.load(array)"""
 VIEW = "widget = volume.view(azimuth=30, elevation=20, height=600)\nwidget.layout.width = '560px'\nwidget"
+BUSY = "import time\ntime.sleep(600)"
 # As where a browser does not reach the kernel's machine.
 KERNEL_ALONE = {"BINDER_SERVICE_HOST": "far.test"}
 
@@ -60,10 +61,10 @@ class Browsed(unittest.TestCase):
 
     def notebook(self, *cells: str, **environment: str) -> JupyterTab:
         """In JupyterLab, with these cells run."""
-        servers.notebook(self.folder / "a.ipynb", *cells)
+        servers.notebook(self.folder / "a.ipynb", *cells, BUSY)
         self.lab = self.serve(servers.lab, **environment)
         tab = self.tab(JupyterTab, self.lab, "lab/tree/a.ipynb")
-        self.run_all(tab, len(cells))
+        self.run_all(tab, len(cells), "JupyterLab, over the kernel")
         return tab
 
     def run_all(self, tab: JupyterTab, count: int, what: str = "") -> None:
@@ -116,6 +117,18 @@ class Kernel(Browsed):
         self.assertGreater(np.abs(self.check_picture(tab).astype(int) - moved).mean(), 1)
         tab.save(SCREENSHOTS, "lab")
         note(f"over the kernel: {tab.pictures_a_second(5):.1f} pictures a second of {'x'.join(map(str, tab.pixels().shape[1::-1]))} while turning")
+
+    def test_it_turns_while_a_cell_runs(self) -> None:
+        """By the kernel's subshells."""
+        tab = self.notebook(LOAD, VIEW, **KERNEL_ALONE)
+        tab.run_cell(2)
+        tab.until(f"{tab.SESSION}.session.kernel.status === 'busy'")
+        before, count = tab.pixels(), tab.js("drawn.length")
+        tab.drag(120, 40)
+        tab.until(f"drawn.length > {count}")
+        tab.final()
+        self.assertGreater(np.abs(tab.pixels().astype(int) - before).mean(), 1)
+        self.assertIsNone(tab.js(f"{tab.PANEL}.content.widgets[2].model.executionCount"))
 
     def test_a_restarted_kernel_shows_it_again(self) -> None:
         tab = self.notebook(LOAD, VIEW, **KERNEL_ALONE)
@@ -207,13 +220,15 @@ class Others(Browsed):
         for environment, channel in (({}, "gateway"), (KERNEL_ALONE, "kernel")):
             server = self.serve(servers.marimo, "a.py", **environment)
             tab = self.tab(Tab, f"{server.url}/?access_token={server.token}")
-            tab.until("document.querySelector('#run-button, [data-testid=run-button]') !== null")
-            tab.driver.execute_script("[...document.querySelectorAll('#run-button, [data-testid=run-button]')][0].click()")
+            button = "[...document.querySelectorAll('[data-testid=run-button]')].filter(b => !b.className.includes('inactive')).pop()"
+            tab.until(f"!!{button}")  # of the last cell; those that it needs run, too
+            tab.js(f"({button}.click(), 1)")
             tab.until("drawn.length > 0")
             tab.final()
-            before = tab.pixels()
+            before, count = tab.pixels(), tab.js("drawn.length")
             tab.drag(120, 40)
-            tab.until("drawn[drawn.length - 1].final && performance.now() - drawn[drawn.length - 1].at > 400")
+            tab.until(f"drawn.length > {count}")
+            tab.final()
             self.assertGreater(np.abs(tab.pixels().astype(int) - before).mean(), 1)
             tab.save(SCREENSHOTS, f"marimo-{channel}")
             note(f"marimo, {channel}: {tab.pictures_a_second(5):.1f} pictures a second of {'x'.join(map(str, tab.pixels().shape[1::-1]))} while turning")

@@ -67,8 +67,11 @@ class Page(comm.base_comm.BaseComm):
         return message, found
 
     def stream(self, number: int) -> None:
-        self.say({"open": number})
-        self.hear(lambda message: message.get("opened") == number)
+        """As a page does, it opens it again if it was closed."""
+        message: dict = {}
+        while "opened" not in message:
+            self.say({"open": number})
+            message, _ = self.hear(lambda message: number in (message.get("opened"), message.get("closed")))
 
     def view(self, number: int, seq: int, **options) -> None:
         self.say({"send": number, "text": json.dumps({"type": "view", "seq": seq, "picture": "render", "timeline": False, "options": options})})
