@@ -196,15 +196,14 @@ class Connection:
         """Unavailable: in a forked child."""
         self._loop.check_process()
 
-    def submit(self, frame: Any, deadline_seconds: float, observer: Observer) -> int:
-        """The request's number."""
-        requests = self._loop.requests
-        number = next(requests.numbers)
-        self._loop.call(lambda: requests.submit(number, frame, deadline_seconds, observer, time.monotonic()))
-        return number
+    def number(self) -> int:
+        """Of a request that is made next."""
+        return next(self._loop.requests.numbers)
+
+    def submit(self, number: int, frame: Any, deadline_seconds: float, observer: Observer) -> None:
+        self._loop.call(lambda: self._loop.requests.submit(number, frame, deadline_seconds, observer, time.monotonic()))
 
     def cancel(self, number: int) -> None:
-        """`number`: of submit()."""
         self._loop.call(lambda: self._loop.requests.cancel(number))
 
     async def upload(self, order: Any, parts: Iterator[memoryview]) -> Any:
@@ -243,11 +242,11 @@ class Connection:
         """A question or an order: its number, and its answer. After the block nobody waits for it: the time was over, or whoever waited was
         interrupted."""
         answer: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        requests = self._loop.requests
-        nonce = next(requests.numbers)
-        self._loop.call(lambda: requests.ask(nonce, kind, message, answer, time.monotonic(), credited))
+        requests, nonce = self._loop.requests, self.number()
         try:
+            self._loop.call(lambda: requests.ask(nonce, kind, message, answer, time.monotonic(), credited))
             yield nonce, answer
         finally:
             if not answer.done():
-                self._loop.call(lambda: requests.forget(nonce))
+                with contextlib.suppress(Unavailable):  # closed
+                    self._loop.call(lambda: requests.forget(nonce))

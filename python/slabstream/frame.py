@@ -86,11 +86,18 @@ class Frame:
     `async for image in frame` has what previews() has. If whoever waits is interrupted, by Ctrl-C or as a task that is cancelled, so is the
     frame."""
 
-    def __init__(self, connection: Connection, draft: Draft, deadline: float, on_progress: Callable[[Progress], None] | None,
-                 on_preview: Callable[[Image], None] | None):
-        self._connection = connection
+    def __init__(self, connection: Connection, draft: Draft, deadline: float, on_progress: Callable[[Progress], None] | None = None,
+                 on_preview: Callable[[Image], None] | None = None):
+        self._connection, self._deadline = connection, deadline
         self._waiting = _Waiting(draft, on_progress, on_preview)
-        self._number = connection.submit(draft.frame, deadline, self._waiting)
+        self._number = connection.number()
+        self._sent = False
+
+    def _send(self) -> None:
+        """Asks for it, unless that is done. Until then there is nothing that an interrupt may leave behind at the service."""
+        if not self._sent:
+            self._sent = True
+            self._connection.submit(self._number, self._waiting.draft.frame, self._deadline, self._waiting)
 
     def result(self, timeout: float | None = None) -> Image:
         """The picture. Raises why there is none; DeadlineExceeded, which is a TimeoutError, if it is not there after `timeout` seconds."""
@@ -108,6 +115,7 @@ class Frame:
 
     async def _until_done(self, front: Front, timeout: float | None = None) -> None:
         with self._cancelled_if_interrupted():
+            self._send()
             done = await front.wait(self._waiting.end, timeout)
         if not done:
             raise DeadlineExceeded(f"the frame is not finished after {timeout:g} s")

@@ -87,7 +87,7 @@ class AsyncService:
 
         Raises InvalidArgument, NotFound, Unavailable, ResourceExhausted or DeadlineExceeded with the service's sentence.
         """
-        return await picture_of(await self.submit(dataset, deadline=deadline, **options), self._connection.front)
+        return await picture_of(await self._frame(dataset, deadline, options), self._connection.front)
 
     @takes_options_of("render")
     async def submit(self, /, dataset: str, *, deadline: float = DEADLINE_SECONDS, previews: bool = False,
@@ -99,6 +99,13 @@ class AsyncService:
         boxes, nearest first (see `groups`). Callbacks run on the connection's thread: they must be quick and not wait for anything of the
         service. `deadline` is in seconds, up to a day.
         """
+        frame = await self._frame(dataset, deadline, options, previews, on_progress, on_preview)
+        frame._send()
+        return frame
+
+    async def _frame(self, dataset: str, deadline: float, options: dict[str, Any], previews: bool = False,
+                     on_progress: Callable[[Progress], None] | None = None, on_preview: Callable[[Image], None] | None = None) -> Frame:
+        """One that is not sent yet."""
         draft = draft_of(dataset, options)
         await self._settle([draft])
         draft.frame.previews = previews or on_preview is not None
@@ -327,7 +334,8 @@ class AsyncService:
         open_frames: collections.deque[Frame] = collections.deque()
         try:
             for draft in await drafts():
-                open_frames.append(Frame(self._connection, draft, deadline, None, None))
+                open_frames.append(Frame(self._connection, draft, deadline))
+                open_frames[-1]._send()
                 if len(open_frames) == in_flight:
                     image = await picture_of(open_frames[0], self._connection.front)
                     open_frames.popleft()

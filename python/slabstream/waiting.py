@@ -4,9 +4,11 @@ without an event loop; ASYNCIO has a task wait, so that its loop goes on.
 from __future__ import annotations
 
 import concurrent.futures
+import threading
 from typing import Any, AsyncGenerator, Awaitable, Callable, Iterator, Protocol, TypeVar
 
 Result = TypeVar("Result")
+_WAKE_SECONDS = 0.25  # a kernel of Jupyter notices that it is interrupted when its event loop wakes
 
 
 class Front(Protocol):
@@ -21,7 +23,12 @@ class _Blocking:
     """Its coroutines never suspend, so run() and each() can run them wherever they are called, beside any event loop."""
 
     async def wait(self, future: concurrent.futures.Future[Any], timeout: float | None = None) -> bool:
-        return bool(concurrent.futures.wait([future], timeout).done)
+        # Not concurrent.futures.wait(): a KeyboardInterrupt in it may leave the future locked, which the connection's thread then waits for.
+        done = threading.Lock()
+        done.acquire()
+        future.add_done_callback(lambda _: done.release())
+        done.acquire(timeout=-1 if timeout is None else max(timeout, 0))
+        return future.done()
 
     async def do(self, function: Callable[..., Result], *arguments: Any) -> Result:
         return function(*arguments)
@@ -41,7 +48,9 @@ class _Asyncio:
                 pass  # the loop was closed, so nobody waits
 
         future.add_done_callback(tell)
-        await asyncio.wait([done], timeout=timeout)
+        due = None if timeout is None else loop.time() + timeout
+        while not future.done() and (due is None or loop.time() < due):
+            await asyncio.wait([done], timeout=_WAKE_SECONDS if due is None else min(_WAKE_SECONDS, due - loop.time()))
         return future.done()
 
     async def do(self, function: Callable[..., Result], *arguments: Any) -> Result:

@@ -43,12 +43,13 @@ class Async(WithAService, unittest.IsolatedAsyncioTestCase):
         self.addAsyncCleanup(self.service.close)
 
     def test_both_services_have_the_same_methods(self) -> None:
-        public = [{name: value for name, value in vars(kind).items() if name[0] != "_" and callable(value)} for kind in (ss.Service, ss.AsyncService)]
-        self.assertEqual(public[0].keys() - {"show"}, public[1].keys(), "show() asks nothing of the service")
-        self.assertGreater(len(public[1]), 15)
-        for name, method in public[1].items():
+        blocking, ours = ({name: value for name, value in vars(kind).items() if name[0] != "_" and callable(value)}
+                          for kind in (ss.Service, ss.AsyncService))
+        self.assertEqual(blocking.keys() - {"show"}, ours.keys(), "show() asks nothing of the service")
+        self.assertGreater(len(ours), 15)
+        for name, method in ours.items():
             self.assertEqual(inspect.iscoroutinefunction(method), name != "turntable", name)
-            self.assertEqual(inspect.signature(method), inspect.signature(public[0][name]))
+            self.assertEqual(inspect.signature(method), inspect.signature(blocking[name]))
 
     async def test_answers_are_those_of_the_blocking_client(self) -> None:
         service = self.service
@@ -56,7 +57,8 @@ class Async(WithAService, unittest.IsolatedAsyncioTestCase):
             np.testing.assert_array_equal((await service.render("head", size=40)).rgba, blocking.render("head", size=40).rgba)
             np.testing.assert_array_equal(np.asarray(await service.slice("head", plane="zyx", size=20)),
                                           np.asarray(blocking.slice("head", plane="zyx", size=20)))
-            for ours, theirs in zip([image async for image in service.turntable("head", 3, size=20)], blocking.turntable("head", 3, size=20)):
+            turned = [image async for image in service.turntable("head", 3, size=20)]
+            for ours, theirs in zip(turned, blocking.turntable("head", 3, size=20)):
                 np.testing.assert_array_equal(ours.rgba, theirs.rgba)
             self.assertEqual((await service.histogram("head")).percentiles, blocking.histogram("head").percentiles)
             self.assertEqual((await service.joint_histogram("head")).counts.sum(), blocking.joint_histogram("head").counts.sum())
@@ -191,11 +193,12 @@ class Async(WithAService, unittest.IsolatedAsyncioTestCase):
         self.assertNotIn("slabstream", [thread.name for thread in threading.enumerate()][threads:])
 
     async def test_loops_of_other_threads_share_a_service(self) -> None:
-        async def sides(first: int) -> list[int]:
+        async def sizes(first: int) -> list[int]:
             return [image.size[0] for image in await asyncio.gather(*(self.service.render("head", size=first + i) for i in range(5)))]
 
         with concurrent.futures.ThreadPoolExecutor(4) as pool:
-            found = await asyncio.gather(*(asyncio.get_running_loop().run_in_executor(pool, lambda i=i: asyncio.run(sides(10 * i))) for i in range(1, 5)))
+            loops = [pool.submit(lambda first: asyncio.run(sizes(first)), 10 * i) for i in range(1, 5)]
+            found = [await asyncio.wrap_future(loop) for loop in loops]
         self.assertEqual(found, [list(range(10 * i, 10 * i + 5)) for i in range(1, 5)])
 
 

@@ -18,10 +18,11 @@ import urllib.request
 
 import numpy as np
 
-from client_support import PROGRAMS, ROOT, InAFolder, WithAService, read_png, write_cells
+from client_support import HEAVY, PROGRAMS, ROOT, START_SECONDS, InAFolder, WithAService, read_png, write_cells
 
 try:
     import ipykernel  # noqa: F401
+    import jupyter_client
     import matplotlib  # noqa: F401
     import nbconvert  # noqa: F401
 except ImportError as missing:
@@ -60,6 +61,38 @@ class Notebook(InAFolder):
         self.assertIn("text/html", kinds)  # the viewer
         source = json.loads((ROOT / "docs" / "notebook.ipynb").read_text())
         self.assertEqual([cell["outputs"] for cell in source["cells"] if cell["cell_type"] == "code" and cell["outputs"]], [], "without outputs")
+
+
+class Interrupted(WithAService):
+    def test_an_interrupted_kernel_cancels_its_frame_and_goes_on(self) -> None:
+        manager, kernel = jupyter_client.manager.start_new_kernel(env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}, kernel_name="python3")
+        self.addCleanup(manager.shutdown_kernel, now=True)
+        self.addCleanup(kernel.stop_channels)
+
+        def run(code: str) -> dict:
+            return kernel.execute_interactive(code, timeout=START_SECONDS, stop_on_error=False, output_hook=lambda _: None)["content"]
+
+        where = f"endpoint={self.running.endpoint!r}"
+        self.assertEqual(run(f"import slabstream as ss\nservice = ss.connect({where})\nother = await ss.connect_async({where})")["status"], "ok")
+        with ss.connect(endpoint=self.running.endpoint) as service:
+            def until(busy: bool) -> ss.Status:
+                limit = time.monotonic() + START_SECONDS
+                while True:
+                    status = service.status()
+                    if bool(status.running + status.queued) == busy:
+                        return status
+                    self.assertLess(time.monotonic(), limit)
+
+            for render in ("service.render", "await other.render"):
+                with self.subTest(render=render):
+                    done = until(busy=False).frames_done
+                    kernel.execute(f"{render}('head', **{HEAVY})", stop_on_error=False)
+                    until(busy=True)
+                    manager.interrupt_kernel()
+                    answer = kernel.get_shell_msg(timeout=START_SECONDS)["content"]
+                    self.assertIn(answer.get("ename"), ("KeyboardInterrupt", "CancelledError"))
+                    self.assertEqual(until(busy=False).frames_done, done, "given up, not finished")
+                    self.assertEqual(run(f"assert ({render}('head', size=9)).size == (9, 9)")["status"], "ok")
 
 
 class Shows(WithAService):

@@ -8,12 +8,14 @@ import subprocess
 import sys
 import time
 import unittest
+import unittest.mock
 
 from client_support import HEAVY, START_SECONDS, InAFolder, WithAService
 
 import slabstream as ss  # noqa: E402
+from slabstream import waiting  # noqa: E402
 
-ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONWARNINGS": "ignore::DeprecationWarning"}  # of threads beside fork()
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONWARNINGS": "ignore::DeprecationWarning"}  # of fork() with threads
 
 
 class Processes(WithAService):
@@ -46,12 +48,12 @@ class Processes(WithAService):
             print(service.render("head", size=9).size, flush=True)
             sys.stdin.readline()
         """
-        for wait in ("service.render('head', **heavy)", "service.submit('head', **heavy).result()", "list(service.turntable('head', 3, **heavy))",
-                     "list(service.submit('head', previews=True, **heavy).previews())", "asyncio.run(with_asyncio())"):
+        for wait in ("service.render('head', **heavy)", "list(service.turntable('head', 3, **heavy))", "asyncio.run(with_asyncio())"):
             with self.subTest(wait=wait):
                 done = self.until(busy=False).frames_done
-                child = subprocess.Popen([sys.executable, "-c", inspect.cleandoc(script.format(heavy=HEAVY, wait=wait)), self.running.endpoint],
-                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
+                code = inspect.cleandoc(script.format(heavy=HEAVY, wait=wait))
+                child = subprocess.Popen([sys.executable, "-c", code, self.running.endpoint], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                         text=True, env=ENVIRONMENT)
                 with child:
                     self.until(busy=True)
                     child.send_signal(signal.SIGINT)
@@ -60,6 +62,14 @@ class Processes(WithAService):
                     child.stdin.write("\n")
                     child.stdin.flush()
                     self.assertEqual(child.stdout.readline(), "(9, 9)\n")
+
+    def test_an_interrupt_cancels_a_frame_that_was_submitted_before(self) -> None:
+        for wait in (ss.Frame.result, ss.Frame.exception, lambda frame: next(frame.previews())):
+            frame = self.service.submit("head", **HEAVY)
+            interrupted = unittest.mock.patch.object(type(waiting.BLOCKING), "wait", side_effect=KeyboardInterrupt)
+            with interrupted, self.assertRaises(KeyboardInterrupt):
+                wait(frame)
+            self.assertIsInstance(frame.exception(), ss.Cancelled)
 
     def test_a_forked_process_is_refused(self) -> None:
         script = """
@@ -88,8 +98,9 @@ class Processes(WithAService):
             frame.cancel()
             print(service.render("head", size=8).size)
         """
-        run = subprocess.run([sys.executable, "-c", inspect.cleandoc(script.format(heavy=HEAVY)), self.running.endpoint], capture_output=True,
-                             text=True, env=ENVIRONMENT, timeout=2 * START_SECONDS)
+        code = inspect.cleandoc(script.format(heavy=HEAVY))
+        run = subprocess.run([sys.executable, "-c", code, self.running.endpoint], capture_output=True, text=True, env=ENVIRONMENT,
+                             timeout=2 * START_SECONDS)
         self.assertEqual(run.stderr, "")
         *refusals, own, ended, theirs = run.stdout.splitlines()
         status, child, parent = ended.split()
@@ -116,7 +127,8 @@ class Spawned(InAFolder):
                 print(sizes, services.count(own[1]))
         """))
         for method in ("spawn", "forkserver"):
-            run = subprocess.run([sys.executable, str(program), method], capture_output=True, text=True, env=ENVIRONMENT, timeout=3 * START_SECONDS)
+            run = subprocess.run([sys.executable, str(program), method], capture_output=True, text=True, env=ENVIRONMENT,
+                                 timeout=3 * START_SECONDS)
             self.assertEqual((run.stderr, run.stdout), ("", f"{tuple((size, size) for size in range(5, 10))} 1\n"), method)
 
 

@@ -53,7 +53,7 @@ class Documents(InAFolder):
         self.write_scan()
         code = "\n".join(blocks_of("python.md"))
         printed = "tcp://127.0.0.1:7420"
-        self.assertEqual(code.count(printed), 4)
+        self.assertEqual(code.count(printed), 5)
         names: dict = {}
         said = io.StringIO()
         with working_in(self.folder), contextlib.redirect_stdout(said):
@@ -62,7 +62,7 @@ class Documents(InAFolder):
         self.assertEqual(len(list(self.folder.glob("turn_*.png"))), 12)
         self.assertEqual(names["there"].value, volume_arrays()[0][names["there"].index])
         self.assertIsNotNone(names["seen"])
-        for name in ("image", "front", "above", "planes", "surface", "preview"):
+        for name in ("image", "front", "above", "planes", "surface", "preview", "left", "right"):
             self.assertGreater(np.asarray(names[name])[..., :3].max(), 50, name)
             if KEEP:
                 names[name].save(f"{KEEP}/{name}.png")
