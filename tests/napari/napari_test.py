@@ -325,6 +325,13 @@ class Data(OfNapari):
             self.assertEqual(plugin_layers.address_of(layer), f"{folder}/array.zarr")
             self.open()
             self.same("opened")
+            self.viewer.layers.clear()
+            array = zarr.create_array(f"{folder}/one", data=blobs(), chunks=(20, 20, 20))
+            layer = self.viewer.add_image(array, rendering="mip", contrast_limits=(20, 190))
+            self.assertEqual(plugin_layers.address_of(layer), f"{folder}/one")
+            self.same("array")
+            source = list(self.widget._pictures._sources.values())[-1][1]
+            self.assertEqual(source.options, {"channels": [0]})  # by its address
 
 if __name__ == "__main__":
     unittest.main()

@@ -3,7 +3,10 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import functools
+import http.server
 import inspect
+import json
 import os
 import pathlib
 import shutil
@@ -12,6 +15,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 import unittest.mock
@@ -567,6 +571,24 @@ class OwnService(InAFolder):
         (self.folder / "a.raw").write_bytes(values.tobytes())
         found = ss.render(f"{self.folder}/a.raw?dims=28,24,20,type=uint8", spacing=(2, 1.5, 1.25), size=30)
         np.testing.assert_array_equal(np.asarray(found), np.asarray(ss.render(values, spacing=(2, 1.5, 1.25), size=30)))
+
+    def test_the_service_reads_addresses(self) -> None:
+        values = volume_arrays()[0]
+        store = self.folder / "far.zarr"
+        store.mkdir()
+        (store / ".zarray").write_text(json.dumps({
+            "zarr_format": 2, "shape": values.shape, "chunks": values.shape, "dtype": "|u1", "compressor": None, "fill_value": 0, "order": "C",
+            "filters": None}))
+        (store / "0.0.0").write_bytes(values.tobytes())
+        handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(self.folder))
+        with unittest.mock.patch.object(http.server.SimpleHTTPRequestHandler, "log_message"), \
+                http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            try:
+                found = ss.render(f"http://127.0.0.1:{server.server_port}/far.zarr", size=30)
+            finally:
+                server.shutdown()
+        np.testing.assert_array_equal(np.asarray(found), np.asarray(ss.render(values, size=30)))
 
     def test_a_wrong_option_is_told_before_anything_is_started(self) -> None:
         ss.shutdown()

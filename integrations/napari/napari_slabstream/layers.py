@@ -106,12 +106,12 @@ def _picked(array: Any, index: tuple[int | None, ...]) -> Any:
 
 def address_of(layer: Any) -> str | None:
     """Where a service can read the layer's data itself: what layer.metadata["slabstream"] says, else the store that it was opened from."""
-    stated = layer.metadata.get("slabstream")
-    path = str(stated or layer.source.path or "").rstrip("/")
+    stated, opened = layer.metadata.get("slabstream"), str(layer.source.path or "").rstrip("/")
+    path = str(stated or (opened if opened.endswith(_ADDRESSES) else ""))
     if not path and not layer.multiscale and type(layer.data).__module__.startswith("zarr"):
-        root = str(getattr(layer.data.store, "root", "") or getattr(layer.data.store, "path", ""))
+        root = getattr(layer.data.store, "root", None) or getattr(layer.data.store, "path", None)  # of a folder, in zarr 3 and 2
         path = f"{root}/{layer.data.path}".rstrip("/") if root else ""
-    if not stated and not path.partition("?")[0].endswith(_ADDRESSES):
+    if not path:
         return None
     return path if "://" in path or os.path.exists(path.partition("?")[0]) else None
 

@@ -94,7 +94,7 @@ class Pictures:
         data, found = self._sources.pop(key, None) or (shown.data, self._bring(shown))
         self._sources[key] = data, found  # with the data, so that no others get their id; a layer that is not shown keeps its reason
         for old in list(self._sources)[:-_MOST_SOURCES]:
-            del self._sources[old]
+            self._sources.pop(old, None)
         if isinstance(found, NotShown):
             raise found
         return found
@@ -116,8 +116,9 @@ class Pictures:
         frames, notes = [], {}
         scale = view.ratio if sharp else _COARSE
         for shown in view.layers:
-            if self._newer(view):
-                break
+            if sharp and self._newer(view):
+                self._cancel(frames)
+                return
             try:
                 source = self._source(shown)
                 camera, mirrored = camera_options(view.camera, shown.place, source, scale)
@@ -129,9 +130,6 @@ class Pictures:
                 frames.append((shown, key, mirrored, frame))
             except (ss.SlabstreamError, NotShown) as error:
                 notes[shown.layer] = str(error)
-        if len(frames) + len(notes) < len(view.layers):
-            self._cancel(frames)
-            return
         below, done = np.array(view.background, np.float32), {}
         below = np.broadcast_to(below, (max(round(view.camera.height * scale), 1), max(round(view.camera.width * scale), 1), 3))
         for number, (shown, key, mirrored, frame) in enumerate(frames):
