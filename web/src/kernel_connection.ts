@@ -1,7 +1,7 @@
 // The gateway through the kernel of a notebook: a widget's custom messages, which the kernel relays to the gateway beside it.
 //   {ask: id, method, path} [body]   -> {answer: id, status, type} [body]       {cancel: id}
 //   {open: id}                       -> {opened: id}                            {alive: [id, ...]} each 2 s: streams of a page that is gone end
-//   {send: id, text}                    {heard: id, text}, or {heard: id} [bytes]
+//   {send: id, text, more: [text]}      {heard: id, text}, or {heard: id} [bytes]
 //   {close: id}                      -> {closed: id, reason}
 import type { Connection, Stream } from "./connection";
 
@@ -19,6 +19,8 @@ interface Message { answer?: number; opened?: number; heard?: number; closed?: n
 type Listener = (message: Message, bytes: ArrayBuffer) => void;
 
 const ALIVE_MS = 2000;
+const VIEW_MS = 50, UNANSWERED_MS = 250;
+const VIEW = /^\{"type":"view"/;
 
 const bufferOf = (bytes: Bytes | undefined): ArrayBuffer =>
   bytes === undefined ? new ArrayBuffer(0) : bytes instanceof ArrayBuffer ? bytes : (bytes.buffer as ArrayBuffer).slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
@@ -28,6 +30,10 @@ class KernelStream implements Stream {
   onmessage = (_: string | ArrayBuffer): void => undefined;
   onclose = (_: string): void => undefined;
   isOpen = false;
+  private view: string | null = null; // that waits
+  private viewAt = -Infinity; // when the last one was sent
+  private answered = true; // by a picture, which was acknowledged
+  private timer = 0;
 
   constructor(private readonly tell: (message: object) => void, private readonly id: number, private readonly ended: () => void) { tell({ open: id }); }
 
@@ -36,9 +42,30 @@ class KernelStream implements Stream {
     else if (closed === undefined) this.onmessage(text ?? bytes);
     else { this.end(); this.onclose(reason ?? ""); }
   }
-  send(text: string): void { this.tell({ send: this.id, text }); }
+
+  // Each message keeps a notebook busy, and the newest view replaces those before it. So one goes with the acknowledgement of a picture, and not
+  // sooner than 50 ms after the last one; or later, if no picture comes.
+  send(text: string): void {
+    if (VIEW.test(text)) { this.view = text; return this.flush([]); }
+    this.answered = true;
+    this.flush([text]);
+  }
+
+  private flush(texts: string[]): void {
+    const rest = this.viewAt + (this.answered ? VIEW_MS : UNANSWERED_MS) - performance.now();
+    clearTimeout(this.timer);
+    if (this.view !== null && rest <= 0) {
+      texts.push(this.view);
+      this.view = null;
+      this.viewAt = performance.now();
+      this.answered = false;
+    } else if (this.view !== null) this.timer = setTimeout(() => this.flush([]), rest);
+    const [text, ...more] = texts;
+    if (text !== undefined) this.tell({ send: this.id, text, ...(more.length > 0 && { more }) });
+  }
+
   close(): void { this.tell({ close: this.id }); this.end(); }
-  private end(): void { this.isOpen = false; this.ended(); }
+  private end(): void { this.isOpen = false; clearTimeout(this.timer); this.ended(); }
 }
 
 export class KernelConnection implements Connection {

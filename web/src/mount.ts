@@ -256,7 +256,7 @@ class Assembly {
     if (answer?.status !== 401) return;
     const { error = "" } = (await answer.json().catch(() => ({}))) as { error?: string };
     if (this.host.refused) this.host.refused(error);
-    else this.say(`The gateway refuses the token: ${error}.`, "error");
+    else this.say(`The gateway says: ${error}.`, "error");
   }
 
   // ---- what can be done
