@@ -51,18 +51,17 @@ class Gateway:
         arguments = ["--endpoint", address.endpoint] + ([] if address.file is None else ["--service", str(address.file)])
         if behind_proxy:
             port = _free_port()
-            parts = urllib.parse.urlsplit(behind_proxy.replace(_PORT, str(port)))
-            arguments += ["--listen", f"127.0.0.1:{port}", "--behind-proxy", f"{parts.scheme}://{parts.netloc}"]
+            public = behind_proxy.replace(_PORT, str(port)).rstrip("/") + "/"
+            arguments += ["--listen", f"127.0.0.1:{port}", "--behind-proxy", public]
         self.program = Kept([str(program), *arguments], stderr=subprocess.DEVNULL)
         words = self.program.first_line(_START_SECONDS).split()
         if len(words) != 2 or words[0] != "ready":
             self.program.end(_END_SECONDS)
             raise Unavailable("slabstream-gateway did not start")
-        here = urllib.parse.urlsplit(words[1])
-        self.host, self.port = str(here.hostname), int(here.port or 0)
-        self.token = here.fragment.partition("=")[2]
-        self.url = f"{parts.geturl().rstrip('/')}/#{here.fragment}" if behind_proxy else words[1]  #: for browsers, with the token
-
+        said = urllib.parse.urlsplit(words[1])
+        self.host, self.port = ("127.0.0.1", port) if behind_proxy else (str(said.hostname), int(said.port or 0))
+        self.token = said.fragment.partition("=")[2]
+        self.url = f"{public}#{said.fragment}" if behind_proxy else words[1]  #: for browsers, with the token
         deadline = time.monotonic() + _READY_SECONDS
         while self._get("/readyz")[0] != 200 and time.monotonic() < deadline:
             time.sleep(_LOOK_SECONDS)  # until it has found its service
