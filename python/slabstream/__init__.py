@@ -36,13 +36,16 @@ __all__ = [
     "AsyncService", "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry",
     "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner",
     "Parameter", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
-    "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic", "Widget",
+    "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic",
     "Worker", "connect", "connect_async", "load", "open", "presets", "render", "show", "shutdown", "to_pyvista", "view",
 ]
 
 
 def __getattr__(name: str) -> type:
-    if name == "Widget":  # of packages that not everybody has
-        from .widget import Widget
+    if name == "Widget":  # not in __all__: not everybody has what it needs
+        try:
+            from .widget import Widget
+        except ImportError as missing:
+            raise ImportError(f"slabstream.Widget needs {missing.name}: pip install 'slabstream[widget]'") from None
         return Widget
     raise AttributeError(f"module 'slabstream' has no attribute '{name}'")

@@ -8,6 +8,7 @@ import pathlib
 import socket
 import subprocess
 import threading
+import time
 import urllib.parse
 
 from .address import Address
@@ -16,7 +17,9 @@ from .programs import Kept, find_program
 
 _START_SECONDS = 20.0
 _END_SECONDS = 10.0
-_ASSET_SECONDS = 10.0
+_ANSWER_SECONDS = 10.0
+_READY_SECONDS = 2.0
+_LOOK_SECONDS = 0.01
 _PORT = "{port}"
 
 
@@ -48,32 +51,38 @@ class Gateway:
         arguments = ["--endpoint", address.endpoint] + ([] if address.file is None else ["--service", str(address.file)])
         if behind_proxy:
             port = _free_port()
-            parts = urllib.parse.urlsplit(behind_proxy.replace(_PORT, str(port)))
-            arguments += ["--listen", f"127.0.0.1:{port}", "--behind-proxy", f"{parts.scheme}://{parts.netloc}"]
+            public = behind_proxy.replace(_PORT, str(port)).rstrip("/") + "/"
+            arguments += ["--listen", f"127.0.0.1:{port}", "--behind-proxy", public]
         self.program = Kept([str(program), *arguments], stderr=subprocess.DEVNULL)
         words = self.program.first_line(_START_SECONDS).split()
         if len(words) != 2 or words[0] != "ready":
             self.program.end(_END_SECONDS)
             raise Unavailable("slabstream-gateway did not start")
-        here = urllib.parse.urlsplit(words[1])
-        self.host, self.port = str(here.hostname), int(here.port or 0)
-        self.token = here.fragment.partition("=")[2]
-        self.url = f"{parts.geturl().rstrip('/')}/#{here.fragment}" if behind_proxy else words[1]  #: for browsers, with the token
+        said = urllib.parse.urlsplit(words[1])
+        self.host, self.port = ("127.0.0.1", port) if behind_proxy else (str(said.hostname), int(said.port or 0))
+        self.token = said.fragment.partition("=")[2]
+        self.url = f"{public}#{said.fragment}" if behind_proxy else words[1]  #: for browsers, with the token
+        deadline = time.monotonic() + _READY_SECONDS
+        while self._get("/readyz")[0] != 200 and time.monotonic() < deadline:
+            time.sleep(_LOOK_SECONDS)  # until it has found its service
 
     def asset(self, name: str) -> str:
         """A file of the gateway's page."""
-        connection = http.client.HTTPConnection(self.host, self.port, timeout=_ASSET_SECONDS)
+        status, content = self._get(f"/assets/{name}")
+        if status != 200:
+            raise Unavailable(f"slabstream-gateway has no assets/{name}: it is older than this package")
+        return content.decode()
+
+    def _get(self, path: str) -> tuple[int, bytes]:
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=_ANSWER_SECONDS)
         try:
-            connection.request("GET", f"/assets/{name}")
+            connection.request("GET", path)
             answer = connection.getresponse()
-            text = answer.read().decode()
+            return answer.status, answer.read()
         except (OSError, http.client.HTTPException) as error:
             raise Unavailable(f"slabstream-gateway does not answer: {error}") from None
         finally:
             connection.close()
-        if answer.status != 200:
-            raise Unavailable(f"slabstream-gateway has no assets/{name}: it is older than this package")
-        return text
 
 
 _lock = threading.Lock()

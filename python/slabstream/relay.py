@@ -199,8 +199,8 @@ class _Stream:
                     if self._reason is not None:
                         break
                 reason = opened.close_reason or ""
-        except (OSError, websockets.exceptions.WebSocketException, SlabstreamError) as error:
-            reason = str(error) or type(error).__name__
+        except Exception as error:  # no gateway, no connection, or a version of websockets that we do not know: the page shows why
+            reason = (str(error) or type(error).__name__).splitlines()[0]
         self.send(None)
         self._relay.end(self._number)
         said = reason if self._reason is None else self._reason

@@ -11,7 +11,7 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
 import browser  # noqa: E402
 
-SECONDS = 40  # far above what anything needs
+SECONDS = 90  # far above what anything needs
 
 WATCH = """
 window.drawn = [];

@@ -118,6 +118,9 @@ class Shows(WithAService):
             np.testing.assert_array_equal(read_png(answer.read()), np.asarray(self.service.render("head", size=30)))
         self.assertEqual(self.service.view("head").url.partition("&")[0], viewer.url.partition("&")[0], "one gateway for a service")
 
+        with self.assertRaisesRegex(ImportError, r"slabstream.Widget needs slabstream.widget: pip install 'slabstream\[widget\]'"):
+            ss.Widget
+
     def test_where_the_browser_cannot_reach_it_there_is_no_address(self) -> None:
         with unittest.mock.patch.dict(os.environ, {"JUPYTERHUB_SERVICE_PREFIX": "/user/a/"}):
             viewer = self.service.view("head", size=40)

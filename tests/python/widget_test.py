@@ -62,9 +62,13 @@ class Page(comm.base_comm.BaseComm):
                 return message, buffers
 
     def ask(self, number: int, path: str, method: str = "GET", *body: bytes) -> tuple[dict, bytes]:
-        self.say({"ask": number, "method": method, "path": path}, *body)
-        message, (found,) = self.hear(lambda message: message.get("answer") == number)
-        return message, found
+        """Again while the gateway does not hear its service."""
+        limit = time.monotonic() + SECONDS
+        while True:
+            self.say({"ask": number, "method": method, "path": path}, *body)
+            message, (found,) = self.hear(lambda message: message.get("answer") == number)
+            if message["status"] != 503 or time.monotonic() > limit:
+                return message, found
 
     def stream(self, number: int) -> None:
         """As a page does, it opens it again if it was closed."""
@@ -108,7 +112,7 @@ class Widgets(WithAService):
     def test_requests_are_answered(self) -> None:
         _, page = self.widget()
         message, found = page.ask(7, "datasets")
-        self.assertEqual((message["status"], message["type"]), (200, "application/json"))
+        self.assertEqual((message["status"], message["type"]), (200, "application/json"), found)
         self.assertEqual([each["name"] for each in json.loads(found)["datasets"]], ["head"])
         message, found = page.ask(2**53 - 1, "render.png", "POST", json.dumps({"dataset": "head", "size": 30, "azimuth": 30}).encode())
         np.testing.assert_array_equal(read_png(found), np.asarray(self.service.render("head", size=30, azimuth=30)))
@@ -152,7 +156,11 @@ class Widgets(WithAService):
                 message, _ = page.hear(lambda message: message.get("heard") == 1 or "closed" in message)
                 if "closed" in message:
                     break
-        self.assertEqual(message, {"closed": 1, "reason": "the page has gone"})
+            self.assertEqual(message, {"closed": 1, "reason": "the page has gone"})
+            for _ in range(4):
+                page.say({"alive": [2]})
+                message, _ = page.hear(lambda message: 2 in (message.get("heard"), message.get("closed")))
+                self.assertNotIn("closed", message)
         page.say({"close": 2})
         page.hear(lambda message: message == {"closed": 2, "reason": ""})
 
