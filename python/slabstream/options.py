@@ -50,8 +50,9 @@ def _option(entry: dict[str, Any]) -> Option:
         "windows": {window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
         **{others: tuple(map(_keyword, entry.get(others, ()))) for others in ("excludes", "needs")},
     }
-    as_they_are = [field.name for field in dataclasses.fields(Option) if field.name in entry and field.name not in given]
-    return Option(**given, **{name: tuple(entry[name]) if isinstance(entry[name], list) else entry[name] for name in as_they_are})
+    for name in (field.name for field in dataclasses.fields(Option) if field.name in entry and field.name not in given):
+        given[name] = tuple(entry[name]) if isinstance(entry[name], list) else entry[name]
+    return Option(**given)
 
 
 #: In place of --channel and of the options of single channels.

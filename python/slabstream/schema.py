@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from typing import Any, Callable, TypeVar
+from typing import Any, Callable, TypeVar, cast
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
@@ -60,7 +60,7 @@ _Made = TypeVar("_Made")
 
 def read(kind: Callable[..., _Made], message: Any, /, **given: Any) -> _Made:
     """A dataclass of this kind: fields that are not given are those of the message of the same names."""
-    names = [field.name for field in dataclasses.fields(kind) if field.name not in given]
+    names = [field.name for field in dataclasses.fields(cast(Any, kind)) if field.name not in given]
     return kind(**given, **{name: getattr(message, name) for name in names})
 
 

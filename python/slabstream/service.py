@@ -220,7 +220,7 @@ class AsyncService:
                     timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume. `field`, `time`: as of
         histogram(), but there may be several fields; None: the first one that shows, and the overlay."""
-        named = field if isinstance(field, (list, tuple)) else [] if field is None else [field]
+        named: Sequence[Any] = field if isinstance(field, (list, tuple)) else [] if field is None else [field]
         query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))], channels=[_of(each, None)["field"] for each in named],
                                    **_of(None, time))
         return probe.sample_of((await self._connection.ask("sample_query", query, timeout)).samples[0])
