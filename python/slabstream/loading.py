@@ -100,10 +100,11 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
 
-    `volume` is a path of any format that slabstream reads, the address of a store, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax,
-    xarray.DataArray, an image of nibabel, SimpleITK, ITK or VTK, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
-    as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
-    volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
+    `volume` is a path or an address of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax,
+    xarray.DataArray, an image of nibabel, ITK, SimpleITK or VTK, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or
+    `spacing` one number for all axes; row i of `direction` is where the array's axis i points to, as z, y, x of the world; `world` is
+    "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are volumes on the same grid, or paths.
+    `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.
     """
     given = [layer for layer in (labels, overlay) if layer is not None]

@@ -6,8 +6,8 @@
     with ss.load(array, spacing=spacing) as volume:
         image = sv.compose(plotter, volume.service, volume.name, renderer="raycast", transfer="ct-bone")
 
-Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of the
-render window.
+Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of
+the render window.
 """
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _MOST_FRONTS = 64
 
 
 def to_pyvista(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None) -> Any:
-    """A pyvista.ImageData of whatever load() takes as an array, with the samples as its points' scalars "values"; in memory as a whole. Of a
-    patient it is in the world of the service: x to the right, y to anterior, z to superior.
+    """A pyvista.ImageData of whatever load() takes as an array, with the samples as its points' scalars "values"; in memory as a whole.
+    Of a patient it is in the world of the service: x to the right, y to anterior, z to superior.
 
     Of an Image: its pixels as points, from the lower left one, with the scalars "rgba", and "depth" where it has depths."""
     image_data = importlib.import_module("pyvista").ImageData
@@ -54,8 +54,8 @@ def to_pyvista(volume: Any, *, spacing: Any = None, origin: Any = None, directio
 
 
 def camera_of(renderer: Any, radius: float) -> dict[str, Any]:
-    """The options of pictures with the camera and the size of a vtkRenderer that fills its window. `radius`: of the ball round the volume, for
-    parallel projections (ball_of)."""
+    """The options of pictures with the camera and the size of a vtkRenderer that fills its window. `radius`: of the ball round the volume,
+    for parallel projections (ball_of)."""
     camera, (width, height) = renderer.GetActiveCamera(), renderer.GetRenderWindow().GetSize()
     shorter = min(width, height)
     options = {"size": (width, height), "eye": camera.GetPosition(), "look_at": camera.GetFocalPoint(), "up": camera.GetViewUp()}
@@ -68,7 +68,8 @@ def camera_of(renderer: Any, radius: float) -> dict[str, Any]:
 
 def _shown(plotter: Any) -> tuple[Any, Floats, Floats]:
     """The renderer; what its window shows, red, green and blue from 0 to 1; and depths from the eye, along the direction of view."""
-    core, to_numpy = importlib.import_module("vtkmodules.vtkCommonCore"), importlib.import_module("vtkmodules.util.numpy_support").vtk_to_numpy
+    core = importlib.import_module("vtkmodules.vtkCommonCore")
+    to_numpy = importlib.import_module("vtkmodules.util.numpy_support").vtk_to_numpy
     renderer = getattr(plotter, "renderer", plotter)
     window = renderer.GetRenderWindow()
     if tuple(renderer.GetViewport()) != (0, 0, 1, 1):

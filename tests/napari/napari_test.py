@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A real napari shows by the plugin what it shows by itself, and follows its user (deploy/check napari). Needs a display that has OpenGL."""
+"""A real napari shows by the plugin what it shows by itself, and follows its user (deploy/check napari). Needs a display with OpenGL."""
 from __future__ import annotations
 
 import contextlib
@@ -127,9 +127,9 @@ class Follows(OfNapari):
     def test_the_look(self):
         layer = self.layer
         camera_model(self.viewer).angles = (10, -40, 5)
-        for name, value in (("contrast_limits", (60, 140)), ("gamma", 0.5), ("colormap", "magma"), ("opacity", 0.6), ("colormap", "viridis"),
-                            ("rendering", "minip"), ("rendering", "average"), ("blending", "additive"), ("rendering", "mip"), ("scale", (1, 2, 1)),
-                            ("data", blobs(0.4))):
+        for name, value in (("contrast_limits", (60, 140)), ("gamma", 0.5), ("colormap", "magma"), ("opacity", 0.6),
+                            ("colormap", "viridis"), ("rendering", "minip"), ("rendering", "average"), ("blending", "additive"),
+                            ("rendering", "mip"), ("scale", (1, 2, 1)), ("data", blobs(0.4))):
             setattr(layer, name, value)
             if layer.rendering == "average":
                 layer.contrast_limits = (0, 70)
@@ -148,7 +148,8 @@ class Follows(OfNapari):
     def test_several_layers(self):
         self.layer.colormap = "green"
         for blending in ("additive", "translucent", "minimum", "opaque"):
-            other = self.viewer.add_image(blobs(-0.5), colormap="red", blending=blending, scale=(2, 1, 1.5), rendering="mip", contrast_limits=(20, 190))
+            other = self.viewer.add_image(blobs(-0.5), colormap="red", blending=blending, scale=(2, 1, 1.5), rendering="mip",
+                                          contrast_limits=(20, 190))
             self.layer.blending = "additive" if blending == "minimum" else "translucent"
             camera_model(self.viewer).angles = (20, 35, 10)
             if blending in ("additive", "minimum"):
@@ -275,7 +276,8 @@ class Data(OfNapari):
         levels = []
         for level in range(2):
             step = 2**level
-            group.create_array(str(level), data=both[:, ::step, ::step, ::step], chunks=(1, 20, 20, 20), chunk_key_encoding={"name": "v2", "separator": "/"})
+            group.create_array(str(level), data=both[:, ::step, ::step, ::step], chunks=(1, 20, 20, 20),
+                               chunk_key_encoding={"name": "v2", "separator": "/"})
             levels.append({"path": str(level), "coordinateTransformations": [{"type": "scale", "scale": [1, 2 * step, step, step]}]})
         group.attrs["multiscales"] = [{"version": "0.4", "axes": axes, "datasets": levels}]
         group.attrs["omero"] = {"channels": [{"label": name, "color": "FF0000", "window": {"start": 0, "end": 200, "min": 0, "max": 255}}
@@ -285,8 +287,8 @@ class Data(OfNapari):
     def check_store(self, folder, address):
         """By its address, and by value, it is the same picture."""
         _, levels = self.store(folder)
-        added = self.viewer.add_image(levels, channel_axis=0, name=["DAPI", "Actin"], rendering="mip", contrast_limits=(20, 190), scale=(2, 1, 1),
-                                      colormap=["green", "red"], blending="additive", metadata={"slabstream": address})
+        added = self.viewer.add_image(levels, channel_axis=0, name=["DAPI", "Actin"], rendering="mip", contrast_limits=(20, 190),
+                                      scale=(2, 1, 1), colormap=["green", "red"], blending="additive", metadata={"slabstream": address})
         self.open()
         camera_model(self.viewer).angles = (20, 35, 10)
         self.settle()
@@ -321,7 +323,8 @@ class Data(OfNapari):
             self.assertEqual(plugin_layers.address_of(layer), None)  # a folder of another name
             os.symlink(path / "0", f"{folder}/array.zarr")
             self.viewer.layers.clear()
-            (layer,) = self.viewer.open(f"{folder}/array.zarr", plugin="napari", layer_type="image", rendering="mip", contrast_limits=(20, 190))
+            (layer,) = self.viewer.open(f"{folder}/array.zarr", plugin="napari", layer_type="image", rendering="mip",
+                                        contrast_limits=(20, 190))
             self.assertEqual(plugin_layers.address_of(layer), f"{folder}/array.zarr")
             self.open()
             self.same("opened")

@@ -151,7 +151,8 @@ class Scenes(unittest.TestCase):
         for parallel in (True, False):
             with self.subTest(parallel=parallel):
                 plotter = plotter_with(sphere, *FROM["behind"], parallel)
-                image = self.compose(plotter, f"mist-{parallel}", renderer="raycast", transfer=mist, shading="none", sampling_rate=4, fronts=24)
+                image = self.compose(plotter, f"mist-{parallel}", renderer="raycast", transfer=mist, shading="none", sampling_rate=4,
+                                     fronts=24)
                 begin, along = rays(plotter.camera)
                 (near, far), mesh = hits(begin, along, BALL), hits(begin, along, SPHERE)[0]
                 with np.errstate(invalid="ignore"):

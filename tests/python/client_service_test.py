@@ -577,8 +577,8 @@ class OwnService(InAFolder):
         store = self.folder / "far.zarr"
         store.mkdir()
         (store / ".zarray").write_text(json.dumps({
-            "zarr_format": 2, "shape": values.shape, "chunks": values.shape, "dtype": "|u1", "compressor": None, "fill_value": 0, "order": "C",
-            "filters": None}))
+            "zarr_format": 2, "shape": values.shape, "chunks": values.shape, "dtype": "|u1", "compressor": None, "fill_value": 0,
+            "order": "C", "filters": None}))
         (store / "0.0.0").write_bytes(values.tobytes())
         handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(self.folder))
         with unittest.mock.patch.object(http.server.SimpleHTTPRequestHandler, "log_message"), \

@@ -1,7 +1,7 @@
 """What a picture of a layer of napari shows: its volume at a service, its camera and its look, as options of Slabstream.
 
-Pure: neither Qt nor the canvas. Vectors of the scene are those of the three displayed dimensions, in napari's order; vectors of a service are
-x, y, z.
+Pure: neither Qt nor the canvas. Vectors of the scene are those of the three displayed dimensions, in napari's order; vectors of a service
+are x, y, z.
 """
 from __future__ import annotations
 
@@ -204,8 +204,8 @@ def camera_options(camera: Camera, place: Place, source: Source, scale: float) -
     look_at = np.array(source.centre) + there(np.array(camera.center) - middle) / unit
     right = there(np.cross(camera.forward, camera.up)) * (-1 if camera.mirrored else 1)
     shorter = min(camera.width, camera.height)
-    options: dict[str, Any] = {"size": (max(round(camera.width * scale), 1), max(round(camera.height * scale), 1)), "look_at": tuple(look_at),
-                               "up": tuple(up)}
+    size = (max(round(camera.width * scale), 1), max(round(camera.height * scale), 1))
+    options: dict[str, Any] = {"size": size, "look_at": tuple(look_at), "up": tuple(up)}
     if camera.perspective == 0:
         zoom = 2 * source.radius * unit * camera.zoom / shorter
         options.update(eye=tuple(look_at - 4 * source.radius * forward), zoom=min(max(zoom, _LEAST_ZOOM), _MOST_ZOOM))
@@ -246,8 +246,8 @@ def look_options(layer: Any) -> dict[str, Any]:
 
 
 def blend(below: Any, rgba: Any, opacity: float, blending: str, first: bool) -> Any:
-    """Red, green and blue of the canvas with a picture on it. Pictures are premultiplied; all is from 0 to 1. `first`: nothing but the canvas
-    is below, which napari treats apart."""
+    """Red, green and blue of the canvas with a picture on it. Pictures are premultiplied; all is from 0 to 1. `first`: nothing but the
+    canvas is below, which napari treats apart."""
     color, alpha = rgba[..., :3], rgba[..., 3:]
     if first and blending == "additive":
         return np.where(alpha > 0, opacity * color, below)

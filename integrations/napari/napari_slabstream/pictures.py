@@ -39,7 +39,8 @@ class View:
 
 
 class Pictures:
-    """`tell(view, rgb, sharp, notes)` is called on the thread: height, width, 3 of float32 from 0 to 1, and by layer why the picture lacks it."""
+    """`tell(view, rgb, sharp, notes)` is called on the thread: height, width, 3 of float32 from 0 to 1, and by layer why the picture lacks
+    it."""
 
     def __init__(self, tell: Callable[[View, Any, bool, dict[Any, str]], None]):
         self._tell = tell
