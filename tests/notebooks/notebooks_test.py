@@ -165,8 +165,12 @@ class Kernel(Browsed):
         tab = self.notebook(LOAD, VIEW, second, **KERNEL_ALONE)
         tab.until("canvases().length === 2")
         for viewer in (0, 1, 0):
+            for number in (0, 1):
+                tab.final(number)
+            before = [tab.pixels(number) for number in (0, 1)]
             tab.drag(90, 30, viewer)
             for number, name in enumerate(("widget", "other")):
+                tab.changed(before[number], number)
                 self.check_picture(tab, name, number)
             self.assertEqual(tab.ask("widget.camera == other.camera"), "True")
         tab.save(SCREENSHOTS, "linked")
