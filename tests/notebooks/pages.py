@@ -69,6 +69,18 @@ class Tab:
         width, height, text = self.js("pixelsOf(canvases()[arguments[0]])", viewer)
         return np.frombuffer(base64.b64decode(text), np.uint8).reshape(height, width, 4)
 
+    def changed(self, before: np.ndarray, viewer: int = 0) -> None:
+        """Its lossless picture is another one than before."""
+        limit = time.monotonic() + SECONDS
+        while True:
+            self.final(viewer)
+            apart = np.abs(self.pixels(viewer).astype(int) - before).mean()
+            if apart > 1:
+                return
+            if time.monotonic() > limit:
+                raise AssertionError(f"the picture stays as it is: pixels differ by {apart:.3f} on average")
+            time.sleep(0.05)
+
     def _middle(self, viewer: int) -> tuple[float, float]:
         """Of its canvas, on the screen."""
         return self.js("(c => { c.scrollIntoView({block: 'center'}); const b = c.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]; })(canvases()[arguments[0]])", viewer)
