@@ -4,7 +4,7 @@
 
     plotter.add_mesh(mesh)
     with ss.load(array, spacing=spacing) as volume:
-        image = sv.compose(plotter, volume.service, volume.name, renderer="raycast", transfer="ct-bone")
+        image = sv.compose(plotter, volume.service, volume.name, transfer="ct-bone")
 
 Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of
 the render window.
@@ -95,7 +95,7 @@ def compose(plotter: Any, service: Service, dataset: str, *, fronts: int = 16, *
     """The picture of a dataset together with the opaque meshes that a pyvista.Plotter or a vtkRenderer shows, with its camera, size and
     background.
 
-    A picture with depths (renderer="zbuffer") is exact: the nearer of both is seen at each pixel. Others have no depths, so the part of the
+    A picture with depths, as the Z-buffer makes them, is exact: the nearer of both is seen at each pixel. Others have no depths, so the part of the
     volume in front of the meshes is rendered up to `fronts` depths, 1 to 64, from the nearest to the farthest point of the meshes, and is
     interpolated between them: as many pictures more. Those cut by planes, so options that cut something away are refused.
     """
