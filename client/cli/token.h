@@ -16,7 +16,8 @@ struct TokenOptions {
   std::string token_file;  // the gateway's; empty: the token of the gateway of this user that was started here last
 };
 
-// Prints the token, and the link to the gateway if it runs here. InvalidArgument, Unavailable: there is no gateway.
+// Prints the token. If the gateway runs here, prints a link with the token, too. InvalidArgument: the gateway's own token is too short to
+// sign others, or there are too many datasets. Unavailable: no gateway of this user runs here, and no token file is named.
 Status RunToken(const TokenOptions& options);
 
 }  // namespace slabstream

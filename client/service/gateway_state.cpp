@@ -35,12 +35,8 @@ void ForgetGateway(pid_t pid) {
 
 std::vector<GatewayState> RunningGateways() {
   std::vector<GatewayState> states;
-  const Result<std::string> directory = StateDirectory();
-  if (!directory.ok()) return states;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
-    if (entry.path().extension() != kEnding) continue;
-    const Result<std::string> text = ReadPrivateTextFile(entry.path(), kMostBytes);
+  for (const std::string& file : StateFiles(kEnding)) {
+    const Result<std::string> text = ReadPrivateTextFile(file, kMostBytes);
     const Result<Json> json = text.ok() ? Json::Parse(*text) : Result<Json>(text.status());
     if (!json.ok()) continue;
     try {

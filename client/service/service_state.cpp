@@ -80,6 +80,17 @@ Result<std::string> StateDirectory() {
   return path;
 }
 
+std::vector<std::string> StateFiles(std::string_view ending) {
+  std::vector<std::string> files;
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
+    if (entry.path().extension() == ending) files.push_back(entry.path());
+  }
+  return files;
+}
+
 Status SaveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
@@ -110,12 +121,8 @@ void RemoveState(const ServiceState& state) {
 
 std::vector<ServiceState> AllStates() {
   std::vector<ServiceState> states;
-  const Result<std::string> directory = StateDirectory();
-  if (!directory.ok()) return states;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
-    if (entry.path().extension() != ".json") continue;
-    if (std::optional<ServiceState> state = Load(entry.path())) states.push_back(*std::move(state));
+  for (const std::string& file : StateFiles(".json")) {
+    if (std::optional<ServiceState> state = Load(file)) states.push_back(*std::move(state));
   }
   std::ranges::sort(states, {}, &ServiceState::started_unix);
   return states;

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/client.h"
@@ -33,6 +34,8 @@ struct ServiceState {
 
 // Creates the directory if it does not exist. Unavailable, naming XDG_RUNTIME_DIR: it cannot be created or belongs to somebody else.
 Result<std::string> StateDirectory();
+// The files there whose names end so: ".json". Empty: none, or there is no such directory.
+std::vector<std::string> StateFiles(std::string_view ending);
 
 Status SaveState(const ServiceState& state);
 void ForgetState(const ServiceState& state);  // keeps its logs, and what another service has saved for its endpoint since

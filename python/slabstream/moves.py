@@ -11,6 +11,7 @@ from .errors import InvalidArgument
 from .values import json_of, number
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 1000
+_LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees, of the option fov
 _MOST_TIMES = 1 << 20
 
 
@@ -54,6 +55,13 @@ def ball_of(service: Any, dataset: str, time: Any = None) -> tuple[tuple[float, 
     side = 16
     geometry = service.render(dataset, size=side, fit=False, projection="orthographic", azimuth=0, elevation=0, time=time).geometry
     return geometry.target, geometry.pixel_size * side / 2
+
+
+def perspective_of(slope: float) -> dict[str, Any]:
+    """The options of a perspective picture. `slope`: half its shorter side, divided by the distance from the eye, both in the plane of the
+    point looked at. The zoom makes up for what the option `fov` cannot take."""
+    fov = min(max(2 * math.degrees(math.atan(slope)), _LEAST_FOV), _MOST_FOV)
+    return {"projection": "perspective", "fov": fov, "zoom": math.tan(math.radians(fov / 2)) / slope}
 
 
 def cameras_of(path: Any) -> tuple[list[float], list[dict[str, Any]]]:

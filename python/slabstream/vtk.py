@@ -19,14 +19,13 @@ import numpy
 
 from .errors import InvalidArgument
 from .image import Image
-from .moves import ball_of
+from .moves import ball_of, perspective_of
 from .options import takes_options_of
 from .runs import Floats
 from .service import Service
 from .values import integer
 from .volumes import slabs_of, volume_of
 
-_LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees, of the option fov
 _MOST_FRONTS = 64
 
 
@@ -62,8 +61,7 @@ def camera_of(renderer: Any, radius: float) -> dict[str, Any]:
     if camera.GetParallelProjection():
         return {**options, "projection": "orthographic", "zoom": radius * height / (shorter * camera.GetParallelScale())}
     slope = math.tan(math.radians(camera.GetViewAngle() / 2)) * shorter / (width if camera.GetUseHorizontalViewAngle() else height)
-    fov = min(max(2 * math.degrees(math.atan(slope)), _LEAST_FOV), _MOST_FOV)
-    return {**options, "projection": "perspective", "fov": fov, "zoom": math.tan(math.radians(fov / 2)) / slope}
+    return {**options, **perspective_of(slope)}
 
 
 def _shown(plotter: Any) -> tuple[Any, Floats, Floats]:

@@ -14,14 +14,13 @@ from typing import Any
 
 import numpy as np
 import slabstream as ss
-from slabstream.moves import ball_of
+from slabstream.moves import ball_of, perspective_of
 
 _POINTS = 65  # of a colour map in a transfer function
 _DENSE = 0.25  # opacity of a voxel length at the upper contrast limit, in modes that add up opacities
 _BESIDE = 1 / 4096  # of the contrast limits: what has another opacity than the limit itself
 _UPRIGHT = 1e-3  # by which axes may miss right angles, and sides their lengths
 _LEAST_ZOOM, _MOST_ZOOM = 0.001, 10000.0
-_LEAST_FOV, _MOST_FOV = 1.0, 60.0  # degrees
 _OWNED_BYTES = 1 << 30  # larger arrays of dask stay where they are, and are computed chunk by chunk
 _MOST_BOXES = 4096
 _COME_SECONDS, _ASK_AGAIN_SECONDS = 20.0, 0.05
@@ -211,10 +210,8 @@ def camera_options(camera: Camera, place: Place, source: Source, scale: float) -
         options.update(eye=tuple(look_at - 4 * source.radius * forward), zoom=min(max(zoom, _LEAST_ZOOM), _MOST_ZOOM))
     else:
         half = math.tan(math.radians(camera.perspective / 2))
-        slope = half * shorter / camera.height
-        fov = min(max(2 * math.degrees(math.atan(slope)), _LEAST_FOV), _MOST_FOV)
-        options.update(eye=tuple(look_at - camera.height / (camera.zoom * unit * 2 * half) * forward), projection="perspective", fov=fov,
-                       zoom=math.tan(math.radians(fov / 2)) / slope)
+        options.update(eye=tuple(look_at - camera.height / (camera.zoom * unit * 2 * half) * forward),
+                       **perspective_of(half * shorter / camera.height))
     return options, bool(np.cross(forward, up) @ right < 0)
 
 
