@@ -24,7 +24,8 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
   if (!json.ok()) return Printable(json.status());
   std::optional<std::string> mistake;
   const JsonValue value(*json, "message", mistake);
-  static constexpr std::array<std::string_view, 2> kTypes = {"view", "ack"}, kKinds = {"render", "slice"};
+  static constexpr std::array<std::string_view, 3> kTypes = {"view", "ack", "pong"};
+  static constexpr std::array<std::string_view, 2> kKinds = {"render", "slice"};
   const std::size_t type = value.At("type").OneOf(kTypes);
   if (mistake) return Status::InvalidArgument(Printable(*mistake));
   const auto ignore = [](const JsonValue&) {};
@@ -34,6 +35,13 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
     (void)value.At("frame");
     if (mistake) return Status::InvalidArgument(Printable(*mistake));
     return PageMessage(ack);
+  }
+  if (type == 2) {
+    PongMessage pong;
+    value.Fields({{"type", ignore}, {"ping", [&](const JsonValue& v) { pong.ping = Sequence(v); }}});
+    (void)value.At("ping");
+    if (mistake) return Status::InvalidArgument(Printable(*mistake));
+    return PageMessage(pong);
   }
   ViewMessage view;
   value.Fields({{"type", ignore},

@@ -28,7 +28,12 @@ struct AckMessage {
   std::uint64_t frame = 0;
 };
 
-using PageMessage = std::variant<ViewMessage, AckMessage>;
+// The answer to a ping.
+struct PongMessage {
+  std::uint64_t ping = 0;
+};
+
+using PageMessage = std::variant<ViewMessage, AckMessage, PongMessage>;
 
 // InvalidArgument: wrong in form.
 Result<PageMessage> ParsePageMessage(std::string_view text);

@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Quality of JPEG falls with the round trip: at these and beyond it stays.
+// Quality of JPEG falls with the time that a picture takes to the page: at these and beyond it stays.
 constexpr Duration kQuick = milliseconds(30), kSlow = milliseconds(200);
 constexpr int kBestQuality = 92, kLeastQuality = 50;
 // Pictures become small above the first, and large again below the second, which small ones would else lead to at once.
@@ -30,7 +30,7 @@ Duration Smoothed(Duration before, Duration sample) { return before == Duration:
 }  // namespace
 
 int ViewMachine::Quality() const {
-  const double share = double((std::clamp(round_trip_, kQuick, kSlow) - kQuick).count()) / double((kSlow - kQuick).count());
+  const double share = double((std::clamp(link_.picture_time(), kQuick, kSlow) - kQuick).count()) / double((kSlow - kQuick).count());
   return kBestQuality - int(share * (kBestQuality - kLeastQuality));
 }
 
@@ -116,13 +116,9 @@ ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
 }
 
 ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Time now) {
-  if (sent_ != frame) return {};
-  sent_.reset();
-  if (!sent_final_) {  // lossless pictures are larger: they say nothing about the next one that moves
-    round_trip_ = Smoothed(round_trip_, std::max<Duration>(now - sent_at_, Duration(1)));
-    if (round_trip_ > kSmallAbove) small_ = true;
-    if (round_trip_ < kLargeBelow) small_ = false;
-  }
+  if (!link_.OnAck(frame, now)) return {};
+  if (link_.picture_time() > kSmallAbove) small_ = true;
+  if (link_.picture_time() < kLargeBelow) small_ = false;
   return Next(now);
 }
 
@@ -138,12 +134,10 @@ ViewMachine::Actions ViewMachine::Next(Time now) {
 }
 
 void ViewMachine::Send(Time now, Actions& actions) {
-  if (out_ != Out::kEncoded || sent_) return;
+  if (out_ != Out::kEncoded || link_.is_full()) return;
   out_ = Out::kEmpty;
-  sent_ = ++frames_;
-  sent_at_ = now;
-  sent_final_ = outgoing_final_;
-  actions.push_back({.kind = ViewActionKind::kSend, .frame = *sent_});
+  link_.OnSent(++frames_, !outgoing_final_, now);
+  actions.push_back({.kind = ViewActionKind::kSend, .frame = frames_});
 }
 
 void ViewMachine::Encode(Time now, Actions& actions) {
@@ -170,9 +164,8 @@ bool ViewMachine::IsRenderedOrRenders(std::uint64_t seq) const {
 
 // A frame that would wait for the page is begun later, and then shows a newer view.
 bool ViewMachine::MayRender(Time now) {
-  if (!sent_) return true;
-  if (out_ != Out::kEmpty) return false;
-  const Time ready = sent_at_ + round_trip_ - render_time_;
+  if (link_.is_full() && out_ != Out::kEmpty) return false;
+  const Time ready = link_.ready() - render_time_;
   if (now >= ready) return true;
   WakeAt(ready);
   return false;

@@ -4,8 +4,10 @@
 //   OnView --> [pending] --Render--> [rendering] --OnRendered--> [outgoing] --Encode--> OnEncoded --Send--> [sent] --OnAck--> ...
 //
 // - The latest view wins: there is one pending view, and a new one takes its place.
-// - One view renders, one picture is outgoing, one is sent and not acknowledged. The next view begins to render when it should be finished
-//   no sooner than the page is ready for its picture: so what is shown is as new as can be, and no frame is rendered for nothing.
+// - One view renders, one picture is outgoing, and as many are sent and not acknowledged as the way to the page holds (page_link.h). The
+// next
+//   view begins to render when it should be finished no sooner than its picture gets through: so what is shown is as new as can be, and no
+//   frame is rendered for nothing.
 // - A frame that renders is finished although newer views have come, else a picture that always moves would never be seen. A lossless
 //   picture is given up for a newer view.
 // - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly. If a picture with
@@ -19,6 +21,7 @@
 #include <vector>
 
 #include "common/base/time.h"
+#include "gateway/page_link.h"
 
 namespace slabstream {
 
@@ -60,12 +63,13 @@ class ViewMachine {
   Actions OnEncoded(Time now);
   Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
   Actions OnAck(std::uint64_t frame, Time now);
-  Actions OnTime(Time now);  // at wake_time()
+  void OnEcho(Duration round_trip, Time now) { link_.OnEcho(round_trip, now); }  // as PageLink's
+  Actions OnTime(Time now);                                                      // at wake_time()
 
   // When OnTime is due; nullopt: nothing waits for a time.
   std::optional<Time> wake_time() const { return wake_; }
-  Duration round_trip() const { return round_trip_; }
-  // The JPEG quality of a moving picture, by the measured round trip.
+  const PageLink& link() const { return link_; }
+  // The JPEG quality of a moving picture, by the time that pictures take to the page.
   int Quality() const;
 
  private:
@@ -98,19 +102,17 @@ class ViewMachine {
   bool to_be_shown_ = false;         // and it was not encoded yet
   Out out_ = Out::kEmpty;
   bool outgoing_final_ = false;
-  std::uint64_t final_seq_ = 0;        // the newest view whose lossless picture was begun
-  std::optional<std::uint64_t> sent_;  // the frame that is not acknowledged
-  Time sent_at_{};
-  bool sent_final_ = false;
+  std::uint64_t final_seq_ = 0;  // the newest view whose lossless picture was begun
+  PageLink link_;
   std::uint64_t frames_ = 0;
-  Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
-  bool small_ = false;                     // pictures while moving have half the size, for the connection's sake
-  double scale_ = 1;                       // the scale of pictures while moving, below 1 for the service's sake
-  Duration wider_time_{};                  // what the last picture of twice the scale took
-  Time whole_until_{};                     // scale_ stays 1
-  double coarseness_ = kFirstCoarseness;   // the coarseness of pictures while the view moves
-  bool plain_ = false;                     // pictures while moving have no shadows
-  double still_coarseness_ = 1;            // the coarseness of the next picture of a view that stands still
+  Duration render_time_{};                // smoothed; 0: not measured yet
+  bool small_ = false;                    // pictures while moving have half the size, for the connection's sake
+  double scale_ = 1;                      // the scale of pictures while moving, below 1 for the service's sake
+  Duration wider_time_{};                 // what the last picture of twice the scale took
+  Time whole_until_{};                    // scale_ stays 1
+  double coarseness_ = kFirstCoarseness;  // the coarseness of pictures while the view moves
+  bool plain_ = false;                    // pictures while moving have no shadows
+  double still_coarseness_ = 1;           // the coarseness of the next picture of a view that stands still
   std::optional<Time> wake_;
 };
 

@@ -94,8 +94,12 @@ void ViewSession::OnText(std::string_view text) {
     return peer_->Close(1008, message.status().message());
   }
   if (auto* view = std::get_if<ViewMessage>(&*message)) return Handle(*std::move(view));
+  if (const auto* pong = std::get_if<PongMessage>(&*message)) {
+    if (pong->ping == pings_) machine_.OnEcho(MonotonicNow() - pinged_at_, MonotonicNow());
+    return;
+  }
   const ViewMachine::Actions actions = machine_.OnAck(std::get<AckMessage>(*message).frame, MonotonicNow());
-  if (sent_at_ != Time{}) around_.metrics.CountRoundTrip(MonotonicNow() - std::exchange(sent_at_, Time{}));
+  around_.metrics.CountRoundTrip(machine_.link().last_round_trip());
   Do(actions);
 }
 
@@ -122,6 +126,8 @@ void ViewSession::SendStatus() {
   const Json status = StatusJson(ShownStatus(news_->status, access_));
   for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
   peer_->SendText(TextOf(json));
+  pinged_at_ = MonotonicNow();
+  peer_->SendText(TextOf({{"type", "ping"}, {"ping", ++pings_}}));
 }
 
 void ViewSession::SendError(std::uint64_t seq, const Status& why) {
@@ -290,9 +296,8 @@ void ViewSession::OnEncoded(std::uint64_t number, Result<EncodedView> encoded) {
 
 void ViewSession::Send(std::uint64_t frame) {
   EncodedView encoded = *std::exchange(encoded_, std::nullopt);
-  sent_at_ = MonotonicNow();
   if (encoded.bytes->size() >= kLargePicture) peer_->SendText(TextOf({{"type", "picture"}, {"bytes", encoded.bytes->size()}}));
-  peer_->SendBinary(HeadOf(std::move(encoded.header), frame, machine_.round_trip()), std::move(encoded.bytes));
+  peer_->SendBinary(HeadOf(std::move(encoded.header), frame, machine_.link().round_trip()), std::move(encoded.bytes));
 }
 
 }  // namespace slabstream

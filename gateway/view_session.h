@@ -83,7 +83,8 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;
-  Time sent_at_{};
+  std::uint64_t pings_ = 0;
+  Time pinged_at_{};                    // the last one
   std::uint64_t told_unavailable_ = 0;  // seq of the view of whose failure the page knows
 };
 

@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(PageMessageTest, ViewsAndAcknowledgements) {
+TEST(PageMessageTest, ViewsAcknowledgementsAndPongs) {
   const auto view =
       ParsePageMessage(R"({"type": "view", "seq": 17, "options": {"dataset": "head", "azimuth": 30, "clip-plane": ["1,0,0,5"]}})");
   ASSERT_TRUE(view.ok()) << view.status().message();
@@ -25,6 +25,9 @@ TEST(PageMessageTest, ViewsAndAcknowledgements) {
   const auto ack = ParsePageMessage(R"({"frame": 5, "type": "ack"})");
   ASSERT_TRUE(ack.ok());
   EXPECT_EQ(std::get<AckMessage>(*ack).frame, 5U);
+  const auto pong = ParsePageMessage(R"({"type": "pong", "ping": 7})");
+  ASSERT_TRUE(pong.ok());
+  EXPECT_EQ(std::get<PongMessage>(*pong).ping, 7U);
 }
 
 TEST(PageMessageTest, WrongFormIsRefusedInOneLine) {
@@ -34,7 +37,7 @@ TEST(PageMessageTest, WrongFormIsRefusedInOneLine) {
         std::string(R"({"type": "view"})"), std::string(R"({"type": "view", "seq": 0, "options": {}})"),
         std::string(R"({"type": "view", "seq": 1, "options": []})"), std::string(R"({"type": "view", "seq": 1, "options": {}, "more": 1})"),
         std::string(R"({"type": "view", "seq": 1e300, "options": {}})"), std::string(R"({"type": "ack"})"),
-        std::string(R"({"type": "ack", "frame": -1})"), deep}) {
+        std::string(R"({"type": "ack", "frame": -1})"), std::string(R"({"type": "pong"})"), deep}) {
     const auto message = ParsePageMessage(text);
     ASSERT_FALSE(message.ok()) << text;
     EXPECT_EQ(message.status().code(), StatusCode::kInvalidArgument);

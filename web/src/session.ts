@@ -56,6 +56,7 @@ export class Session {
   private wanted: View | null = null;
   private sent = new Map<number, SentView>();
   private lastSent = "";
+  private drawn: Promise<void> = Promise.resolve(); // when all pictures that have come are drawn
   private silentAt = 0; // when the connection counts as dead, if nothing comes until then
   private lookedAt = 0;
   private readonly looking: number;
@@ -143,26 +144,30 @@ export class Session {
       if (this.stream !== stream) return;
       this.heard();
       if (typeof data === "string") this.onText(data);
-      else void this.onPicture(stream, data);
+      else this.drawn = this.onPicture(stream, data, this.drawn).catch(() => undefined);
     };
     stream.onclose = reason => this.lose(stream, reason);
   }
 
   private onText(text: string): void {
-    const message = JSON.parse(text) as { type: string; seq?: number; error?: string; bytes?: number };
-    if (message.type === "status") this.events.status?.(message as unknown as ServiceStatus);
+    const message = JSON.parse(text) as { type: string; seq?: number; error?: string; bytes?: number; ping?: number };
+    if (message.type === "ping") this.stream?.send(JSON.stringify({ type: "pong", ping: message.ping }));
+    else if (message.type === "status") this.events.status?.(message as unknown as ServiceStatus);
     else if (message.type === "progress") this.events.progress?.(message as unknown as Progress);
     else if (message.type === "picture") this.heard((message.bytes ?? 0) / LEAST_BYTES_A_MS);
     else if (message.type === "error" && message.seq === this.seq) this.events.error?.(message.error ?? "");
   }
 
-  private async onPicture(stream: Stream, message: ArrayBuffer): Promise<void> {
+  // Several pictures may be on their way: they are decoded side by side and drawn one after the other.
+  private async onPicture(stream: Stream, message: ArrayBuffer, before: Promise<void>): Promise<void> {
     const n = new DataView(message).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, n))) as FrameHeader;
     const view = this.sent.get(header.seq);
     const empty = header.bounds[2] === 0;
     // The pixels as they are: no profile of the screen's colours, which would change them.
-    const picture = empty ? null : await createImageBitmap(new Blob([new Uint8Array(message, 4 + n)], { type: header.type }), { colorSpaceConversion: "none" });
+    const decoded = empty ? null : createImageBitmap(new Blob([new Uint8Array(message, 4 + n)], { type: header.type }), { colorSpaceConversion: "none" });
+    await before;
+    const picture = await decoded;
     if (this.stream !== stream) return picture?.close();
     for (const seq of this.sent.keys()) if (seq < header.seq) this.sent.delete(seq);
     if (view) this.events.frame({ header, view, picture });
