@@ -73,16 +73,24 @@ RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
   return view;
 }
 
-Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up) {
+Result<EncodedView> EncodeView(const RenderedView& view, PictureCoding coding, int quality, VideoEncoder& video,
+                               const std::atomic<bool>& given_up) {
   const Time begin = MonotonicNow();
   const Result<ComposedPicture> picture = ComposedPicture::Make(view.image, view.size, view.format, view.panes, view.key);
   if (!picture.ok()) return picture.status();
-  // Outside of what was rendered is background, unless something was drawn onto the picture.
+  const bool final = coding == PictureCoding::kLossless, is_video = coding == PictureCoding::kVideo;
+  // Outside of what was rendered is background, unless something was drawn onto the picture. Pictures of a video have one size.
   const PixelBounds bounds =
-      view.format.annotations.any() ? PixelBounds{0, 0, view.size.width, view.size.height} : view.image.ContentBounds();
-  EncodedView encoded{.seq = view.seq, .header = {}, .bytes = nullptr, .encoding = {}, .type = final ? "png" : "jpeg"};
+      view.format.annotations.any() || is_video ? PixelBounds{0, 0, view.size.width, view.size.height} : view.image.ContentBounds();
+  EncodedView encoded{.seq = view.seq, .header = {}, .bytes = nullptr, .encoding = {}, .type = final ? "png" : is_video ? "vp9" : "jpeg"};
   std::vector<std::byte> bytes;
-  if (!bounds.empty()) {
+  bool key = false;
+  if (is_video) {
+    Result<VideoEncoder::Chunk> chunk = video.Encode(*picture);
+    if (!chunk.ok()) return chunk.status();
+    bytes = std::move(chunk->bytes);
+    key = chunk->key;
+  } else if (!bounds.empty()) {
     const PictureFileType type = final ? PictureFileType::kPng : PictureFileType::kJpeg;
     std::optional<std::vector<std::byte>> part = EncodePart(type, *picture, bounds, quality, given_up);
     if (!part) return Status::Cancelled("a newer view has come");
@@ -97,7 +105,9 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
   encoded.header = {{"frame", 0},
                     {"seq", view.seq},
                     {"final", final},
-                    {"type", final ? "image/png" : "image/jpeg"},
+                    {"type", final      ? "image/png"
+                             : is_video ? "video/vp9"
+                                        : "image/jpeg"},
                     {"size", {view.size.width, view.size.height}},
                     {"scale", view.scale},
                     {"coarseness", view.coarseness},
@@ -105,6 +115,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
                     {"background", {Decimal(background.r), Decimal(background.g), Decimal(background.b), Decimal(background.a)}},
                     {"geometry", GeometryJson(view.panes.front())},
                     {"statistics", std::move(statistics)}};
+  if (is_video) encoded.header["key"] = key;
   if (view.statistics.view) encoded.header["view"] = CameraJson(*view.statistics.view);
   encoded.bytes = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
   return encoded;

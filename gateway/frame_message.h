@@ -12,6 +12,8 @@
 #include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "common/base/status.h"
+#include "gateway/picture_coding.h"
+#include "gateway/video_encoder.h"
 
 namespace slabstream {
 
@@ -41,8 +43,10 @@ struct EncodedView {
   const char* type = "jpeg";  // for Metrics
 };
 
-// Lossless, or as JPEG of `quality`. Cancelled: `given_up` became true. NotFound: the font of annotations.
-Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up);
+// `quality`: of JPEG. `video`: takes the picture if it is to be video. Cancelled: `given_up` became true. NotFound: the font of
+// annotations. Internal: libvpx.
+Result<EncodedView> EncodeView(const RenderedView& view, PictureCoding coding, int quality, VideoEncoder& video,
+                               const std::atomic<bool>& given_up);
 
 // What comes before the encoded rectangle in the message.
 std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip);

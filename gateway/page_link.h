@@ -32,6 +32,7 @@ class PageLink {
   Duration picture_time() const { return picture_time_; }  // smoothed; 0: not measured yet
   Duration round_trip() const { return round_trip_; }      // smoothed; 0: not measured yet
   Duration last_round_trip() const { return last_; }
+  Duration delay() const;
 
  private:
   struct Sent {
@@ -39,7 +40,6 @@ class PageLink {
     bool counts = false;
     Time at{};
   };
-  Duration delay() const;
   std::size_t most_under_way() const;
 
   std::deque<Sent> under_way_;

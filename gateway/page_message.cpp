@@ -48,6 +48,7 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
                 {"seq", [&](const JsonValue& v) { view.seq = Sequence(v); }},
                 {"picture", [&](const JsonValue& v) { view.kind = v.OneOf(kKinds) == 0 ? PagePicture::kRender : PagePicture::kSlice; }},
                 {"timeline", [&](const JsonValue& v) { view.timeline = v.Boolean(); }},
+                {"video", [&](const JsonValue& v) { view.video = v.Boolean(); }},
                 {"options", ignore}});
   (void)value.At("seq");
   (void)value.At("options");

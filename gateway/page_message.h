@@ -20,6 +20,7 @@ struct ViewMessage {
   std::uint64_t seq = 0;  // [1, kMaxSequence]
   PagePicture kind = PagePicture::kRender;
   bool timeline = false;
+  bool video = false;  // the page can show video/vp9
   PictureFields options;
 };
 

@@ -13,6 +13,9 @@ constexpr Duration kQuick = milliseconds(30), kSlow = milliseconds(200);
 constexpr int kBestQuality = 92, kLeastQuality = 50;
 // Pictures become small above the first, and large again below the second, which small ones would else lead to at once.
 constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(50);
+// Pictures become video above the first, where the delay is at least the second: nearer by, a page that is slow has no time to spare. After
+// a while it is tried without.
+constexpr Duration kVideoAbove = milliseconds(40), kFar = milliseconds(10), kVideoFor = std::chrono::seconds(20);
 // Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
 constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
@@ -34,9 +37,10 @@ int ViewMachine::Quality() const {
   return kBestQuality - int(share * (kBestQuality - kLeastQuality));
 }
 
-ViewMachine::Actions ViewMachine::OnView(std::uint64_t seq, Time now) {
+ViewMachine::Actions ViewMachine::OnView(std::uint64_t seq, bool video, Time now) {
   Actions actions;
   if (seq <= latest_) return actions;
+  may_be_video_ = video;
   latest_ = seq;
   latest_since_ = now;
   refused_ = false;
@@ -117,6 +121,7 @@ ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
 
 ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Time now) {
   if (!link_.OnAck(frame, now)) return {};
+  if (link_.picture_time() > kVideoAbove && link_.delay() >= kFar) video_until_ = now + kVideoFor;
   if (link_.picture_time() > kSmallAbove) small_ = true;
   if (link_.picture_time() < kLargeBelow) small_ = false;
   return Next(now);
@@ -142,11 +147,14 @@ void ViewMachine::Send(Time now, Actions& actions) {
 
 void ViewMachine::Encode(Time now, Actions& actions) {
   if (out_ == Out::kEncoding || !rendered_) return;
-  if (to_be_shown_) {  // also in place of an older picture that could not be sent yet
+  if (to_be_shown_) {  // also in place of an older picture that could not be sent yet, unless it is video
+    const bool video = may_be_video_ && now < video_until_;
+    if (video && (out_ != Out::kEmpty || link_.is_full())) return;
     to_be_shown_ = false;
     outgoing_final_ = false;
     out_ = Out::kEncoding;
-    actions.push_back({.kind = ViewActionKind::kEncode, .quality = Quality()});
+    actions.push_back(
+        {.kind = ViewActionKind::kEncode, .coding = video ? PictureCoding::kVideo : PictureCoding::kJpeg, .quality = Quality()});
     return;
   }
   const bool as_asked = rendered_->seq == latest_ && rendered_->as_asked();
@@ -155,7 +163,7 @@ void ViewMachine::Encode(Time now, Actions& actions) {
   final_seq_ = latest_;
   outgoing_final_ = true;
   out_ = Out::kEncoding;
-  actions.push_back({.kind = ViewActionKind::kEncode, .final = true});
+  actions.push_back({.kind = ViewActionKind::kEncode, .coding = PictureCoding::kLossless});
 }
 
 bool ViewMachine::IsRenderedOrRenders(std::uint64_t seq) const {
@@ -164,7 +172,7 @@ bool ViewMachine::IsRenderedOrRenders(std::uint64_t seq) const {
 
 // A frame that would wait for the page is begun later, and then shows a newer view.
 bool ViewMachine::MayRender(Time now) {
-  if (link_.is_full() && out_ != Out::kEmpty) return false;
+  if (link_.is_full() && (out_ != Out::kEmpty || to_be_shown_)) return false;
   const Time ready = link_.ready() - render_time_;
   if (now >= ready) return true;
   WakeAt(ready);

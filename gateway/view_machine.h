@@ -12,6 +12,8 @@
 //   picture is given up for a newer view.
 // - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly. If a picture with
 //   shadows or ambient occlusion takes longer than 50 ms, those that move have neither.
+// - Where pictures take long to a page that is far away, those that move are video, if the page can show it. All that is encoded is sent
+// then.
 // - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size
 //   and of the level that the view asks for. If rendering takes long, pictures of levels between these come before it.
 #pragma once
@@ -22,6 +24,7 @@
 
 #include "common/base/time.h"
 #include "gateway/page_link.h"
+#include "gateway/picture_coding.h"
 
 namespace slabstream {
 
@@ -31,20 +34,20 @@ inline constexpr double kFirstCoarseness = 4, kMostCoarseness = 16;  // powers o
 enum class ViewActionKind : std::uint8_t {
   kRender,        // view `seq` at `scale` and `coarseness`; answer by OnRendered, OnRefused or OnUnavailable
   kCancelRender,  // the frame that renders; no answer
-  kEncode,        // the picture that was rendered last, `final` or with `quality`; answer by OnEncoded
+  kEncode,        // the picture that was rendered last, as `coding` and `quality` say; answer by OnEncoded
   kCancelEncode,  // no answer
   kSend,          // what was encoded, as number `frame`; answered by the page (OnAck)
 };
 
 struct ViewAction {
   ViewActionKind kind = ViewActionKind::kRender;
-  std::uint64_t seq = 0;    // kRender
-  double scale = 1;         // kRender: of width and height
-  double coarseness = 1;    // kRender: factor of the view's `detail`, [1, kMostCoarseness]
-  bool plain = false;       // kRender: without the view's shadows and ambient occlusion
-  bool final = false;       // kEncode: lossless
-  int quality = 0;          // kEncode: of JPEG, if not final
-  std::uint64_t frame = 0;  // kSend
+  std::uint64_t seq = 0;                        // kRender
+  double scale = 1;                             // kRender: of width and height
+  double coarseness = 1;                        // kRender: factor of the view's `detail`, [1, kMostCoarseness]
+  bool plain = false;                           // kRender: without the view's shadows and ambient occlusion
+  PictureCoding coding = PictureCoding::kJpeg;  // kEncode
+  int quality = 0;                              // kEncode: of JPEG
+  std::uint64_t frame = 0;                      // kSend
   friend bool operator==(const ViewAction&, const ViewAction&) = default;
 };
 
@@ -52,8 +55,8 @@ class ViewMachine {
  public:
   using Actions = std::vector<ViewAction>;
 
-  // `seq` rises from view to view; one that does not is ignored.
-  Actions OnView(std::uint64_t seq, Time now);
+  // `seq` rises from view to view; one that does not is ignored. `video`: the page can show it.
+  Actions OnView(std::uint64_t seq, bool video, Time now);
   // finest: with less coarseness the picture would be the same. shadowed: the view has shadows or ambient occlusion.
   Actions OnRendered(bool finest, bool shadowed, Time now);
   void OnLoading(Time now);         // the dataset is still read: that is no time of rendering
@@ -106,6 +109,8 @@ class ViewMachine {
   PageLink link_;
   std::uint64_t frames_ = 0;
   Duration render_time_{};                // smoothed; 0: not measured yet
+  bool may_be_video_ = false;             // by the latest view
+  Time video_until_{};                    // pictures while moving are video
   bool small_ = false;                    // pictures while moving have half the size, for the connection's sake
   double scale_ = 1;                      // the scale of pictures while moving, below 1 for the service's sake
   Duration wider_time_{};                 // what the last picture of twice the scale took

@@ -108,8 +108,9 @@ void ViewSession::Handle(ViewMessage view) {
     return peer_->Close(1008, "seq " + std::to_string(view.seq) + " does not rise: the last one was " + std::to_string(view_->seq));
   }
   const std::uint64_t seq = view.seq;
+  const bool video = view.video;
   view_ = std::move(view);
-  Do(machine_.OnView(seq, MonotonicNow()));
+  Do(machine_.OnView(seq, video, MonotonicNow()));
 }
 
 void ViewSession::OnNews(std::shared_ptr<const ServiceNews> news) {
@@ -144,7 +145,7 @@ void ViewSession::Do(const ViewMachine::Actions& actions) {
         if (rendering_) link_->Cancel(rendering_->ticket);
         rendering_.reset();
         break;
-      case ViewActionKind::kEncode: Encode(action.final, action.quality); break;
+      case ViewActionKind::kEncode: Encode(action.coding, action.quality); break;
       case ViewActionKind::kCancelEncode:
         *given_up_ = true;
         ++encoding_;
@@ -270,11 +271,11 @@ void ViewSession::FetchNextTimes(const FrameRequest& shown) {
   fetching_ = link_->Render(std::move(next), kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
 }
 
-void ViewSession::Encode(bool final, int quality) {
+void ViewSession::Encode(PictureCoding coding, int quality) {
   given_up_ = std::make_shared<std::atomic<bool>>(false);
   const std::uint64_t number = ++encoding_;
-  asio::post(around_.encoders, [self = shared_from_this(), view = rendered_, final, quality, given_up = given_up_, number]() mutable {
-    Result<EncodedView> encoded = Guarded("the picture", [&] { return EncodeView(*view, final, quality, *given_up); });
+  asio::post(around_.encoders, [self = shared_from_this(), view = rendered_, coding, quality, given_up = given_up_, number]() mutable {
+    Result<EncodedView> encoded = Guarded("the picture", [&] { return EncodeView(*view, coding, quality, *self->video_, *given_up); });
     view.reset();
     auto& io = self->around_.io;
     asio::post(io,

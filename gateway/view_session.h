@@ -52,7 +52,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void FetchNextTimes(const FrameRequest& shown);
-  void Encode(bool final, int quality);
+  void Encode(PictureCoding coding, int quality);
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
   void Send(std::uint64_t frame);
   void SendError(std::uint64_t seq, const Status& why);
@@ -78,8 +78,9 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   };
   std::optional<Rendering> rendering_;
   std::shared_ptr<const RenderedView> rendered_;
-  FrameRequest shown_;                           // the first frame of `rendered_`
-  ServiceLink::Ticket fetching_ = 0;             // times ahead; 0: none
+  FrameRequest shown_;                                                            // the first frame of `rendered_`
+  ServiceLink::Ticket fetching_ = 0;                                              // times ahead; 0: none
+  const std::shared_ptr<VideoEncoder> video_ = std::make_shared<VideoEncoder>();  // used by one encoding at a time
   std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;

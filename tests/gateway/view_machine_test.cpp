@@ -23,14 +23,14 @@ Time At(int ms) { return Time{} + milliseconds(100000 + ms); }
 
 TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
   ViewMachine machine;
-  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = kFirstCoarseness}));
+  EXPECT_THAT(machine.OnView(1, false, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = kFirstCoarseness}));
   EXPECT_THAT(machine.OnRendered(true, false, At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   EXPECT_THAT(machine.OnEncoded(At(35)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 1}));
   EXPECT_EQ(machine.wake_time(), At(150));
   EXPECT_THAT(machine.OnAck(1, At(45)), IsEmpty());
   EXPECT_EQ(machine.link().round_trip(), milliseconds(10));
   EXPECT_THAT(machine.OnTime(At(150)),
-              ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));  // the same picture: nothing is rendered
+              ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));  // the same picture: nothing is rendered
   EXPECT_THAT(machine.OnEncoded(At(200)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
   EXPECT_THAT(machine.OnAck(2, At(230)), IsEmpty());
   EXPECT_EQ(machine.wake_time(), std::nullopt);
@@ -38,48 +38,48 @@ TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
 
 TEST(ViewMachineTest, TheLatestViewWins) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
-  for (int seq = 2; seq <= 9; ++seq) EXPECT_THAT(machine.OnView(std::uint64_t(seq), At(seq)), IsEmpty());
+  machine.OnView(1, false, At(0));
+  for (int seq = 2; seq <= 9; ++seq) EXPECT_THAT(machine.OnView(std::uint64_t(seq), false, At(seq)), IsEmpty());
   EXPECT_THAT(machine.OnRendered(true, false, At(30)),
               ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 9, .coarseness = kFirstCoarseness}));
-  EXPECT_THAT(machine.OnView(9, At(31)), IsEmpty());  // not newer
+  EXPECT_THAT(machine.OnView(9, false, At(31)), IsEmpty());  // not newer
 }
 
 TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(30));
   machine.OnEncoded(At(31));
   machine.OnAck(1, At(40));
-  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
-  EXPECT_THAT(machine.OnView(2, At(160)),
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
+  EXPECT_THAT(machine.OnView(2, false, At(160)),
               ElementsAre(Is(Kind::kCancelEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = kFirstCoarseness}));
 }
 
 TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(30));
   machine.OnEncoded(At(31));
-  EXPECT_THAT(machine.OnView(2, At(40)), ElementsAre(Is(Kind::kRender)));  // no round trip is known yet
+  EXPECT_THAT(machine.OnView(2, false, At(40)), ElementsAre(Is(Kind::kRender)));  // no round trip is known yet
   EXPECT_THAT(machine.OnRendered(true, false, At(70)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(75)), IsEmpty());
-  EXPECT_THAT(machine.OnView(3, At(80)), IsEmpty());  // it would wait behind the second
-  EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());   // of no frame that was sent
+  EXPECT_THAT(machine.OnView(3, false, At(80)), IsEmpty());  // it would wait behind the second
+  EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());          // of no frame that was sent
   EXPECT_THAT(machine.OnAck(1, At(90)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
 }
 
 TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
   ViewMachine machine;
   machine.OnEcho(milliseconds(200), At(-500));
-  machine.OnView(1, At(-500));
+  machine.OnView(1, false, At(-500));
   machine.OnRendered(true, false, At(-499));
   machine.OnEncoded(At(-498));
   machine.OnAck(1, At(-288));  // 210 ms
-  machine.OnView(2, At(-280));
+  machine.OnView(2, false, At(-280));
   for (int seq = 2; seq <= 6; ++seq) {
     const int begin = 40 * seq - 320;
-    machine.OnView(std::uint64_t(seq) + 1, At(begin));
+    machine.OnView(std::uint64_t(seq) + 1, false, At(begin));
     const auto actions = machine.OnRendered(true, false, At(begin + 1));
     EXPECT_EQ(actions.front(), (ViewAction{.kind = Kind::kEncode, .quality = 92}));
     EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = std::uint64_t(seq) + 1, .coarseness = actions.back().coarseness}));
@@ -91,40 +91,40 @@ TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
 
 TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));  // the lossless picture is being encoded meanwhile
   EXPECT_EQ(machine.Quality(), 50);
   machine.OnTime(At(410));
-  const auto actions = machine.OnView(2, At(500));
+  const auto actions = machine.OnView(2, false, At(500));
   ASSERT_FALSE(actions.empty());
   EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 0.5, .coarseness = kFirstCoarseness / 2}));
   EXPECT_THAT(machine.OnRendered(true, false, At(510)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(511)), ElementsAre(Is(Kind::kSend)));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 1}));
-  EXPECT_THAT(machine.OnRendered(true, false, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnRendered(true, false, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
   EXPECT_THAT(machine.OnEncoded(At(670)), IsEmpty());
   EXPECT_THAT(machine.OnAck(2, At(900)), ElementsAre(Is(Kind::kSend)));
 }
 
 TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));
-  machine.OnView(2, At(500));
+  machine.OnView(2, false, At(500));
   machine.OnRendered(true, false, At(510));
   machine.OnEncoded(At(511));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(Is(Kind::kRender)));
-  EXPECT_THAT(machine.OnView(3, At(660)), testing::Contains(Is(Kind::kCancelRender)));
+  EXPECT_THAT(machine.OnView(3, false, At(660)), testing::Contains(Is(Kind::kCancelRender)));
 }
 
 TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAskedFor) {
   ViewMachine machine;
   const auto render = [](double coarseness) { return ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = coarseness}; };
-  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(render(4)));
+  EXPECT_THAT(machine.OnView(1, false, At(0)), ElementsAre(render(4)));
   EXPECT_THAT(machine.OnRendered(false, false, At(100)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   machine.OnEncoded(At(101));
   EXPECT_THAT(machine.OnAck(1, At(110)), IsEmpty());
@@ -133,26 +133,26 @@ TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAsk
   EXPECT_THAT(machine.OnRendered(false, false, At(400)), ElementsAre(Is(Kind::kEncode), render(1)));
   EXPECT_THAT(machine.OnEncoded(At(401)), ElementsAre(Is(Kind::kSend)));
   machine.OnAck(2, At(410));
-  EXPECT_THAT(machine.OnRendered(true, false, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnRendered(true, false, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
   EXPECT_THAT(machine.OnEncoded(At(950)), ElementsAre(Is(Kind::kSend)));
   EXPECT_EQ(machine.wake_time(), std::nullopt);
 }
 
 TEST(ViewMachineTest, WhatIsRenderedQuicklyIsAsAskedForAtOnce) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(false, false, At(10));
   machine.OnEncoded(At(11));
   machine.OnAck(1, At(20));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
   machine.OnRendered(true, false, At(160));
-  EXPECT_THAT(machine.OnView(2, At(170)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 2}));
+  EXPECT_THAT(machine.OnView(2, false, At(170)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 2}));
 }
 
 TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
-  machine.OnView(2, At(10));
+  machine.OnView(1, false, At(0));
+  machine.OnView(2, false, At(10));
   EXPECT_THAT(machine.OnRendered(false, false, At(300)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 8}));
   machine.OnEncoded(At(301));
   machine.OnAck(1, At(310));
@@ -161,15 +161,15 @@ TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
   machine.OnEncoded(At(601));
   machine.OnAck(2, At(610));
   // The finer picture is given up for a new view.
-  EXPECT_THAT(machine.OnView(3, At(620)), ElementsAre(ViewAction{.kind = Kind::kCancelRender},
-                                                      ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
+  EXPECT_THAT(machine.OnView(3, false, At(620)), ElementsAre(ViewAction{.kind = Kind::kCancelRender},
+                                                             ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
 }
 
 class SmallPictures : public testing::Test {
  protected:
   // Of the next view's picture, which takes so long.
   double ScaleOf(int begin, int ms, bool finest = true) {
-    const auto actions = machine.OnView(std::uint64_t(begin), At(begin));
+    const auto actions = machine.OnView(std::uint64_t(begin), false, At(begin));
     const ViewAction render = actions.back();
     EXPECT_EQ(render.kind, Kind::kRender);
     machine.OnRendered(finest, false, At(begin + ms));
@@ -207,19 +207,19 @@ TEST_F(SmallPictures, DoNotMoveWhereTheyTakeAsLong) {
 }
 
 TEST_F(SmallPictures, DoNotFollowFromReading) {
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnLoading(At(4950));
   machine.OnRendered(true, false, At(5000));
   machine.OnEncoded(At(5001));
   machine.OnAck(1, At(5002));
-  EXPECT_EQ(machine.OnView(2, At(6000)).back().scale, 1);
+  EXPECT_EQ(machine.OnView(2, false, At(6000)).back().scale, 1);
 }
 
 TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
   ViewMachine machine;
   std::uint64_t frames = 0;
   const auto rendered = [&](int begin, int ms) {  // the next view; returns what it rendered
-    const auto actions = machine.OnView(std::uint64_t(begin), At(begin));
+    const auto actions = machine.OnView(std::uint64_t(begin), false, At(begin));
     EXPECT_FALSE(actions.empty());
     const ViewAction render = actions.back();
     EXPECT_EQ(render.kind, Kind::kRender);
@@ -242,26 +242,26 @@ TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
 
 TEST(ViewMachineTest, PicturesWithoutShadowsAreNotDrawnTwice) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(80));
   machine.OnEncoded(At(81));
   machine.OnAck(1, At(90));
-  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
 }
 
 TEST(ViewMachineTest, ARefusedViewIsDoneWith) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   EXPECT_THAT(machine.OnRefused(At(1)), IsEmpty());
   EXPECT_EQ(machine.wake_time(), std::nullopt);
-  EXPECT_THAT(machine.OnView(2, At(2)), ElementsAre(Is(Kind::kRender)));
+  EXPECT_THAT(machine.OnView(2, false, At(2)), ElementsAre(Is(Kind::kRender)));
 }
 
 TEST(ViewMachineTest, WhenTheServiceIsBackTheViewIsRendered) {
   ViewMachine machine;
-  machine.OnView(1, At(0));
+  machine.OnView(1, false, At(0));
   EXPECT_THAT(machine.OnUnavailable(At(10)), IsEmpty());
-  EXPECT_THAT(machine.OnView(2, At(20)), IsEmpty());
+  EXPECT_THAT(machine.OnView(2, false, At(20)), IsEmpty());
   EXPECT_THAT(machine.OnServiceBack(At(30)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = kFirstCoarseness}));
   EXPECT_THAT(machine.OnServiceBack(At(31)), IsEmpty());
 }
@@ -311,7 +311,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
             ASSERT_FALSE(encodes);
             encodes = true;
             encoding_seq = rendered_seq;
-            encoding_final = action.final;
+            encoding_final = action.coding == PictureCoding::kLossless;
             if (encoding_final) {
               ASSERT_EQ(rendered_coarseness, 1);
             }
@@ -346,7 +346,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
       events.erase(events.begin());
       now = time;
       switch (event.kind) {
-        case Event::kView: apply(machine.OnView(event.number, now)); break;
+        case Event::kView: apply(machine.OnView(event.number, false, now)); break;
         case Event::kRendered:
           if (event.number != order || !renders) break;
           renders = false;

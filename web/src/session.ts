@@ -2,6 +2,7 @@
 import type { Api, Dataset, Options } from "./api";
 import type { Stream } from "./connection";
 import type { Vec3 } from "./vec";
+import { VideoPictures } from "./video";
 
 export interface Geometry {
   right: Vec3; up: Vec3; forward: Vec3; target: Vec3; target_depth: number; pixel_size: number;
@@ -14,7 +15,7 @@ export interface Statistics {
   stages_ms: Record<string, number>; plan: Record<string, string>; timeline?: Span[];
 }
 export interface FrameHeader {
-  frame: number; seq: number; final: boolean; type: string; size: [number, number]; scale: number; coarseness: number; bounds: [number, number, number, number];
+  frame: number; seq: number; final: boolean; type: string; key?: boolean; size: [number, number]; scale: number; coarseness: number; bounds: [number, number, number, number];
   background: [number, number, number, number]; geometry: Geometry; statistics: Statistics;
 }
 export interface WorkerStatus {
@@ -56,6 +57,7 @@ export class Session {
   private wanted: View | null = null;
   private sent = new Map<number, SentView>();
   private lastSent = "";
+  private video = new VideoPictures();
   private drawn: Promise<void> = Promise.resolve(); // when all pictures that have come are drawn
   private silentAt = 0; // when the connection counts as dead, if nothing comes until then
   private lookedAt = 0;
@@ -79,7 +81,7 @@ export class Session {
     const seq = ++this.seq;
     this.sent.set(seq, { ...view, seq, inputAt });
     if (this.sent.size > KEPT_VIEWS) this.sent.delete(this.sent.keys().next().value as number);
-    this.stream.send(JSON.stringify({ type: "view", seq, ...view }));
+    this.stream.send(JSON.stringify({ type: "view", seq, ...view, video: this.video.works }));
   }
 
   // The same view, of a dataset that has another time now.
@@ -97,6 +99,7 @@ export class Session {
     this.api.ended.removeEventListener("abort", this.end);
     this.stream?.close();
     this.stream = null;
+    this.video.close();
   };
 
   private readonly retryNow = (): void => {
@@ -129,6 +132,8 @@ export class Session {
   private connect(): void {
     this.events.connection?.("connecting", "");
     const stream = this.stream = this.api.connection.open();
+    this.video.close();
+    this.video = new VideoPictures();
     this.heard();
     stream.onopen = () => {
       if (this.stream !== stream) return;
@@ -144,7 +149,7 @@ export class Session {
       if (this.stream !== stream) return;
       this.heard();
       if (typeof data === "string") this.onText(data);
-      else this.drawn = this.onPicture(stream, data, this.drawn).catch(() => undefined);
+      else this.drawn = this.onPicture(stream, data, this.drawn);
     };
     stream.onclose = reason => this.lose(stream, reason);
   }
@@ -163,15 +168,23 @@ export class Session {
     const n = new DataView(message).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, n))) as FrameHeader;
     const view = this.sent.get(header.seq);
-    const empty = header.bounds[2] === 0;
-    // The pixels as they are: no profile of the screen's colours, which would change them.
-    const decoded = empty ? null : createImageBitmap(new Blob([new Uint8Array(message, 4 + n)], { type: header.type }), { colorSpaceConversion: "none" });
-    await before;
+    const decoded = this.decode(header, new Uint8Array(message, 4 + n)).catch(() => null);
+    await before.catch(() => undefined);
     const picture = await decoded;
     if (this.stream !== stream) return picture?.close();
+    if (header.type === "video/vp9" && !picture) this.again(); // and from now on without video
     for (const seq of this.sent.keys()) if (seq < header.seq) this.sent.delete(seq);
-    if (view) this.events.frame({ header, view, picture });
-    picture?.close();
-    if (stream.isOpen) stream.send(JSON.stringify({ type: "ack", frame: header.frame }));
+    try {
+      if (view && (picture || header.bounds[2] === 0)) this.events.frame({ header, view, picture });
+    } finally {
+      picture?.close();
+      if (stream.isOpen) stream.send(JSON.stringify({ type: "ack", frame: header.frame }));
+    }
+  }
+
+  private async decode(header: FrameHeader, data: Uint8Array): Promise<ImageBitmap | null> {
+    if (header.type === "video/vp9") return this.video.decode(data, header.key === true);
+    // The pixels as they are: no profile of the screen's colours, which would change them.
+    return header.bounds[2] === 0 ? null : createImageBitmap(new Blob([data], { type: header.type }), { colorSpaceConversion: "none" });
   }
 }
