@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <deque>
 #include <map>
+#include <utility>
 
 #include "tests/support/random.h"
 
@@ -87,6 +87,74 @@ TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
   }
   machine.OnAck(2, At(-28));
   EXPECT_EQ(machine.Quality(), 92);
+}
+
+// A page that is 100 ms away, to which a picture takes 60 ms more.
+class FarAndSlow : public testing::Test {
+ protected:
+  FarAndSlow() {
+    machine.OnEcho(milliseconds(100), At(-1000));
+    machine.OnView(1, true, At(-1000));
+    machine.OnRendered(true, false, At(-990));
+    machine.OnEncoded(At(-980));
+    machine.OnAck(1, At(-820));
+  }
+  ViewMachine machine;
+};
+
+TEST_F(FarAndSlow, PicturesThatMoveAreVideo) {
+  machine.OnView(2, true, At(0));
+  EXPECT_THAT(machine.OnRendered(true, false, At(10)),
+              ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kVideo, .quality = machine.Quality()}));
+  EXPECT_THAT(machine.OnEncoded(At(11)), ElementsAre(Is(Kind::kSend)));
+  machine.OnAck(2, At(130));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
+}
+
+TEST_F(FarAndSlow, APageWithoutVideoGetsJpeg) {
+  machine.OnView(2, false, At(0));
+  EXPECT_EQ(machine.OnRendered(true, false, At(10)).front().coding, PictureCoding::kJpeg);
+}
+
+TEST_F(FarAndSlow, AfterAWhileItIsTriedWithoutVideo) {
+  machine.OnView(2, true, At(19500));
+  EXPECT_EQ(machine.OnRendered(true, false, At(19510)).front().coding, PictureCoding::kJpeg);
+}
+
+TEST_F(FarAndSlow, AllVideoThatIsEncodedIsSent) {
+  std::uint64_t encoded = 0, sent = 1;
+  int now = 0;
+  bool encodes = false;
+  const auto apply = [&](const ViewMachine::Actions& actions) {
+    for (const ViewAction& action : actions) {
+      if (action.kind == Kind::kEncode) {
+        ASSERT_EQ(action.coding, PictureCoding::kVideo);
+        ASSERT_EQ(encoded + 1, sent) << "the one before is lost";
+        ++encoded;
+        encodes = true;
+      }
+      if (action.kind == Kind::kSend) sent = action.frame;
+    }
+  };
+  for (std::uint64_t seq = 2; seq < 100; ++seq) {  // the page acknowledges nothing for long
+    apply(machine.OnView(seq, true, At(now += 10)));
+    apply(machine.OnRendered(true, false, At(now += 10)));
+    if (std::exchange(encodes, false)) apply(machine.OnEncoded(At(++now)));
+    if (seq % 10 == 0 && sent > 1) apply(machine.OnAck(sent, At(++now)));
+    if (machine.wake_time() && *machine.wake_time() <= At(now)) apply(machine.OnTime(At(now)));
+  }
+  EXPECT_GT(encoded, 10);
+}
+
+TEST(ViewMachineTest, NearByASlowPageGetsJpeg) {
+  ViewMachine machine;
+  machine.OnEcho(milliseconds(1), At(0));
+  machine.OnView(1, true, At(0));
+  machine.OnRendered(true, false, At(10));
+  machine.OnEncoded(At(10));
+  machine.OnAck(1, At(110));
+  machine.OnView(2, true, At(400));
+  EXPECT_EQ(machine.OnRendered(true, false, At(410)).front().coding, PictureCoding::kJpeg);
 }
 
 TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) {

@@ -24,6 +24,7 @@ from page import png_pixels  # noqa: E402
 import browser  # noqa: E402
 from browser import Viewer  # noqa: E402
 from proxy import Proxy  # noqa: E402
+from slow_link import SlowLink  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
@@ -1566,6 +1567,25 @@ class PageTest(unittest.TestCase):
             viewer.drag(20, 3, steps=2)
         drawn = self.assertFinal(viewer, "Math.abs(o.azimuth - 84) < 0.01")
         self.assertGreater(drawn["header"]["statistics"]["round_trip_ms"], 150)
+
+    def test_far_away_what_moves_is_video(self):
+        link = SlowLink(self.gateway.port, round_trip_ms=100, megabits=2)
+        self.addCleanup(link.close)
+        viewer = self.viewer(link.port)
+        viewer.settled()
+        self.assertTrue(viewer.js("'VideoDecoder' in window"))
+        viewer.js("""(() => { const canvas = document.querySelector('canvas'); window.moving = [];
+            canvas.addEventListener('slabstream:drawn', e => { const { header } = e.detail, { width, height } = canvas;
+                const codes = canvas.getContext('2d').getImageData(0, 0, width, height).data;
+                if (!header.final) window.last = { type: header.type, codes, seq: header.seq }, window.moving.push(header.type);
+                else if (window.last) { const sums = [0, 0, 0]; let far = 0;
+                    for (let i = 0; i < codes.length; i++) if (i % 4 < 3) { const d = codes[i] - last.codes[i]; sums[i % 4] += d; far += Math.abs(d); }
+                    window.compared = { type: last.type, seq: last.seq, final: header.seq, bias: sums.map(s => 4 * s / codes.length), far: 4 / 3 * far / codes.length }; } }); })()""")
+        for _ in range(6):
+            viewer.drag(20, 3, steps=4)
+        compared = viewer.until("(() => { const c = window.compared; return c && c.type === 'video/vp9' && c.seq === c.final ? c : null; })()")
+        self.assertLess(max(abs(bias) for bias in compared["bias"]), 2, f"the colours are others: {compared}")
+        self.assertLess(compared["far"], 4, f"the picture is another: {compared}")
 
     def test_it_connects_again(self):
         proxy = self.proxy()

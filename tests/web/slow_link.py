@@ -15,6 +15,9 @@ class SlowLink:
         threading.Thread(target=self._run, daemon=True).start()
         self.ready.wait()
 
+    def close(self):
+        self.loop.call_soon_threadsafe(self.loop.stop)
+
     def _run(self):
         asyncio.set_event_loop(self.loop)
         server = self.loop.run_until_complete(asyncio.start_server(self._connected, "127.0.0.1", 0))
