@@ -16,27 +16,28 @@ namespace {
 constexpr unsigned kQuality = 20;
 constexpr int kSpeed = 8;  // [0, 9] of encoding in real time
 
-// Two rows of RGBA codes as luma, and as chroma of 2 x 2 pixels (ITU-R BT.709-6, full range), in fixed point. The last column of an odd
-// width counts twice.
+// Two rows of RGBA codes as luma, and as chroma of 2 x 2 pixels, in fixed point: ITU-R BT.709-6 with codes of 16 to 235 and 16 to 240,
+// since browsers take all video for such. The last column of an odd width counts twice.
 void TwoRows(const std::uint8_t* upper, const std::uint8_t* lower, int width, std::uint8_t* luma0, std::uint8_t* luma1, std::uint8_t* blue,
              std::uint8_t* red) {
-  constexpr int kR = 13933, kG = 46871, kB = 4732;  // of 2^16: 0.2126, 0.7152, 0.0722
-  const auto luma = [](const std::uint8_t* p) { return std::uint8_t((kR * p[0] + kG * p[1] + kB * p[2] + (1 << 15)) >> 16); };
+  constexpr int kR = 11966, kG = 40254, kB = 4064;  // of 2^16: 0.2126, 0.7152 and 0.0722, times 219 / 255
+  const auto weighted = [](int r, int g, int b) { return kR * r + kG * g + kB * b; };
+  const auto luma = [&](const std::uint8_t* p) { return std::uint8_t(16 + ((weighted(p[0], p[1], p[2]) + (1 << 15)) >> 16)); };
   for (int x = 0; x < width; ++x) luma0[x] = luma(upper + 4 * x);
   for (int x = 0; x < width; ++x) luma1[x] = luma(lower + 4 * x);
-  constexpr int kBlue = 35318, kRed = 41614;  // of 2^16: 1 / 1.8556, 1 / 1.5748
+  constexpr int kWhole = 56284, kBlue = 36124, kRed = 42564;  // of 2^16: 219 / 255; 224 / 219 over 1.8556 and 1.5748
   for (int x = 0; x < width; x += 2) {
     const int left = 4 * x, right = 4 * std::min(x + 1, width - 1);
     const auto sum = [&](int channel) {
       return upper[left + channel] + upper[right + channel] + lower[left + channel] + lower[right + channel];
     };
-    const int r = sum(0), g = sum(1), b = sum(2);
-    const int y = (kR * r + kG * g + kB * b) >> 16;  // four times the mean luma
-    const auto code = [](int difference, int factor) {
-      return std::uint8_t(std::clamp(128 + ((difference * factor + (1 << 17)) >> 18), 0, 255));
+    const int r = sum(0), g = sum(1), b = sum(2), y = weighted(r, g, b);
+    const auto code = [&](int channel, int factor) {  // the sum is that of four pixels
+      const int difference = (kWhole * channel - y + (1 << 9)) >> 10;
+      return std::uint8_t(128 + ((difference * (factor >> 4) + (1 << 19)) >> 20));
     };
-    blue[x / 2] = code(b - y, kBlue);
-    red[x / 2] = code(r - y, kRed);
+    blue[x / 2] = code(b, kBlue);
+    red[x / 2] = code(r, kRed);
   }
 }
 
@@ -52,10 +53,10 @@ struct VideoEncoder::Stream {
     config.kf_mode = VPX_KF_DISABLED;
     config.rc_end_usage = VPX_Q;
     ok = vpx_codec_enc_init(&codec, vpx_codec_vp9_cx(), &config, 0) == VPX_CODEC_OK && Set(VP8E_SET_CPUUSED, kSpeed) &&
-         Set(VP8E_SET_CQ_LEVEL, kQuality) && Set(VP9E_SET_COLOR_SPACE, VPX_CS_BT_709) && Set(VP9E_SET_COLOR_RANGE, VPX_CR_FULL_RANGE) &&
+         Set(VP8E_SET_CQ_LEVEL, kQuality) && Set(VP9E_SET_COLOR_SPACE, VPX_CS_BT_709) && Set(VP9E_SET_COLOR_RANGE, VPX_CR_STUDIO_RANGE) &&
          vpx_img_alloc(&image, VPX_IMG_FMT_I420, config.g_w, config.g_h, 32) != nullptr;
     image.cs = VPX_CS_BT_709;
-    image.range = VPX_CR_FULL_RANGE;
+    image.range = VPX_CR_STUDIO_RANGE;
   }
   ~Stream() {
     if (image.img_data != nullptr) vpx_img_free(&image);

@@ -1,4 +1,4 @@
-// VideoEncoder: the pictures of a view that moves as video: VP9 (profile 0, 4:2:0, BT.709, full range), one chunk a picture, of constant
+// VideoEncoder: the pictures of a view that moves as video: VP9 (profile 0, 4:2:0, BT.709), one chunk a picture, of constant
 // quality. A chunk says what differs from the picture before, so a page needs all of them, in order. One thread at a time.
 #pragma once
 

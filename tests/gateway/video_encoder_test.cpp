@@ -47,14 +47,15 @@ class Decoder {
     const vpx_image_t* image = vpx_codec_get_frame(&codec_, &next);
     if (image == nullptr || int(image->d_w) != picture.size().width || int(image->d_h) != picture.size().height) return 1e9;
     EXPECT_EQ(image->cs, VPX_CS_BT_709);
-    EXPECT_EQ(image->range, VPX_CR_FULL_RANGE);
+    EXPECT_EQ(image->range, VPX_CR_STUDIO_RANGE);
     const auto at = [&](int plane, int x, int y) { return double(image->planes[plane][y * image->stride[plane] + x]); };
     std::vector<std::uint8_t> row(4 * std::size_t(picture.size().width));
     double squares = 0;
     for (int y = 0; y < picture.size().height; ++y) {
       picture.OpaqueRow(y, row);
       for (int x = 0; x < picture.size().width; ++x) {
-        const double luma = at(VPX_PLANE_Y, x, y), blue = at(VPX_PLANE_U, x / 2, y / 2) - 128, red = at(VPX_PLANE_V, x / 2, y / 2) - 128;
+        const double luma = (at(VPX_PLANE_Y, x, y) - 16) * 255 / 219;
+        const double blue = (at(VPX_PLANE_U, x / 2, y / 2) - 128) * 255 / 224, red = (at(VPX_PLANE_V, x / 2, y / 2) - 128) * 255 / 224;
         const double r = luma + 1.5748 * red, b = luma + 1.8556 * blue, g = (luma - 0.2126 * r - 0.0722 * b) / 0.7152;
         const std::uint8_t* codes = row.data() + 4 * x;
         for (const auto& [is, was] : {std::pair(r, codes[0]), std::pair(g, codes[1]), std::pair(b, codes[2])}) {

@@ -10,21 +10,22 @@ class SlowLink:
     def __init__(self, port, round_trip_ms, megabits):
         self.delay, self.rate = round_trip_ms / 2000, megabits * 1e6 / 8
         self.target = port
-        self.loop = asyncio.new_event_loop()
         self.ready = threading.Event()
-        threading.Thread(target=self._run, daemon=True).start()
+        self.thread = threading.Thread(target=lambda: asyncio.run(self._run()), daemon=True)
+        self.thread.start()
         self.ready.wait()
 
     def close(self):
-        self.loop.call_soon_threadsafe(self.loop.stop)
+        self.loop.call_soon_threadsafe(self.over.set)
+        self.thread.join()
 
-    def _run(self):
-        asyncio.set_event_loop(self.loop)
-        server = self.loop.run_until_complete(asyncio.start_server(self._connected, "127.0.0.1", 0))
-        self.port = server.sockets[0].getsockname()[1]
+    async def _run(self):
+        self.loop, self.over = asyncio.get_running_loop(), asyncio.Event()
         self.free = {"up": 0.0, "down": 0.0}  # when the link of this direction is free again: all connections share it
-        self.ready.set()
-        self.loop.run_forever()
+        async with await asyncio.start_server(self._connected, "127.0.0.1", 0) as server:
+            self.port = server.sockets[0].getsockname()[1]
+            self.ready.set()
+            await self.over.wait()
 
     async def _connected(self, reader, writer):
         try:
