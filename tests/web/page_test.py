@@ -1587,6 +1587,27 @@ class PageTest(unittest.TestCase):
         self.assertLess(max(abs(bias) for bias in compared["bias"]), 2, f"the colours are others: {compared}")
         self.assertLess(compared["far"], 4, f"the picture is another: {compared}")
 
+    def test_far_away_zooming_and_moving_follow_at_once(self):
+        link = SlowLink(self.gateway.port, round_trip_ms=400, megabits=100)
+        self.addCleanup(link.close)
+        viewer = self.viewer(link.port)
+        viewer.settled()
+        # What a view looks like in the task in which it is wanted, and once the service has drawn it.
+        viewer.js("""(() => { const canvas = document.querySelector('canvas'), codes = () => canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+            const far = (a, b) => { let sum = 0; for (let i = 0; i < a.length; i++) sum += Math.abs(a[i] - b[i]); return 4 / 3 * sum / a.length; };
+            window.wanted = (name, step) => { const before = codes(); window[name] = null; step();
+                requestAnimationFrame(() => requestAnimationFrame(() => { const soon = codes();
+                    canvas.addEventListener('slabstream:drawn', function drawn(e) { if (!e.detail.final) return; canvas.removeEventListener('slabstream:drawn', drawn);
+                        window[name] = { moved: far(before, codes()), soon: far(soon, codes()) }; }); })); };
+            window.at = (type, more) => { const box = canvas.getBoundingClientRect(); canvas.dispatchEvent(new (type === 'wheel' ? WheelEvent : PointerEvent)(type, { bubbles: true, pointerId: 1, button: 0, clientX: box.left + 0.6 * box.width + (more.dx || 0), clientY: box.top + 0.4 * box.height + (more.dy || 0), ...more })); };
+            canvas.setPointerCapture = () => {}; })()""")
+        drag = lambda **keys: f"() => {{ at('pointerdown', {json.dumps(keys)}); at('pointermove', {json.dumps({'dx': 40, 'dy': 25, **keys})}); at('pointerup', {json.dumps({'dx': 40, 'dy': 25, **keys})}); }}"
+        for name, step in (("zooming", "() => at('wheel', { deltaY: -200 })"), ("moving", drag(shiftKey=True)), ("rolling", drag(ctrlKey=True))):
+            viewer.js(f"wanted('{name}', {step})")
+            seen = viewer.until(f"window.{name}")
+            self.assertGreater(seen["moved"], 3, f"{name}: {seen}")
+            self.assertLess(seen["soon"], seen["moved"] / 5, f"{name}: {seen}")
+
     def test_it_connects_again(self):
         proxy = self.proxy()
         viewer = self.viewer(proxy.port)

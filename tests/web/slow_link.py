@@ -21,19 +21,28 @@ class SlowLink:
 
     async def _run(self):
         self.loop, self.over = asyncio.get_running_loop(), asyncio.Event()
+        self.connections = set()
         self.free = {"up": 0.0, "down": 0.0}  # when the link of this direction is free again: all connections share it
         async with await asyncio.start_server(self._connected, "127.0.0.1", 0) as server:
             self.port = server.sockets[0].getsockname()[1]
             self.ready.set()
             await self.over.wait()
+        for connection in self.connections:
+            connection.cancel()
+        await asyncio.gather(*self.connections, return_exceptions=True)
 
     async def _connected(self, reader, writer):
+        self.connections.add(asyncio.current_task())
+        down = None
         try:
             up, down = await asyncio.open_connection("127.0.0.1", self.target)
+            await asyncio.gather(self._carry(reader, down, "up"), self._carry(up, writer, "down"))
         except OSError:
-            writer.close()
-            return
-        await asyncio.gather(self._carry(reader, down, "up"), self._carry(up, writer, "down"))
+            pass
+        finally:
+            for end in filter(None, (writer, down)):
+                end.close()
+            self.connections.discard(asyncio.current_task())
 
     async def _carry(self, reader, writer, direction):
         under_way = asyncio.Queue()
@@ -55,18 +64,20 @@ class SlowLink:
                     break
             writer.close()
 
-        delivery = asyncio.ensure_future(deliver())
-        while True:
-            try:
-                piece = await reader.read(1 << 14)
-            except OSError:
-                piece = b""
-            self.free[direction] = max(self.free[direction], self.loop.time()) + len(piece) / self.rate
-            under_way.put_nowait((self.free[direction] + self.delay, piece))
-            held += len(piece)
-            if not piece:
-                break
-            while held > WINDOW:
-                room.clear()
-                await room.wait()
-        await delivery
+        async def take():
+            nonlocal held
+            while True:
+                try:
+                    piece = await reader.read(1 << 14)
+                except OSError:
+                    piece = b""
+                self.free[direction] = max(self.free[direction], self.loop.time()) + len(piece) / self.rate
+                under_way.put_nowait((self.free[direction] + self.delay, piece))
+                held += len(piece)
+                if not piece:
+                    break
+                while held > WINDOW:
+                    room.clear()
+                    await room.wait()
+
+        await asyncio.gather(take(), deliver())

@@ -1,4 +1,5 @@
 // The view: where one stands, by the definitions of docs/rendering.md, and how gestures move it.
+import type { Options } from "./api";
 import type { Geometry } from "./session";
 import { add, clamp, dot, length, rounded, roundedPoint, scale, sub, type Vec3 } from "./vec";
 
@@ -87,4 +88,14 @@ export function project(geometry: Geometry, width: number, height: number, p: Ve
 export function unproject(geometry: Geometry, width: number, height: number, x: number, y: number): Vec3 {
   const pixel = geometry.pixel_size;
   return add(geometry.target, add(scale(geometry.right, (x - width / 2) * pixel), scale(geometry.up, (height / 2 - y) * pixel)));
+}
+
+// How a picture lies in that of a later view: magnified by `zoom` and turned clockwise by `roll`, in radians, about the picture's centre, where its
+// pixel (x, y) is then. Other differences of the views do not move a picture in its plane. null: they are not of the same thing.
+export interface Placing { x: number; y: number; zoom: number; roll: number }
+export function placing(geometry: Geometry, width: number, height: number, was: Options, is: Options): Placing | null {
+  if (["dataset", "projection", "fit", "size"].some(name => was[name] !== is[name])) return null;
+  const at = is["look-at"], point = typeof at === "string" ? (at.split(",").map(Number) as unknown as Vec3) : geometry.target;
+  const [x, y] = project(geometry, width, height, point);
+  return { x, y, zoom: Number(is["zoom"]) / Number(was["zoom"]), roll: (Number(is["roll"]) - Number(was["roll"])) * DEGREE };
 }

@@ -1,6 +1,7 @@
 // A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
 import { Drawing } from "./annotations";
 import type { Api } from "./api";
+import { type Placing, placing } from "./camera";
 import { h, put } from "./dom";
 import { LevelBadge } from "./level_badge";
 import { type Frame, Session, type SessionEvents, type View } from "./session";
@@ -12,6 +13,7 @@ export interface PaneEvents extends Omit<SessionEvents, "frame"> {
 }
 
 const LEAST_SIDE = 16, MOST_SIDE = 8192;
+const FAR_MS = 50;
 
 export class Pane {
   readonly canvas = h("canvas", { width: LEAST_SIDE, height: LEAST_SIDE });
@@ -23,6 +25,9 @@ export class Pane {
   private readonly session: Session;
   private readonly watcher: ResizeObserver;
   private size: [number, number] = [0, 0]; // pixels of the screen
+  private wanted: View | null = null;
+  private placed: Placing | null = null; // where the last picture is, unless it is where it was drawn
+  private readonly last = document.createElement("canvas"); // the last picture, where the next one takes a while; else empty
   private exact: [number, number] | null = null; // the same as the browser rounds it, where it tells
 
   constructor(name: string, label: string, api: Api, private readonly events: PaneEvents) {
@@ -44,7 +49,10 @@ export class Pane {
 
   // The view without its size, which is the pane's.
   show(view: View, inputAt?: number): void {
-    if (this.isVisible) this.session.show({ ...view, options: { ...view.options, size: this.size.join("x") } }, inputAt);
+    if (!this.isVisible) return;
+    this.wanted = { ...view, options: { ...view.options, size: this.size.join("x") } };
+    this.session.show(this.wanted, inputAt);
+    this.place();
   }
 
   again(): void { if (this.isVisible) this.session.again(); }
@@ -81,9 +89,17 @@ export class Pane {
     const [r, g, b] = header.background.map(c => Math.round(c * 255));
     this.element.style.background = this.context.fillStyle = `rgb(${r} ${g} ${b})`;
     this.context.fillRect(0, 0, width, height);
+    const paint = (onto: CanvasRenderingContext2D): void => {
+      if (picture) onto.drawImage(picture, x * across, y * down, w * across, h * down);
+    };
     const across = width / header.size[0], down = height / header.size[1], [x, y, w, h] = header.bounds;
-    if (picture) this.context.drawImage(picture, x * across, y * down, w * across, h * down);
+    paint(this.context);
+    const far = header.statistics.round_trip_ms > FAR_MS;
+    this.last.width = far ? width : 0; // which also clears it
+    this.last.height = far ? height : 0;
+    if (far) paint(this.last.getContext("2d") as CanvasRenderingContext2D);
     this.markOld();
+    this.placed = null;
     this.shown = { frame, cssWidth: width / devicePixelRatio, cssHeight: height / devicePixelRatio };
     this.events.drawn?.(this.shown);
     // For whoever embeds or measures the page.
@@ -91,5 +107,33 @@ export class Pane {
       bubbles: true, composed: true,
       detail: { pane: this.element.dataset["pane"], header, seq: header.seq, final: header.final, options: frame.view.options, inputAt: frame.view.inputAt, drawnAt: performance.now() },
     }));
+    this.place();
+  }
+
+  // The pixel of the picture that is seen at a pixel of the page.
+  under(x: number, y: number): [number, number] {
+    if (!this.placed) return [x, y];
+    const { placed, canvas } = this, cos = Math.cos(placed.roll) / placed.zoom, sin = Math.sin(placed.roll) / placed.zoom;
+    const across = x * devicePixelRatio - canvas.width / 2, down = y * devicePixelRatio - canvas.height / 2;
+    return [(placed.x + across * cos + down * sin) / devicePixelRatio, (placed.y + down * cos - across * sin) / devicePixelRatio];
+  }
+
+  // Until the picture of the wanted view is there, the last one is drawn where it lies in that: moving, zooming and rolling follow the hand at once,
+  // however far the service is. What turns has to wait.
+  private place(): void {
+    const { wanted, shown, canvas, context } = this;
+    if (!wanted || !shown || this.last.width === 0 || wanted.picture !== "render") return;
+    const { header, view } = shown.frame, geometry = { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / canvas.width };
+    const at = placing(geometry, canvas.width, canvas.height, view.options, wanted.options);
+    if (!at) return;
+    const same = at.zoom === 1 && at.roll === 0 && Math.hypot(at.x - canvas.width / 2, at.y - canvas.height / 2) < 0.01;
+    if (same && !this.placed) return;
+    this.placed = same ? null : at;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.translate(canvas.width / 2, canvas.height / 2);
+    context.rotate(at.roll);
+    context.scale(at.zoom, at.zoom);
+    context.drawImage(this.last, -at.x, -at.y);
+    context.resetTransform();
   }
 }

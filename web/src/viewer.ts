@@ -48,7 +48,7 @@ export class Viewer {
       pixelSize: () => this.pixelSize(),
       move: (patch, at) => this.move(patch, at),
       window: (widen, raise, at) => this.window(widen, raise, at),
-      hover: (x, y) => pointed.atPixel(this.pane.shown, x, y, at => measuring.hover(at)),
+      hover: (x, y) => pointed.atPixel(this.pane.shown, ...this.pane.under(x, y), at => measuring.hover(at)),
       leave: () => pointed.clear(),
       place: (x, y) => { if (!measuring.tool) void this.place(x, y, crosshair => context.store.update({ crosshair, layout: "quad" })); },
       click: (x, y) => { if (measuring.tool) void this.place(x, y, at => measuring.place(at)); else this.tell(x, y); },
@@ -143,13 +143,13 @@ export class Viewer {
   // Who embeds the viewer hears what was clicked at.
   private tell(x: number, y: number): void {
     const { picked } = this.context;
-    if (picked && this.pane.shown) this.pointed.pick(this.pane.shown, x, y).then(value => { if (value) picked(value); }).catch(() => undefined);
+    if (picked && this.pane.shown) this.pointed.pick(this.pane.shown, ...this.pane.under(x, y)).then(value => { if (value) picked(value); }).catch(() => undefined);
   }
 
   // Uses the point that a pixel shows.
   private async place(x: number, y: number, use: (at: Vec3) => void): Promise<void> {
     if (!this.pane.shown) return;
-    const value = await this.pointed.pick(this.pane.shown, x, y).catch(() => null);
+    const value = await this.pointed.pick(this.pane.shown, ...this.pane.under(x, y)).catch(() => null);
     if (value?.at && value.hit !== false) use(roundedPoint(value.at));
     else if (this.measuring.tool) this.context.say("Nothing shows there.");
   }
