@@ -28,13 +28,15 @@ Duration PageLink::delay() const {
 
 void PageLink::OnSent(std::uint64_t frame, bool counts, Time now) { under_way_.push_back({frame, counts, now}); }
 
-bool PageLink::OnAck(std::uint64_t frame, Time now) {
+bool PageLink::OnAck(std::uint64_t frame, Duration in_page, Time now) {
   const auto sent = std::ranges::find(under_way_, frame, &Sent::frame);
   if (sent == under_way_.end()) return false;
   const Time done = now - delay();
   last_ = now - sent->at;
   if (sent->counts) {
-    picture_time_ = Smoothed(picture_time_, std::max(done - std::max(sent->at, free_since_), Duration(1)));
+    const Duration time = std::max(done - std::max(sent->at, free_since_), Duration(1));
+    picture_time_ = Smoothed(picture_time_, time);
+    connection_time_ = Smoothed(connection_time_, std::max(time - in_page, Duration(1)));
     round_trip_ = Smoothed(round_trip_, std::max(last_, Duration(1)));
   }
   free_since_ = std::max(free_since_, done);

@@ -3,7 +3,8 @@
 //
 // A picture's round trip has two parts. The delay is what an empty message takes there and back, however fast the connection is: while it
 // passes, more pictures can be sent. The rest is the picture's own time, on the connection and in the page: only when it is over, the next
-// picture gets there. Far away the delay is long and pictures are quick; on a slow connection it is the other way round.
+// picture gets there. Far away the delay is long and pictures are quick; on a slow connection it is the other way round. Of its time in the
+// page, the page itself tells.
 #pragma once
 
 #include <array>
@@ -21,16 +22,17 @@ class PageLink {
   void OnEcho(Duration round_trip, Time now);
   // `frame` rises. Lossless pictures, which are larger, say nothing about the others' time: they do not count.
   void OnSent(std::uint64_t frame, bool counts, Time now);
-  // The page has drawn `frame` and all before it. false: it is not under way.
-  bool OnAck(std::uint64_t frame, Time now);
+  // The page has drawn `frame` and all before it, and took the time `in_page` for it. false: it is not under way.
+  bool OnAck(std::uint64_t frame, Duration in_page, Time now);
 
   // Whether the page should acknowledge a picture before the next one is sent: as many are under way as leave one every 25 ms, or as many
   // as the way takes if it is slower. So there is one, if the delay is below 25 ms.
   bool is_full() const { return under_way_.size() >= most_under_way(); }
   // When the next picture can get through at once; passed, if it can now.
   Time ready() const;
-  Duration picture_time() const { return picture_time_; }  // smoothed; 0: not measured yet
-  Duration round_trip() const { return round_trip_; }      // smoothed; 0: not measured yet
+  Duration connection_time() const { return connection_time_; }  // of a picture's time, without the page's; smoothed, 0: not measured yet
+  Duration picture_time() const { return picture_time_; }        // smoothed; 0: not measured yet
+  Duration round_trip() const { return round_trip_; }            // smoothed; 0: not measured yet
   Duration last_round_trip() const { return last_; }
   Duration delay() const;
 
@@ -46,7 +48,7 @@ class PageLink {
   std::array<Duration, 2> least_{};  // delays of this period and of the one before; 0: none
   Time period_since_{};
   Time free_since_{};  // the way was done with the last acknowledged picture
-  Duration picture_time_{}, round_trip_{}, last_{};
+  Duration connection_time_{}, picture_time_{}, round_trip_{}, last_{};
 };
 
 }  // namespace slabstream

@@ -12,6 +12,8 @@
 namespace slabstream {
 namespace {
 
+constexpr double kMostPageMs = 1e9;
+
 std::uint64_t Sequence(const JsonValue& value) { return std::uint64_t(value.Number({1, double(kMaxSequence)})); }
 
 }  // namespace
@@ -31,7 +33,11 @@ Result<PageMessage> ParsePageMessage(std::string_view text) {
   const auto ignore = [](const JsonValue&) {};
   if (type == 1) {
     AckMessage ack;
-    value.Fields({{"type", ignore}, {"frame", [&](const JsonValue& v) { ack.frame = Sequence(v); }}});
+    value.Fields({{"type", ignore},
+                  {"frame", [&](const JsonValue& v) { ack.frame = Sequence(v); }},
+                  {"page_ms", [&](const JsonValue& v) {
+                     ack.in_page = Duration(std::int64_t(1e6 * v.Number({0, kMostPageMs})));
+                   }}});
     (void)value.At("frame");
     if (mistake) return Status::InvalidArgument(Printable(*mistake));
     return PageMessage(ack);

@@ -7,6 +7,7 @@
 
 #include "client/request/picture_fields.h"
 #include "common/base/status.h"
+#include "common/base/time.h"
 
 namespace slabstream {
 
@@ -27,6 +28,7 @@ struct ViewMessage {
 // A picture is drawn.
 struct AckMessage {
   std::uint64_t frame = 0;
+  Duration in_page{};  // what the page took to draw it; 0: it does not tell
 };
 
 // The answer to a ping.

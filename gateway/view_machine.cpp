@@ -8,12 +8,12 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Quality of JPEG falls with the time that a picture takes to the page: at these and beyond it stays.
+// Quality of JPEG falls with the time that a picture takes on the connection: at these and beyond it stays.
 constexpr Duration kQuick = milliseconds(30), kSlow = milliseconds(200);
 constexpr int kBestQuality = 92, kLeastQuality = 50;
 // Pictures become small above the first, and large again below the second, which small ones would else lead to at once.
 constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(50);
-// Pictures become video above the first, where the delay is at least the second: nearer by, a page that is slow has no time to spare. After
+// Pictures become video above the first, where the delay is at least the second: nearer by, nothing is gained. After
 // a while it is tried without.
 constexpr Duration kVideoAbove = milliseconds(40), kFar = milliseconds(10), kVideoFor = std::chrono::seconds(20);
 // Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
@@ -33,7 +33,7 @@ Duration Smoothed(Duration before, Duration sample) { return before == Duration:
 }  // namespace
 
 int ViewMachine::Quality() const {
-  const double share = double((std::clamp(link_.picture_time(), kQuick, kSlow) - kQuick).count()) / double((kSlow - kQuick).count());
+  const double share = double((std::clamp(link_.connection_time(), kQuick, kSlow) - kQuick).count()) / double((kSlow - kQuick).count());
   return kBestQuality - int(share * (kBestQuality - kLeastQuality));
 }
 
@@ -119,9 +119,9 @@ ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
   return Next(now);
 }
 
-ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Time now) {
-  if (!link_.OnAck(frame, now)) return {};
-  if (link_.picture_time() > kVideoAbove && link_.delay() >= kFar) video_until_ = now + kVideoFor;
+ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Duration in_page, Time now) {
+  if (!link_.OnAck(frame, in_page, now)) return {};
+  if (link_.connection_time() > kVideoAbove && link_.delay() >= kFar) video_until_ = now + kVideoFor;
   if (link_.picture_time() > kSmallAbove) small_ = true;
   if (link_.picture_time() < kLargeBelow) small_ = false;
   return Next(now);

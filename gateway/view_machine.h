@@ -64,15 +64,15 @@ class ViewMachine {
   Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
   Actions OnServiceBack(Time now);
   Actions OnEncoded(Time now);
-  Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
-  Actions OnAck(std::uint64_t frame, Time now);
+  Actions OnEncodeFailed(Time now);                                              // there is no picture to send; the view is done with
+  Actions OnAck(std::uint64_t frame, Duration in_page, Time now);                // as PageLink's
   void OnEcho(Duration round_trip, Time now) { link_.OnEcho(round_trip, now); }  // as PageLink's
   Actions OnTime(Time now);                                                      // at wake_time()
 
   // When OnTime is due; nullopt: nothing waits for a time.
   std::optional<Time> wake_time() const { return wake_; }
   const PageLink& link() const { return link_; }
-  // The JPEG quality of a moving picture, by the time that pictures take to the page.
+  // The JPEG quality of a moving picture, by the time that pictures take on the connection.
   int Quality() const;
 
  private:

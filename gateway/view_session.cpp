@@ -98,7 +98,8 @@ void ViewSession::OnText(std::string_view text) {
     if (pong->ping == pings_) machine_.OnEcho(MonotonicNow() - pinged_at_, MonotonicNow());
     return;
   }
-  const ViewMachine::Actions actions = machine_.OnAck(std::get<AckMessage>(*message).frame, MonotonicNow());
+  const auto& ack = std::get<AckMessage>(*message);
+  const ViewMachine::Actions actions = machine_.OnAck(ack.frame, ack.in_page, MonotonicNow());
   around_.metrics.CountRoundTrip(machine_.link().last_round_trip());
   Do(actions);
 }

@@ -30,7 +30,7 @@ struct Way {
       if (now % 1000 == 0) link.OnEcho(std::max<Duration>(milliseconds(delay), Duration(1)), Clock(now));
       while (!acks.empty() && acks.front().first <= now) {
         longest = std::max(longest, now - acks.front().second);
-        EXPECT_TRUE(link.OnAck(std::uint64_t(sent) - acks.size() + 1, Clock(now)));
+        EXPECT_TRUE(link.OnAck(std::uint64_t(sent) - acks.size() + 1, {}, Clock(now)));
         acks.pop_front();
       }
       if (now < next || link.is_full() || link.ready() > Clock(now)) continue;
@@ -41,7 +41,7 @@ struct Way {
       next = now + pace;
     }
     while (!acks.empty()) {
-      link.OnAck(std::uint64_t(sent) - acks.size() + 1, Clock(std::max(until, acks.front().first)));
+      link.OnAck(std::uint64_t(sent) - acks.size() + 1, {}, Clock(std::max(until, acks.front().first)));
       acks.pop_front();
     }
   }
@@ -59,8 +59,20 @@ TEST(PageLink, WithoutEchoesItIsAllThePicturesTime) {
   PageLink link;
   link.OnSent(1, true, Clock(0));
   EXPECT_TRUE(link.is_full());
-  EXPECT_TRUE(link.OnAck(1, Clock(120)));
+  EXPECT_TRUE(link.OnAck(1, {}, Clock(120)));
   EXPECT_EQ(link.picture_time(), milliseconds(120));
+}
+
+TEST(PageLink, ThePagesOwnTimeIsNotTheConnections) {
+  PageLink link;
+  link.OnEcho(milliseconds(50), Clock(0));
+  link.OnSent(1, true, Clock(0));
+  link.OnAck(1, milliseconds(70), Clock(130));
+  EXPECT_EQ(link.picture_time(), milliseconds(80));
+  EXPECT_EQ(link.connection_time(), milliseconds(10));
+  link.OnSent(2, true, Clock(200));
+  link.OnAck(2, std::chrono::hours(1), Clock(210));  // whatever the page says
+  EXPECT_GT(link.connection_time(), Duration::zero());
 }
 
 TEST(PageLink, FarAwayPicturesFollowOneAnother) {
@@ -83,9 +95,9 @@ TEST(PageLink, OnASlowWayPicturesDoNotQueue) {
 TEST(PageLink, LosslessPicturesDoNotCount) {
   PageLink link;
   link.OnSent(1, true, Clock(0));
-  link.OnAck(1, Clock(10));
+  link.OnAck(1, {}, Clock(10));
   link.OnSent(2, false, Clock(20));
-  link.OnAck(2, Clock(900));
+  link.OnAck(2, {}, Clock(900));
   EXPECT_EQ(link.picture_time(), milliseconds(10));
   EXPECT_EQ(link.last_round_trip(), milliseconds(880));
 }
@@ -93,16 +105,16 @@ TEST(PageLink, LosslessPicturesDoNotCount) {
 TEST(PageLink, AnAcknowledgementHoldsForAllBefore) {
   PageLink link;
   for (std::uint64_t frame : {1, 2, 3}) link.OnSent(frame, true, Clock(int(frame)));
-  EXPECT_TRUE(link.OnAck(2, Clock(120)));
-  EXPECT_FALSE(link.OnAck(1, Clock(121)));
-  EXPECT_FALSE(link.OnAck(4, Clock(121)));
-  EXPECT_TRUE(link.OnAck(3, Clock(122)));
+  EXPECT_TRUE(link.OnAck(2, {}, Clock(120)));
+  EXPECT_FALSE(link.OnAck(1, {}, Clock(121)));
+  EXPECT_FALSE(link.OnAck(4, {}, Clock(121)));
+  EXPECT_TRUE(link.OnAck(3, {}, Clock(122)));
 }
 
 TEST(PageLink, ADelayThatIsOverIsForgotten) {
   PageLink link;
   link.OnSent(1, true, Clock(-10));
-  link.OnAck(1, Clock(0));
+  link.OnAck(1, {}, Clock(0));
   link.OnEcho(milliseconds(5), Clock(0));
   for (int second = 1; second <= 25; ++second) link.OnEcho(milliseconds(200), Clock(1000 * second));
   for (std::uint64_t frame = 2; frame <= 4; ++frame) link.OnSent(frame, true, Clock(26000));

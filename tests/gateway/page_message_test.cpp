@@ -25,6 +25,9 @@ TEST(PageMessageTest, ViewsAcknowledgementsAndPongs) {
   const auto ack = ParsePageMessage(R"({"frame": 5, "type": "ack"})");
   ASSERT_TRUE(ack.ok());
   EXPECT_EQ(std::get<AckMessage>(*ack).frame, 5U);
+  const auto slow = ParsePageMessage(R"({"type": "ack", "frame": 6, "page_ms": 12.5})");
+  ASSERT_TRUE(slow.ok());
+  EXPECT_EQ(std::get<AckMessage>(*slow).in_page, std::chrono::microseconds(12500));
   const auto pong = ParsePageMessage(R"({"type": "pong", "ping": 7})");
   ASSERT_TRUE(pong.ok());
   EXPECT_EQ(std::get<PongMessage>(*pong).ping, 7U);
@@ -37,7 +40,8 @@ TEST(PageMessageTest, WrongFormIsRefusedInOneLine) {
         std::string(R"({"type": "view"})"), std::string(R"({"type": "view", "seq": 0, "options": {}})"),
         std::string(R"({"type": "view", "seq": 1, "options": []})"), std::string(R"({"type": "view", "seq": 1, "options": {}, "more": 1})"),
         std::string(R"({"type": "view", "seq": 1e300, "options": {}})"), std::string(R"({"type": "ack"})"),
-        std::string(R"({"type": "ack", "frame": -1})"), std::string(R"({"type": "pong"})"), deep}) {
+        std::string(R"({"type": "ack", "frame": -1})"), std::string(R"({"type": "ack", "frame": 1, "page_ms": -1})"),
+        std::string(R"({"type": "pong"})"), deep}) {
     const auto message = ParsePageMessage(text);
     ASSERT_FALSE(message.ok()) << text;
     EXPECT_EQ(message.status().code(), StatusCode::kInvalidArgument);

@@ -27,12 +27,12 @@ TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
   EXPECT_THAT(machine.OnRendered(true, false, At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   EXPECT_THAT(machine.OnEncoded(At(35)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 1}));
   EXPECT_EQ(machine.wake_time(), At(150));
-  EXPECT_THAT(machine.OnAck(1, At(45)), IsEmpty());
+  EXPECT_THAT(machine.OnAck(1, {}, At(45)), IsEmpty());
   EXPECT_EQ(machine.link().round_trip(), milliseconds(10));
   EXPECT_THAT(machine.OnTime(At(150)),
               ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));  // the same picture: nothing is rendered
   EXPECT_THAT(machine.OnEncoded(At(200)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
-  EXPECT_THAT(machine.OnAck(2, At(230)), IsEmpty());
+  EXPECT_THAT(machine.OnAck(2, {}, At(230)), IsEmpty());
   EXPECT_EQ(machine.wake_time(), std::nullopt);
 }
 
@@ -50,7 +50,7 @@ TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
   machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(30));
   machine.OnEncoded(At(31));
-  machine.OnAck(1, At(40));
+  machine.OnAck(1, {}, At(40));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
   EXPECT_THAT(machine.OnView(2, false, At(160)),
               ElementsAre(Is(Kind::kCancelEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = kFirstCoarseness}));
@@ -65,8 +65,8 @@ TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
   EXPECT_THAT(machine.OnRendered(true, false, At(70)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(75)), IsEmpty());
   EXPECT_THAT(machine.OnView(3, false, At(80)), IsEmpty());  // it would wait behind the second
-  EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());          // of no frame that was sent
-  EXPECT_THAT(machine.OnAck(1, At(90)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
+  EXPECT_THAT(machine.OnAck(7, {}, At(85)), IsEmpty());      // of no frame that was sent
+  EXPECT_THAT(machine.OnAck(1, {}, At(90)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
 }
 
 TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
@@ -75,7 +75,7 @@ TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
   machine.OnView(1, false, At(-500));
   machine.OnRendered(true, false, At(-499));
   machine.OnEncoded(At(-498));
-  machine.OnAck(1, At(-288));  // 210 ms
+  machine.OnAck(1, {}, At(-288));  // 210 ms
   machine.OnView(2, false, At(-280));
   for (int seq = 2; seq <= 6; ++seq) {
     const int begin = 40 * seq - 320;
@@ -85,7 +85,7 @@ TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
     EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = std::uint64_t(seq) + 1, .coarseness = actions.back().coarseness}));
     EXPECT_THAT(machine.OnEncoded(At(begin + 2)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = std::uint64_t(seq)}));
   }
-  machine.OnAck(2, At(-28));
+  machine.OnAck(2, {}, At(-28));
   EXPECT_EQ(machine.Quality(), 92);
 }
 
@@ -97,7 +97,7 @@ class FarAndSlow : public testing::Test {
     machine.OnView(1, true, At(-1000));
     machine.OnRendered(true, false, At(-990));
     machine.OnEncoded(At(-980));
-    machine.OnAck(1, At(-820));
+    machine.OnAck(1, {}, At(-820));
   }
   ViewMachine machine;
 };
@@ -107,7 +107,7 @@ TEST_F(FarAndSlow, PicturesThatMoveAreVideo) {
   EXPECT_THAT(machine.OnRendered(true, false, At(10)),
               ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kVideo, .quality = machine.Quality()}));
   EXPECT_THAT(machine.OnEncoded(At(11)), ElementsAre(Is(Kind::kSend)));
-  machine.OnAck(2, At(130));
+  machine.OnAck(2, {}, At(130));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
 }
 
@@ -140,7 +140,7 @@ TEST_F(FarAndSlow, AllVideoThatIsEncodedIsSent) {
     apply(machine.OnView(seq, true, At(now += 10)));
     apply(machine.OnRendered(true, false, At(now += 10)));
     if (std::exchange(encodes, false)) apply(machine.OnEncoded(At(++now)));
-    if (seq % 10 == 0 && sent > 1) apply(machine.OnAck(sent, At(++now)));
+    if (seq % 10 == 0 && sent > 1) apply(machine.OnAck(sent, {}, At(++now)));
     if (machine.wake_time() && *machine.wake_time() <= At(now)) apply(machine.OnTime(At(now)));
   }
   EXPECT_GT(encoded, 10);
@@ -152,7 +152,7 @@ TEST(ViewMachineTest, NearByASlowPageGetsJpeg) {
   machine.OnView(1, true, At(0));
   machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
-  machine.OnAck(1, At(110));
+  machine.OnAck(1, {}, At(110));
   machine.OnView(2, true, At(400));
   EXPECT_EQ(machine.OnRendered(true, false, At(410)).front().coding, PictureCoding::kJpeg);
 }
@@ -162,7 +162,7 @@ TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) 
   machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
-  machine.OnAck(1, At(410));  // the lossless picture is being encoded meanwhile
+  machine.OnAck(1, {}, At(410));  // the lossless picture is being encoded meanwhile
   EXPECT_EQ(machine.Quality(), 50);
   machine.OnTime(At(410));
   const auto actions = machine.OnView(2, false, At(500));
@@ -173,7 +173,7 @@ TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) 
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 1}));
   EXPECT_THAT(machine.OnRendered(true, false, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
   EXPECT_THAT(machine.OnEncoded(At(670)), IsEmpty());
-  EXPECT_THAT(machine.OnAck(2, At(900)), ElementsAre(Is(Kind::kSend)));
+  EXPECT_THAT(machine.OnAck(2, {}, At(900)), ElementsAre(Is(Kind::kSend)));
 }
 
 TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
@@ -181,7 +181,7 @@ TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
   machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
-  machine.OnAck(1, At(410));
+  machine.OnAck(1, {}, At(410));
   machine.OnView(2, false, At(500));
   machine.OnRendered(true, false, At(510));
   machine.OnEncoded(At(511));
@@ -195,12 +195,12 @@ TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAsk
   EXPECT_THAT(machine.OnView(1, false, At(0)), ElementsAre(render(4)));
   EXPECT_THAT(machine.OnRendered(false, false, At(100)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   machine.OnEncoded(At(101));
-  EXPECT_THAT(machine.OnAck(1, At(110)), IsEmpty());
+  EXPECT_THAT(machine.OnAck(1, {}, At(110)), IsEmpty());
   EXPECT_EQ(machine.wake_time(), At(150));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(render(2)));  // it takes long: there is one between
   EXPECT_THAT(machine.OnRendered(false, false, At(400)), ElementsAre(Is(Kind::kEncode), render(1)));
   EXPECT_THAT(machine.OnEncoded(At(401)), ElementsAre(Is(Kind::kSend)));
-  machine.OnAck(2, At(410));
+  machine.OnAck(2, {}, At(410));
   EXPECT_THAT(machine.OnRendered(true, false, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
   EXPECT_THAT(machine.OnEncoded(At(950)), ElementsAre(Is(Kind::kSend)));
   EXPECT_EQ(machine.wake_time(), std::nullopt);
@@ -211,7 +211,7 @@ TEST(ViewMachineTest, WhatIsRenderedQuicklyIsAsAskedForAtOnce) {
   machine.OnView(1, false, At(0));
   machine.OnRendered(false, false, At(10));
   machine.OnEncoded(At(11));
-  machine.OnAck(1, At(20));
+  machine.OnAck(1, {}, At(20));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
   machine.OnRendered(true, false, At(160));
   EXPECT_THAT(machine.OnView(2, false, At(170)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 2}));
@@ -223,11 +223,11 @@ TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
   machine.OnView(2, false, At(10));
   EXPECT_THAT(machine.OnRendered(false, false, At(300)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 8}));
   machine.OnEncoded(At(301));
-  machine.OnAck(1, At(310));
+  machine.OnAck(1, {}, At(310));
   EXPECT_THAT(machine.OnRendered(false, false, At(600)),
               ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 4}));
   machine.OnEncoded(At(601));
-  machine.OnAck(2, At(610));
+  machine.OnAck(2, {}, At(610));
   // The finer picture is given up for a new view.
   EXPECT_THAT(machine.OnView(3, false, At(620)), ElementsAre(ViewAction{.kind = Kind::kCancelRender},
                                                              ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
@@ -242,7 +242,7 @@ class SmallPictures : public testing::Test {
     EXPECT_EQ(render.kind, Kind::kRender);
     machine.OnRendered(finest, false, At(begin + ms));
     machine.OnEncoded(At(begin + ms + 1));
-    machine.OnAck(++frames_, At(begin + ms + 2));
+    machine.OnAck(++frames_, {}, At(begin + ms + 2));
     return render.scale;
   }
   ViewMachine machine;
@@ -279,7 +279,7 @@ TEST_F(SmallPictures, DoNotFollowFromReading) {
   machine.OnLoading(At(4950));
   machine.OnRendered(true, false, At(5000));
   machine.OnEncoded(At(5001));
-  machine.OnAck(1, At(5002));
+  machine.OnAck(1, {}, At(5002));
   EXPECT_EQ(machine.OnView(2, false, At(6000)).back().scale, 1);
 }
 
@@ -293,7 +293,7 @@ TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
     EXPECT_EQ(render.kind, Kind::kRender);
     machine.OnRendered(true, true, At(begin + ms));
     machine.OnEncoded(At(begin + ms + 1));
-    machine.OnAck(++frames, At(begin + ms + 2));
+    machine.OnAck(++frames, {}, At(begin + ms + 2));
     return render;
   };
   EXPECT_FALSE(rendered(100, 40).plain);
@@ -313,7 +313,7 @@ TEST(ViewMachineTest, PicturesWithoutShadowsAreNotDrawnTwice) {
   machine.OnView(1, false, At(0));
   machine.OnRendered(true, false, At(80));
   machine.OnEncoded(At(81));
-  machine.OnAck(1, At(90));
+  machine.OnAck(1, {}, At(90));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .coding = PictureCoding::kLossless}));
 }
 
@@ -429,7 +429,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
           break;
         case Event::kAck:
           --under_way;
-          apply(machine.OnAck(event.number, now));
+          apply(machine.OnAck(event.number, {}, now));
           break;
       }
       ASSERT_FALSE(HasFatalFailure());

@@ -168,6 +168,7 @@ export class Session {
     const n = new DataView(message).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, n))) as FrameHeader;
     const view = this.sent.get(header.seq);
+    const came = performance.now();
     const decoded = this.decode(header, new Uint8Array(message, 4 + n)).catch(() => null);
     await before.catch(() => undefined);
     const picture = await decoded;
@@ -178,7 +179,7 @@ export class Session {
       if (view && (picture || header.bounds[2] === 0)) this.events.frame({ header, view, picture });
     } finally {
       picture?.close();
-      if (stream.isOpen) stream.send(JSON.stringify({ type: "ack", frame: header.frame }));
+      if (stream.isOpen) stream.send(JSON.stringify({ type: "ack", frame: header.frame, page_ms: performance.now() - came }));
     }
   }
 
