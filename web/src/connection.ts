@@ -37,9 +37,15 @@ class SocketStream implements Stream {
 export class GatewayConnection implements Connection {
   constructor(private readonly base: URL, private readonly token: string) {}
 
-  request(path: string, query: Record<string, string>, init: RequestInit): Promise<Response> {
-    const text = new URLSearchParams(query).toString();
-    return fetch(new URL(`api/v1/${path}${text ? `?${text}` : ""}`, this.base), { ...init, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store" });
+  async request(path: string, query: Record<string, string>, init: RequestInit): Promise<Response> {
+    const text = new URLSearchParams(query).toString(), { origin } = location;
+    try {
+      return await fetch(new URL(`api/v1/${path}${text ? `?${text}` : ""}`, this.base), { ...init, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store" });
+    } catch (error) {
+      // A browser does not tell a page of another origin why it gets no answer; but it tells whether there is one.
+      const isThere = origin !== this.base.origin && !init.signal?.aborted && await fetch(new URL("livez", this.base), { mode: "no-cors" }).then(() => true, () => false);
+      throw isThere ? new Error(`The gateway takes no requests from pages of ${origin}. Start it with --origin ${origin}.`) : error;
+    }
   }
 
   open(): Stream {

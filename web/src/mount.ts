@@ -1,5 +1,5 @@
 // A viewer in an element of a document: makes the parts and connects them.
-import { Api, type Dataset, type Value } from "./api";
+import { Api, ApiError, type Dataset, type Value } from "./api";
 import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
 import { carried } from "./carry";
 import { wholeBox } from "./clip_handles";
@@ -392,7 +392,7 @@ export function mountViewer(root: HTMLElement | ShadowRoot, connection: Connecti
     host.changed?.();
   }).catch((error: unknown) => {
     if (end.signal.aborted) return;
-    const message = `The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`;
+    const { message: why } = error as Error, message = error instanceof ApiError ? `The gateway says: ${why}.` : error instanceof TypeError ? `The gateway does not answer: ${why}.` : why;
     showAlone(message);
     host.error?.(message);
     timer = setTimeout(start, RETRY_MS);
