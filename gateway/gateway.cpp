@@ -268,6 +268,8 @@ class Gateway::Impl : public HttpApplication {
                           })};
     routes["/api/v1/openapi.json"] = {.handle = text([] { return OpenApi().dump() + "\n"; })};
     routes["/api/v1/options"] = {.handle = text([] { return OfferedOptions().dump() + "\n"; })};
+    routes["/api/v1/access"] = {
+        .handle = answer([this](const Access& access) { return JsonReply(AccessJson(access, options_.max_upload_bytes > 0)); })};
     routes["/api/v1/status"] = {.handle = answer([this](const Access& access) {
                                   if (news_->health == ServiceHealth::kGone) return ServiceGone();
                                   return JsonReply(StatusJson(ShownStatus(news_->status, access)));

@@ -21,6 +21,7 @@ std::map<std::string, RouteRights, std::less<>> MakeRights() {
       {"/metrics", {kWatch, kNo}},
       {"/api/v1/openapi.json", {kNone, kNo}},
       {"/api/v1/options", {kNone, kNo}},
+      {"/api/v1/access", {kView, kNo}},
       {"/api/v1/status", {kView, kNo}},
       {"/api/v1/datasets", {kView, kNo}},
       {"/api/v1/command", {kView, kView}},
@@ -56,6 +57,18 @@ std::optional<std::string> WhyNot(Right right, const Access& access) {
     return fmt::format("the token is for dataset {} alone", Printable(fmt::format("{}", fmt::join(*access.datasets, ", "))));
   }
   return std::nullopt;
+}
+
+Json AccessJson(const Access& access, bool takes_files) {
+  using enum Right;
+  Json rights = Json::array();
+  for (const auto& [right, name] :
+       {std::pair(kView, "view"), std::pair(kWatch, "watch"), std::pair(kSteer, "steer"), std::pair(kSend, "send")}) {
+    if (!WhyNot(right, access) && (takes_files || right != kSend)) rights.push_back(name);
+  }
+  return {{"rights", std::move(rights)},
+          {"datasets", access.datasets ? Json(*access.datasets) : Json()},
+          {"exp", access.until != Access::kForEver ? Json(access.until) : Json()}};
 }
 
 std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access) {

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "common/http/access_token.h"
+#include "common/json/json.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -34,6 +35,10 @@ const std::map<std::string, RouteRights, std::less<>>& AllRights();
 std::optional<std::string> WhyNot(Right right, const Access& access);
 // The same of a dataset, whether there is one of this name or not.
 std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access);
+
+// What the token gives, for its holder: {"rights": ["view", "steer"], "datasets": ["head"], "exp": 1764450000}; the last two are null if it
+// is for all datasets, or does not expire. `takes_files`: whether the gateway does.
+Json AccessJson(const Access& access, bool takes_files);
 
 // A token for some datasets tells nothing of others, nor where data comes from.
 StatusReply ShownStatus(StatusReply status, const Access& access);

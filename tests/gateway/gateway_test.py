@@ -765,7 +765,7 @@ QUESTIONS = [f"/api/v1/{name}" for name in ("histogram", "joint-histogram", "lab
 BOTH = [*PICTURES, "/api/v1/command", "/api/v1/pick", "/api/v1/turntable.mp4"]  # by GET and POST
 RIGHTS = [("GET", path, NONE) for path in ("/livez", "/readyz", "/api/v1/openapi.json", "/api/v1/options")] + [
     ("GET", "/metrics", WATCH), ("POST", "/api/v1/parameters", STEER), ("POST", "/api/v1/upload", SEND)] + [
-    ("GET", path, VIEW) for path in (*BOTH, *QUESTIONS, "/api/v1/status", "/api/v1/datasets", "/api/v1/parameters", "/api/v1/view")] + [
+    ("GET", path, VIEW) for path in (*BOTH, *QUESTIONS, "/api/v1/access", "/api/v1/status", "/api/v1/datasets", "/api/v1/parameters", "/api/v1/view")] + [
     ("POST", path, VIEW) for path in BOTH]
 
 
@@ -812,7 +812,7 @@ class TokenTest(WithService):
                     self.assertEqual(status, 403, asked)
                     self.assertRegex(why, "^the token is (view-only|for dataset a alone)$")
             self.assertEqual(self.ask(expired, path, method, "a")[0] == 401, need != NONE, asked)
-            if need in (VIEW, STEER) and path not in ("/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
+            if need in (VIEW, STEER) and path not in ("/api/v1/access", "/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
                 for in_body in (False, True) if method == "POST" else (False,):
                     for other in ("b", "none"):  # whether there is one or not
                         self.assertEqual(

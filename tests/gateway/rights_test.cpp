@@ -87,6 +87,13 @@ TEST(RightsTest, TokensGiveWhatTheySay) {
   EXPECT_EQ(given(least), (std::set<Right>{kNone, kView}));
 }
 
+TEST(RightsTest, HoldersAreToldWhatTheyMay) {
+  EXPECT_EQ(AccessJson(Access(), true).dump(), R"({"rights":["view","watch","steer","send"],"datasets":null,"exp":null})");
+  EXPECT_EQ(AccessJson(Access(), false)["rights"].dump(), R"(["view","watch","steer"])");
+  EXPECT_EQ(AccessJson({.until = kNow, .datasets = {{"head"}}, .view_only = true}, true).dump(),
+            R"({"rights":["view"],"datasets":["head"],"exp":1764450000})");
+}
+
 TEST(RightsTest, TheDocumentHasTheMethodsOfTheTable) {
   const Json document = OpenApi();
   for (const auto& [path, operations] : document["paths"].items()) {

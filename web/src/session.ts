@@ -126,6 +126,7 @@ export class Session {
   }
 
   private connect(): void {
+    if (this.api.refusal) return;
     this.events.connection?.("connecting", "");
     const stream = this.stream = this.api.connection.open();
     this.heard();
@@ -145,7 +146,10 @@ export class Session {
       if (typeof data === "string") this.onText(data);
       else void this.onPicture(stream, data);
     };
-    stream.onclose = reason => this.lose(stream, reason);
+    stream.onclose = (reason, expired) => {
+      if (expired) this.api.refuse(reason);
+      this.lose(stream, reason);
+    };
   }
 
   private onText(text: string): void {
