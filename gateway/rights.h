@@ -1,10 +1,7 @@
-// Which right each request needs, and what a token shows of the service. Every request is in the one table: the gateway answers no other.
-// Pure.
+// The rights that requests need, and what a token gives and shows. Pure.
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,14 +19,6 @@ enum class Right : std::uint8_t {
   kSteer,  // a token that is not view-only; of the datasets those that it shows
   kSend,   // a token for all datasets that is not view-only
 };
-
-struct RouteRights {
-  std::optional<Right> get;  // HEAD, too; nullopt: the method is not taken
-  std::optional<Right> post;
-};
-
-// By path, below that of --behind-proxy.
-const std::map<std::string, RouteRights, std::less<>>& AllRights();
 
 // What the holder of a token reads that does not give this right. nullopt: it does.
 std::optional<std::string> WhyNot(Right right, const Access& access);

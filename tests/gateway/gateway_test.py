@@ -723,6 +723,8 @@ class HttpTest(WithService):
                 status, headers, body = self.gateway.request(path, method=method.upper(), body="{}" if method == "post" else None)
                 self.assertIn(str(status), operation["responses"], path)
                 self.assertIn(headers["Content-Type"].split(";")[0], operation["responses"][str(status)]["content"])
+            for method in {"get", "post"} - methods.keys():
+                self.assertEqual(self.gateway.request(path, method=method.upper(), body="{}")[0], 405, (path, method))
         for kind in ("render", "slice"):
             operations = document["paths"][f"/api/v1/{kind}.png"]
             names = [parameter["name"] for parameter in operations["get"]["parameters"]]
