@@ -352,7 +352,13 @@ class WidgetTest(unittest.TestCase):
         # It says that it lives, and then that nobody answers; it goes on when somebody does.
         stream = tab.js("model.sent.find(m => m.open !== undefined).open")
         tab.until("model.sent.some(m => m.alive?.includes(arguments[0]))", stream)
-        tab.js("(model.answers = false, model.sent.length = 0, true)")
+        tab.js("(model.answers = false, model.sent.length = 0, window.timer = setTimeout, true)")
+        tab.js("(window.setTimeout = (run, ms) => timer(run, ms === 180000 ? 1 : ms), true)")
+        self.key(tab, "k")
+        tab.until("shadow('#cell > div').querySelector('.message.error')?.textContent === arguments[0]",
+                  "The kernel has not answered for 3 minutes. It is busy with a cell, or gone.")  # fmt: skip
+        ask = tab.js("model.sent.find(m => m.ask !== undefined && m.path.startsWith('command')).ask")
+        self.assertTrue(tab.js("model.sent.some(m => m.cancel === arguments[0])", ask))
         tab.until("shadow('#cell > div').querySelector('.banner:not([hidden])')?.textContent.includes('no longer answers')")
         tab.until("model.sent.some(m => m.open !== undefined && m.open !== arguments[0])", stream)
         tab.save(SHOTS, "widget-alone")
