@@ -76,9 +76,9 @@ class Programs:
         assert result.returncode == expect, f"{arguments}: {result.returncode} {result.stderr}"
         return result
 
-    def start(self, program, *arguments):
-        child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, env=self.environment,
-                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def start(self, program, *arguments, **more):
+        child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL,
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **{"env": self.environment, **more})
         self.children.append(child)
         return child
 
