@@ -1043,7 +1043,7 @@ class PageTest(unittest.TestCase):
             viewer.until("offered")
             self.assertEqual(viewer.js("offered"), "Drop a volume or a colour map" if sends else "Drop a colour map")
             if not sends:
-                viewer.until("document.querySelector('.message.error')?.textContent === 'a.nrrd is not sent: the token gives no right to send files.'")
+                viewer.until("document.querySelector('.message.error')?.textContent === 'a.nrrd is not sent: you may not send files here.'")
                 self.assertEqual(viewer.js("asked.filter(address => address.includes('upload'))"), [])
             viewer.until("document.querySelector('.panel output')?.checkVisibility()")
             parameter = "[...document.querySelectorAll('.panel .row')].find(row => row.textContent.includes('level'))"

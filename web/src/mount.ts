@@ -361,7 +361,7 @@ class Assembly {
     const take = (file: File | undefined): void => {
       if (file?.name.toLowerCase().endsWith(".json")) void editor.open(file);
       else if (file && sends) void this.sending.send(file);
-      else if (file) this.say(`${file.name} is not sent: the token gives no right to send files.`, "error");
+      else if (file) this.say(`${file.name} is not sent: you may not send files here.`, "error");
     };
     this.file.addEventListener("change", () => { take(this.file.files?.[0]); this.file.value = ""; });
     const { element } = this;
