@@ -75,6 +75,13 @@ class Files(http.server.SimpleHTTPRequestHandler):
         pass
 
 
+class NoGateway(http.server.BaseHTTPRequestHandler):
+    """Answers with errors, as a proxy does whose gateway is down."""
+
+    def log_message(self, *_):
+        pass
+
+
 class PackageTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -95,11 +102,7 @@ class PackageTest(unittest.TestCase):
         modules.mkdir()
         (modules / "slabstream-view").symlink_to(cls.folder / "package")
 
-        server = http.server.ThreadingHTTPServer((SITE, 0), functools.partial(Files, directory=str(cls.folder)))
-        cls.addClassCleanup(server.server_close)
-        cls.addClassCleanup(server.shutdown)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        cls.site = f"http://{SITE}:{server.server_port}"
+        cls.site = cls.serve(SITE, functools.partial(Files, directory=str(cls.folder)))
 
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
         _, endpoint = cls.programs.up("--data", "sphere=s.nrrd")
@@ -109,6 +112,15 @@ class PackageTest(unittest.TestCase):
             wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
         cls.driver = browser.start(CHROMIUM, CHROMEDRIVER)
         cls.addClassCleanup(cls.driver.quit)
+
+    @classmethod
+    def serve(cls, host, handler):
+        """The address of a web server."""
+        server = http.server.ThreadingHTTPServer((host, 0), handler)
+        cls.addClassCleanup(server.server_close)
+        cls.addClassCleanup(server.shutdown)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        return f"http://{host}:{server.server_port}"
 
     def open(self, address):
         tab = Viewer(self.driver, f"{self.site}/{address}", script=WATCH)
@@ -211,6 +223,11 @@ class PackageTest(unittest.TestCase):
         self.assertEqual(tab.js("told[0].detail"), line)
         tab.until("document.querySelector('slab-view').shadowRoot.textContent.includes(arguments[0])", line)
         tab.save(SHOTS, "package-refused")
+
+    def test_a_proxy_without_its_gateway_is_no_gateway(self):
+        tab = self.open(f"package/example/?{self.serve('127.0.0.1', NoGateway)}/#token=abc")
+        tab.until("told.some(t => t.type === 'slab-error')")
+        self.assertTrue(tab.js("told[0].detail.startsWith('The gateway does not answer: ')"), tab.js("told[0].detail"))
 
     def test_the_component_of_react_shows_it(self):
         self.needs_react()
