@@ -3,9 +3,6 @@
 # description of every package that these come from. Sourced after lib.sh. The caller makes the folder $work.
 # shellcheck disable=SC2154  # work, repository
 
-# The time of all files in what is made, so that the same input makes the same bytes: SOURCE_DATE_EPOCH, or that of the last commit.
-epoch() { printf '%s' "${SOURCE_DATE_EPOCH:-$(git -C "$repository" log -1 --format=%ct 2> /dev/null || echo 0)}"; }
-
 # The programs, into $work/programs: those of dist/*.deb, else those of build/ if they run on every processor, else of packages that are made
 # now. The one place that knows where they come from.
 install_programs() {

@@ -16,6 +16,9 @@ fail() {
 # The version of the project.
 version() { sed -n 's/^project(slabstream VERSION \([0-9.]*\).*/\1/p' "$repository/CMakeLists.txt"; }
 
+# The time of all files in what is made, so that the same input makes the same bytes: SOURCE_DATE_EPOCH, or that of the last commit.
+epoch() { printf '%s' "${SOURCE_DATE_EPOCH:-$(git -C "$repository" log -1 --format=%ct 2> /dev/null || echo 0)}"; }
+
 # What the configuration of build/ says of a variable: ON, OFF, or nothing.
 configured() { [[ ! -f "$repository/build/CMakeCache.txt" ]] || sed -n "s/^$1:BOOL=//p" "$repository/build/CMakeCache.txt"; }
 

@@ -158,6 +158,7 @@ Json OpenApi() {
       {"/api/v1/openapi.json", "This document", "application/json", true},
       {"/api/v1/options", "The options of pictures and slices with their limits, as `slabstream options` prints them", "application/json",
        true},
+      {"/api/v1/access", "What the token gives: rights, datasets, until when", "application/json"},
       {"/api/v1/status", "The service: workers, frames, memory", "application/json"},
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
       {"/api/v1/render.png", "A picture, as `slabstream render` makes it; other endings make other files: " + PictureEndings(), "image/png",

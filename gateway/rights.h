@@ -1,15 +1,13 @@
-// Which right each request needs, and what a token shows of the service. Every request is in the one table: the gateway answers no other.
-// Pure.
+// The rights that requests need, and what a token gives and shows. Pure.
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "common/http/access_token.h"
+#include "common/json/json.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -22,18 +20,14 @@ enum class Right : std::uint8_t {
   kSend,   // a token for all datasets that is not view-only
 };
 
-struct RouteRights {
-  std::optional<Right> get;  // HEAD, too; nullopt: the method is not taken
-  std::optional<Right> post;
-};
-
-// By path, below that of --behind-proxy.
-const std::map<std::string, RouteRights, std::less<>>& AllRights();
-
 // What the holder of a token reads that does not give this right. nullopt: it does.
 std::optional<std::string> WhyNot(Right right, const Access& access);
 // The same of a dataset, whether there is one of this name or not.
 std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access);
+
+// What the token gives, for its holder: {"rights": ["view", "steer"], "datasets": ["head"], "exp": 1764450000}; the last two are null if it
+// is for all datasets, or does not expire. `takes_files`: whether the gateway does.
+Json AccessJson(const Access& access, bool takes_files);
 
 // A token for some datasets tells nothing of others, nor where data comes from.
 StatusReply ShownStatus(StatusReply status, const Access& access);

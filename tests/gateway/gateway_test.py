@@ -76,9 +76,9 @@ class Programs:
         assert result.returncode == expect, f"{arguments}: {result.returncode} {result.stderr}"
         return result
 
-    def start(self, program, *arguments):
-        child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, env=self.environment,
-                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def start(self, program, *arguments, **more):
+        child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL,
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **{"env": self.environment, **more})
         self.children.append(child)
         return child
 
@@ -723,6 +723,8 @@ class HttpTest(WithService):
                 status, headers, body = self.gateway.request(path, method=method.upper(), body="{}" if method == "post" else None)
                 self.assertIn(str(status), operation["responses"], path)
                 self.assertIn(headers["Content-Type"].split(";")[0], operation["responses"][str(status)]["content"])
+            for method in {"get", "post"} - methods.keys():
+                self.assertEqual(self.gateway.request(path, method=method.upper(), body="{}")[0], 405, (path, method))
         for kind in ("render", "slice"):
             operations = document["paths"][f"/api/v1/{kind}.png"]
             names = [parameter["name"] for parameter in operations["get"]["parameters"]]
@@ -765,7 +767,7 @@ QUESTIONS = [f"/api/v1/{name}" for name in ("histogram", "joint-histogram", "lab
 BOTH = [*PICTURES, "/api/v1/command", "/api/v1/pick", "/api/v1/turntable.mp4"]  # by GET and POST
 RIGHTS = [("GET", path, NONE) for path in ("/livez", "/readyz", "/api/v1/openapi.json", "/api/v1/options")] + [
     ("GET", "/metrics", WATCH), ("POST", "/api/v1/parameters", STEER), ("POST", "/api/v1/upload", SEND)] + [
-    ("GET", path, VIEW) for path in (*BOTH, *QUESTIONS, "/api/v1/status", "/api/v1/datasets", "/api/v1/parameters", "/api/v1/view")] + [
+    ("GET", path, VIEW) for path in (*BOTH, *QUESTIONS, "/api/v1/access", "/api/v1/status", "/api/v1/datasets", "/api/v1/parameters", "/api/v1/view")] + [
     ("POST", path, VIEW) for path in BOTH]
 
 
@@ -812,7 +814,7 @@ class TokenTest(WithService):
                     self.assertEqual(status, 403, asked)
                     self.assertRegex(why, "^the token is (view-only|for dataset a alone)$")
             self.assertEqual(self.ask(expired, path, method, "a")[0] == 401, need != NONE, asked)
-            if need in (VIEW, STEER) and path not in ("/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
+            if need in (VIEW, STEER) and path not in ("/api/v1/access", "/api/v1/status", "/api/v1/datasets", "/api/v1/view"):
                 for in_body in (False, True) if method == "POST" else (False,):
                     for other in ("b", "none"):  # whether there is one or not
                         self.assertEqual(

@@ -4,8 +4,6 @@
 
 #include <set>
 
-#include "gateway/openapi.h"
-
 namespace slabstream {
 namespace {
 
@@ -87,21 +85,11 @@ TEST(RightsTest, TokensGiveWhatTheySay) {
   EXPECT_EQ(given(least), (std::set<Right>{kNone, kView}));
 }
 
-TEST(RightsTest, TheDocumentHasTheMethodsOfTheTable) {
-  const Json document = OpenApi();
-  for (const auto& [path, operations] : document["paths"].items()) {
-    ASSERT_TRUE(AllRights().contains(path)) << path;
-    const RouteRights& rights = AllRights().find(path)->second;
-    EXPECT_EQ(operations.contains("get"), rights.get.has_value()) << path;
-    EXPECT_EQ(operations.contains("post"), rights.post.has_value()) << path;
-  }
-  std::set<std::string> left;
-  for (const auto& [path, rights] : AllRights()) {
-    const bool other_ending = (path.starts_with("/api/v1/render.") || path.starts_with("/api/v1/slice.")) && !path.ends_with(".png");
-    if (!document["paths"].contains(path) && !other_ending) left.insert(path);
-    EXPECT_TRUE(rights.get || rights.post) << path;
-  }
-  EXPECT_EQ(left, std::set<std::string>{"/api/v1/view"}) << "the WebSocket";
+TEST(RightsTest, HoldersAreToldWhatTheyMay) {
+  EXPECT_EQ(AccessJson(Access(), true).dump(), R"({"rights":["view","watch","steer","send"],"datasets":null,"exp":null})");
+  EXPECT_EQ(AccessJson(Access(), false)["rights"].dump(), R"(["view","watch","steer"])");
+  EXPECT_EQ(AccessJson({.until = kNow, .datasets = {{"head"}}, .view_only = true}, true).dump(),
+            R"({"rights":["view"],"datasets":["head"],"exp":1764450000})");
 }
 
 }  // namespace

@@ -18,7 +18,6 @@ ALLOWED = {
     ("gateway/gateway.cpp", "slice"): "a command",
     ("gateway/openapi.cpp", "slice"): "a command",
     ("gateway/page_message.cpp", "slice"): "a kind of picture",
-    ("gateway/rights.cpp", "slice"): "a command",
     ("python/slabstream/drafts.py", "slice"): "a command",
     ("python/slabstream/image.py", "splat"): "a stage",
     ("python/slabstream/image.py", "zbuffer"): "a stage",

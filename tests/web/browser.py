@@ -89,10 +89,10 @@ class Viewer:
     def canvas(self, pane="3d"):
         return self.driver.find_element(By.CSS_SELECTOR, f'[data-pane="{pane}"] canvas')
 
-    def pixels(self, pane="3d"):
-        """Width, height and RGBA bytes of what the canvas shows."""
-        width, height, text = self.js("""(() => { const c = document.querySelector(`[data-pane="${arguments[0]}"] canvas`), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-            let s = ''; for (let i = 0; i < d.length; i += 32768) s += String.fromCharCode(...d.subarray(i, i + 32768)); return [c.width, c.height, btoa(s)]; })()""", pane)
+    def pixels(self, pane="3d", root="document"):
+        """Width, height and RGBA bytes of what the canvas shows. `root`: in which it is, as JavaScript."""
+        width, height, text = self.js("""(() => { const c = ROOT.querySelector(`[data-pane="${arguments[0]}"] canvas`), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            let s = ''; for (let i = 0; i < d.length; i += 32768) s += String.fromCharCode(...d.subarray(i, i + 32768)); return [c.width, c.height, btoa(s)]; })()""".replace("ROOT", root), pane)
         return width, height, base64.b64decode(text)
 
     def find(self, selector):

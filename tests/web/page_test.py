@@ -12,6 +12,7 @@ import re
 import shutil
 import signal
 import sys
+import time
 import unittest
 import urllib.parse
 from pathlib import Path
@@ -108,12 +109,13 @@ class PageTest(unittest.TestCase):
         cls.driver = browser.start(CHROMIUM, CHROMEDRIVER)
         cls.addClassCleanup(cls.driver.quit)
 
-    def url(self, port=None, token=True, **fields):
-        parts = ([f"token={self.gateway.token}"] if token else []) + [f"{name.replace('_', '-')}={urllib.parse.quote(str(value), safe=',:;')}" for name, value in {"dataset": "patient", **fields}.items()]
+    def url(self, port=None, token=True, held=None, **fields):
+        parts = ([f"token={(held or self.gateway).token}"] if token else []) + [f"{name.replace('_', '-')}={urllib.parse.quote(str(value), safe=',:;')}" for name, value in {"dataset": "patient", **fields}.items()]
         return f"http://127.0.0.1:{port or self.gateway.port}/#{'&'.join(parts)}"
 
-    def viewer(self, port=None, width=1000, height=640, pixels=1, mobile=False, theme="dark", token=True, script="", **fields):
-        viewer = Viewer(self.driver, self.url(port, token, **fields), width, height, pixels, mobile, theme, script)
+    def viewer(self, port=None, width=1000, height=640, pixels=1, mobile=False, theme="dark", token=True, script="", held=None, **fields):
+        """`held`: for the holder of another token."""
+        viewer = Viewer(self.driver, self.url(port, token, held, **fields), width, height, pixels, mobile, theme, script)
         self.addCleanup(viewer.close)
         return viewer
 
@@ -1014,6 +1016,75 @@ class PageTest(unittest.TestCase):
         viewer.find(".sending button").click()
         viewer.until("document.querySelector('.sending').hidden")
         wait_until(lambda: all(each["name"] != "large" for each in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "it is dropped")
+
+    def test_what_the_token_does_not_give_is_not_offered(self):
+        simulation = self.programs.start("../tests/steered_simulation", self.endpoint, "phi")
+        self.addCleanup(self.programs.end, simulation)
+        wait_until(lambda: self.gateway.json("/api/v1/parameters?dataset=phi")[0] == 200, "the simulation")
+        spy = """window.chosen = 0; window.asked = []; const ask = window.fetch;
+            HTMLInputElement.prototype.click = () => { chosen++; };
+            window.fetch = (address, init) => { asked.push(String(address)); return ask(address, init); };"""
+        drop = """((name, text) => { const d = new DataTransfer(); d.items.add(new File([text], name));
+            for (const type of ['dragover', 'drop']) {
+              document.querySelector('canvas').dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: d}));
+              window.offered ??= document.querySelector('.viewer').dataset.drop;
+            }
+            return true; })(arguments[0], arguments[1])"""
+        for claims, sends, steers in (({}, True, True), ({"view_only": True}, False, False), ({"datasets": ["patient", "phi"]}, False, True)):
+            viewer = self.viewer(dataset="phi", held=self.gateway.holding(**claims), script=spy)
+            viewer.settled()
+            self.assertEqual(viewer.js("document.querySelectorAll('[aria-label^=\"Open a file\"]').length"), int(sends))
+            viewer.keys("f")
+            self.assertEqual(viewer.js("chosen"), int(sends))
+            viewer.keys("?")
+            words = viewer.js("document.querySelector('dialog').textContent")
+            self.assertEqual(("Open a file" in words, "a volume, or a colour map" in words), (sends, sends))
+            viewer.find("dialog [aria-label^=Close]").click()
+            viewer.js(drop, "a.nrrd", "nothing")
+            viewer.until("offered")
+            self.assertEqual(viewer.js("offered"), "Drop a volume or a colour map" if sends else "Drop a colour map")
+            if not sends:
+                viewer.until("document.querySelector('.message.error')?.textContent === 'a.nrrd is not sent: you may not send files here.'")
+                self.assertEqual(viewer.js("asked.filter(address => address.includes('upload'))"), [])
+            viewer.until("document.querySelector('.panel output')?.checkVisibility()")
+            parameter = "[...document.querySelectorAll('.panel .row')].find(row => row.textContent.includes('level'))"
+            self.assertEqual(viewer.js(f"{parameter}.querySelectorAll('input').length > 0"), steers)
+            if not steers:
+                self.assertRegex(viewer.js(f"{parameter}.textContent"), "^level[0-9]+$")
+                self.assertEqual(viewer.driver.execute_script((HERE / "accessibility.js").read_text()), [])
+                viewer.save(SHOTS, "view-only")
+
+    def test_when_the_token_expires_the_picture_stays_and_a_line_says_what_to_do(self):
+        spy = "window.opened = 0; window.WebSocket = class extends WebSocket { constructor(...given) { super(...given); opened++; } };"
+        banner = "document.querySelector('.banner:not([hidden])')?.textContent"
+        for seconds in (5, 20, 80):  # until one is long enough for the first picture
+            until = int(time.time()) + seconds
+            viewer = self.viewer(held=self.gateway.holding(exp=until), script=spy)
+            viewer.until(f"window.drawn.some(d => d.final && d.options['look-at']) || {banner} || document.querySelector('.empty')")
+            if viewer.js("window.drawn.some(d => d.final && d.options['look-at'])"):
+                break
+        picture = viewer.pixels()
+        line = time.strftime("The token expired at %Y-%m-%dT%H:%M:%SZ. Open a new link to go on.", time.gmtime(until))
+        viewer.until(f"{banner} === arguments[0]", line)
+        viewer.until("document.querySelector('.status').textContent === 'Not connected'")
+        # Nothing connects again, nor asks.
+        before = viewer.js("[opened, performance.getEntriesByType('resource').length]")
+        viewer.js("(dispatchEvent(new Event('online')), true)")
+        viewer.drag(30, 0)
+        viewer.hover((10, 10))
+        viewer.keys("k")
+        viewer.until("document.querySelector('.message.error') !== null")
+        self.assertEqual(viewer.js("[opened, performance.getEntriesByType('resource').length]"), before)
+        self.assertEqual(viewer.js(banner), line)
+        self.assertSamePixels(viewer.pixels(), picture)
+        viewer.save(SHOTS, "expired")
+        # So does a page that is loaded then. A new link works in the same tab.
+        viewer.driver.refresh()
+        viewer.until("document.querySelector('dialog') !== null")
+        self.assertEqual(viewer.js("document.querySelector('.empty').textContent"), line)
+        viewer.save(SHOTS, "expired-before")
+        viewer.driver.get(self.url())
+        viewer.settled()
 
     def test_no_curve_is_made_up_while_a_dataset_is_read(self):
         viewer = self.viewer(dataset="later")

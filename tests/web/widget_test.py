@@ -6,6 +6,7 @@
 import gzip
 import json
 import sys
+import time
 import unittest
 from pathlib import Path
 
@@ -267,6 +268,26 @@ class WidgetTest(unittest.TestCase):
         tab.until("told.some(t => t.type === 'slab-error' && t.detail.includes('src is \"\"'))")
         self.assertIn("must be the address of a gateway", tab.js("shadow('#three').textContent"))
 
+    def test_an_element_whose_token_expires_goes_on_with_another_one(self):
+        tab = self.open("/two")
+        make = """(e => { const given = {id: 'short', src: '.', token: arguments[0], dataset: 'patient', azimuth: '40'};
+            for (const [name, value] of Object.entries(given)) e.setAttribute(name, value);
+            document.querySelector('#field').after(e); return true; })(document.createElement('slab-view'))"""
+        self.final(tab, "one")
+        for seconds in (3, 15, 60):  # until one is long enough for the first picture
+            until = int(time.time()) + seconds
+            tab.js("(document.querySelector('#short')?.remove(), told.length = 0, true)")
+            tab.js(make, self.gateway.holding(exp=until).token)
+            drawn = "pictures.some(d => d.of === 'short' && d.final && d.options['look-at'])"
+            tab.until(f"{drawn} || told.some(t => t.type === 'slab-error' && t.of === 'short')")
+            if tab.js(drawn):
+                break
+        line = time.strftime("The token expired at %Y-%m-%dT%H:%M:%SZ. Load the page again to go on.", time.gmtime(until))
+        tab.until("told.some(t => t.type === 'slab-error' && t.of === 'short' && t.detail === arguments[0])", line)
+        tab.until("shadow('#short').querySelector('.banner:not([hidden])')?.textContent === arguments[0]", line)
+        tab.js("(pictures.length = 0, document.querySelector('#short').setAttribute('token', arguments[0]), true)", self.gateway.token)
+        self.final(tab, "short", "o.azimuth === 40")
+
     def widget(self, traits=""):
         tab = self.open("/kernel")
         tab.until("window.start !== undefined")
@@ -331,7 +352,13 @@ class WidgetTest(unittest.TestCase):
         # It says that it lives, and then that nobody answers; it goes on when somebody does.
         stream = tab.js("model.sent.find(m => m.open !== undefined).open")
         tab.until("model.sent.some(m => m.alive?.includes(arguments[0]))", stream)
-        tab.js("(model.answers = false, model.sent.length = 0, true)")
+        tab.js("(model.answers = false, model.sent.length = 0, window.timer = setTimeout, true)")
+        tab.js("(window.setTimeout = (run, ms) => timer(run, ms === 180000 ? 1 : ms), true)")
+        self.key(tab, "k")
+        tab.until("shadow('#cell > div').querySelector('.message.error')?.textContent === arguments[0]",
+                  "The kernel has not answered for 3 minutes. It is busy with a cell, or gone.")  # fmt: skip
+        ask = tab.js("model.sent.find(m => m.ask !== undefined && m.path.startsWith('command')).ask")
+        self.assertTrue(tab.js("model.sent.some(m => m.cancel === arguments[0])", ask))
         tab.until("shadow('#cell > div').querySelector('.banner:not([hidden])')?.textContent.includes('no longer answers')")
         tab.until("model.sent.some(m => m.open !== undefined && m.open !== arguments[0])", stream)
         tab.save(SHOTS, "widget-alone")

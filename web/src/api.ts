@@ -38,9 +38,17 @@ export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [nu
 
 export class Api {
   private readonly missing = new Set<string>();
+  refusal = ""; // why the gateway does not take the token, or not any more: nothing is asked from then on
+  onRefused = (): void => undefined;
 
   // `ended`: nobody waits for answers any more.
   constructor(readonly connection: Connection, readonly ended: AbortSignal) {}
+
+  refuse(why: string): void {
+    if (this.refusal) return;
+    this.refusal = why;
+    this.onRefused();
+  }
 
   // Whether the gateway has said that it has no such address.
   lacks(path: string): boolean { return this.missing.has(path); }
@@ -54,10 +62,13 @@ export class Api {
 
   private async request(path: string, fields: Record<string, string>, what: { method?: string; body?: BodyInit | null }, signal?: AbortSignal): Promise<Response> {
     if (this.ended.aborted) throw new DOMException("The viewer is gone.", "AbortError");
+    if (this.refusal) throw new ApiError(401, this.refusal);
     const response = await this.connection.request(path, fields, { ...what, ...(signal ? { signal } : {}) });
     if (response.ok) return response;
     const answer = (await response.json().catch(() => null)) as { error?: string } | null;
-    throw new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);
+    const error = new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);
+    if (error.status === 401) this.refuse(error.message);
+    throw error;
   }
 
   datasets = async (): Promise<Dataset[]> => ((await (await this.ask("datasets")).json()) as { datasets: Dataset[] }).datasets;
@@ -72,6 +83,7 @@ export class Api {
   };
 
   // Older gateways lack these: null.
+  access = (): Promise<{ rights: string[] } | null> => this.maybe("access", {});
   histogram = (source: Source): Promise<Histogram | null> => this.maybe("histogram", source);
   jointHistogram = (source: Source): Promise<JointHistogram | null> => this.maybe("joint-histogram", source);
   transfer = (source: Source, transfer: string): Promise<unknown> => this.maybe("transfer", { ...source, transfer });

@@ -2,7 +2,7 @@
 export interface Stream {
   onopen: () => void;
   onmessage: (data: string | ArrayBuffer) => void;
-  onclose: (reason: string) => void; // also if it never opened
+  onclose: (reason: string, expired?: boolean) => void; // also if it never opened. `expired`: the token has
   readonly isOpen: boolean;
   send(text: string): void; // while it is open
   close(): void;
@@ -14,10 +14,12 @@ export interface Connection {
   open(): Stream; // of api/v1/view
 }
 
+const EXPIRED = 4401; // close code
+
 class SocketStream implements Stream {
   onopen = (): void => undefined;
   onmessage = (_: string | ArrayBuffer): void => undefined;
-  onclose = (_: string): void => undefined;
+  onclose = (_: string, __?: boolean): void => undefined;
   private readonly socket: WebSocket;
 
   constructor(address: URL, token: string) {
@@ -25,7 +27,7 @@ class SocketStream implements Stream {
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => this.onopen();
     this.socket.onmessage = event => this.onmessage(event.data as string | ArrayBuffer);
-    this.socket.onclose = event => this.onclose(event.reason);
+    this.socket.onclose = event => this.onclose(event.reason, event.code === EXPIRED);
   }
 
   get isOpen(): boolean { return this.socket.readyState === WebSocket.OPEN; }
@@ -37,9 +39,21 @@ class SocketStream implements Stream {
 export class GatewayConnection implements Connection {
   constructor(private readonly base: URL, private readonly token: string) {}
 
-  request(path: string, query: Record<string, string>, init: RequestInit): Promise<Response> {
-    const text = new URLSearchParams(query).toString();
-    return fetch(new URL(`api/v1/${path}${text ? `?${text}` : ""}`, this.base), { ...init, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store" });
+  async request(path: string, query: Record<string, string>, init: RequestInit): Promise<Response> {
+    const text = new URLSearchParams(query).toString(), { origin } = location;
+    try {
+      return await fetch(new URL(`api/v1/${path}${text ? `?${text}` : ""}`, this.base), { ...init, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store" });
+    } catch (error) {
+      if (origin === this.base.origin || init.signal?.aborted || !(await this.showsIcon())) throw error;
+      throw new Error(`The gateway takes no requests from pages of ${origin}. Start it with --origin ${origin}.`);
+    }
+  }
+
+  // A browser does not tell a page of another origin why it gets no answer. But it shows pictures, the gateway's own, too.
+  private showsIcon(): Promise<boolean> {
+    const icon = new Image();
+    icon.src = new URL("assets/icon.svg", this.base).href;
+    return icon.decode().then(() => true, () => false);
   }
 
   open(): Stream {

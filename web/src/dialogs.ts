@@ -18,13 +18,14 @@ export function dialog(place: HTMLElement, title: string, ...content: (HTMLEleme
 const POINTER_HELP: readonly (readonly [string, string])[] = [
   ["Drag", "Turn"], ["Shift and drag, or middle button", "Move"], ["Wheel", "Zoom about the pointer"], ["Ctrl and drag", "Roll"],
   ["Right button and drag", "Window and level: sideways widens, upwards brightens"], ["Double click", "Put the cross-hair there"],
-  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Show it: a volume, or a colour map (ParaView’s JSON)"],
+  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"],
 ];
 
-export function helpDialog(place: HTMLElement, groups: readonly KeyGroup[]): void {
+export function helpDialog(place: HTMLElement, groups: readonly KeyGroup[], takesVolumes: boolean): void {
+  const drop = ["Drop a file", takesVolumes ? "Show it: a volume, or a colour map (ParaView’s JSON)" : "Take it as colour map (ParaView’s JSON)"] as const;
   const table = (rows: readonly (readonly [string, string])[]): HTMLElement => h("dl", { class: "keys" }, ...rows.map(([key, does]) => h("div", {}, h("dt", {}, h("kbd", {}, key)), h("dd", {}, does))));
   dialog(place, "Help", h("div", { class: "help" },
-    h("section", {}, h("h3", {}, "Pointer and touch"), h("dl", { class: "keys wide" }, ...POINTER_HELP.map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))))),
+    h("section", {}, h("h3", {}, "Pointer and touch"), h("dl", { class: "keys wide" }, ...[...POINTER_HELP, drop].map(([key, does]) => h("div", {}, h("dt", {}, key), h("dd", {}, does))))),
     ...groups.map(group => h("section", {}, h("h3", {}, group.title), table(group.keys.map(key => [key.label, key.does]))))));
 }
 

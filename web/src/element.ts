@@ -4,13 +4,17 @@ import { h } from "./dom";
 import { atMostEach, gatewayAt, STATE_MS, styledRoot, themeAround } from "./embedding";
 import type { Fields } from "./link";
 import { type MountedViewer, mountViewer } from "./mount";
+import type { SlabViewElement, SlabViewEventMap, SlabViewSettings, SlabViewState } from "../package/slab-view";
 
 const CONNECTION = ["src", "token"];
 
-class SlabView extends HTMLElement {
+// A server that renders pages imports the module, too, and has no elements.
+const Base = (globalThis.HTMLElement ?? Object) as typeof HTMLElement;
+
+class SlabView extends Base implements SlabViewElement {
   private viewer: MountedViewer | null = null;
   private left: Fields | null = null; // what it showed before it was taken out of the document
-  private readonly told = atMostEach(STATE_MS, () => this.tell("slab-state", this.state));
+  private readonly told = atMostEach(STATE_MS, () => this.tell("slab-state", this.fields));
   private readonly watcher = new MutationObserver(changes => this.follow(changes.map(change => change.attributeName ?? "")));
 
   connectedCallback(): void {
@@ -24,8 +28,13 @@ class SlabView extends HTMLElement {
     this.close();
   }
 
-  get state(): Fields { return this.viewer?.state ?? this.left ?? this.said(); }
-  set state(fields: Fields) { if (this.viewer) this.viewer.update(fields); else this.left = fields; }
+  get state(): SlabViewState { return this.fields; }
+  set state(settings: SlabViewSettings) {
+    const fields = Object.fromEntries(Object.entries(settings).flatMap(([name, value]) => (value === undefined ? [] : [[name, String(value)]])));
+    if (this.viewer) this.viewer.update(fields); else this.left = fields;
+  }
+
+  private get fields(): Fields { return this.viewer?.state ?? this.left ?? this.said(); }
 
   private said(): Fields { return Object.fromEntries([...this.attributes].filter(({ name }) => !CONNECTION.includes(name)).map(({ name, value }) => [name, value])); }
 
@@ -47,14 +56,14 @@ class SlabView extends HTMLElement {
 
   private close(): void {
     this.told.cancel();
-    this.left = this.state;
+    this.left = this.fields;
     this.viewer?.dispose();
     this.viewer = null;
   }
 
   private follow(names: readonly string[]): void {
     if (names.some(name => CONNECTION.includes(name))) { this.close(); this.open({ ...this.left, ...this.said() }); return; }
-    const fields: Record<string, string> = { ...this.state };
+    const fields: Record<string, string> = { ...this.fields };
     for (const name of names) {
       const value = this.getAttribute(name);
       if (value === null) delete fields[name]; else fields[name] = value;
@@ -62,8 +71,8 @@ class SlabView extends HTMLElement {
     this.state = fields;
   }
 
-  private tell(name: string, detail: unknown): void { this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true })); }
+  private tell<K extends keyof SlabViewEventMap>(name: K, detail: SlabViewEventMap[K]["detail"]): void { this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true })); }
 }
 
 // A document may load this module several times: each cell of a notebook does.
-export function defineElement(): void { if (!customElements.get("slab-view")) customElements.define("slab-view", SlabView); }
+export function defineElement(): void { if (globalThis.customElements && !customElements.get("slab-view")) customElements.define("slab-view", SlabView); }

@@ -19,6 +19,8 @@ interface Message { answer?: number; opened?: number; heard?: number; closed?: n
 type Listener = (message: Message, bytes: ArrayBuffer) => void;
 
 const ALIVE_MS = 2000;
+// A kernel answers within 150 s, if only by an error (python/slabstream/relay.py), unless a cell keeps it busy. A movie is sent when it is whole.
+const ANSWER_MINUTES = 3, MOVIE_MINUTES = 60;
 const VIEW_MS = 50, UNANSWERED_MS = 250;
 const VIEW = /^\{"type":"view"/;
 
@@ -71,27 +73,32 @@ class KernelStream implements Stream {
 export class KernelConnection implements Connection {
   private readonly listeners = new Map<number, Listener>(); // by ids of requests and streams
   private readonly streams = new Set<number>();
+  private readonly gone = new AbortController();
   private readonly timer = setInterval(() => { if (this.streams.size > 0) this.tell({ alive: [...this.streams] }); }, ALIVE_MS);
 
   constructor(private readonly model: Model) { model.on("msg:custom", this.hear); }
 
   end(): void {
+    this.gone.abort();
     clearInterval(this.timer);
     this.model.off("msg:custom", this.hear);
   }
 
   async request(path: string, query: Record<string, string>, { method = "GET", body, signal }: { method?: string; body?: BodyInit | null; signal?: AbortSignal }): Promise<Response> {
     const bytes = body === null || body === undefined ? [] : [await new Response(body).arrayBuffer()], text = new URLSearchParams(query).toString();
+    const minutes = path === "turntable.mp4" ? MOVIE_MINUTES : ANSWER_MINUTES;
     return new Promise((resolve, reject) => {
-      const cancel = (): void => { this.listeners.delete(id); this.tell({ cancel: id }); reject(new DOMException("Nobody waits for the answer.", "AbortError")); };
-      if (signal?.aborted) return reject(new DOMException("Nobody waits for the answer.", "AbortError"));
+      const waiting = new AbortController(), nobody = new DOMException("Nobody waits for the answer.", "AbortError");
+      const end = (): void => { this.listeners.delete(id); clearTimeout(timer); waiting.abort(); };
+      const giveUp = (why: Error): void => { end(); this.tell({ cancel: id }); reject(why); };
+      if (signal?.aborted || this.gone.signal.aborted) return reject(nobody);
       const id = this.listen(({ status = 502, type = "" }, answer) => {
-        this.listeners.delete(id);
-        signal?.removeEventListener("abort", cancel);
+        end();
         resolve(new Response(status === 204 ? null : answer, { status, headers: { "Content-Type": type } }));
       });
-      signal?.addEventListener("abort", cancel, { once: true });
-      this.model.send({ ask: id, method, path: text ? `${path}?${text}` : path }, undefined, bytes);
+      const timer = setTimeout(() => giveUp(new Error(`The kernel has not answered for ${minutes} minutes. It is busy with a cell, or gone.`)), minutes * 60_000);
+      for (const each of [signal, this.gone.signal]) each?.addEventListener("abort", () => giveUp(nobody), { signal: waiting.signal });
+      try { this.model.send({ ask: id, method, path: text ? `${path}?${text}` : path }, undefined, bytes); } catch (error) { giveUp(error as Error); }
     });
   }
 

@@ -7,8 +7,10 @@ import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST
 import { cornersOf, isArea, MOST_REGIONS, type Region } from "./regions";
 import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
+import type { SlabViewSetting } from "../package/slab-view";
 
-interface Field<T> { name: string; write: (value: T) => string; read: (text: string, offers: Offers) => T | undefined }
+type Name = SlabViewSetting | ""; // "": of a part of a setting
+interface Field<T> { name: Name; write: (value: T) => string; read: (text: string, offers: Offers) => T | undefined }
 
 const number = (text: string | undefined): number | undefined => (text === undefined || text.trim() === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
 const numbers = (text: string, count: number): number[] | undefined => {
@@ -19,16 +21,16 @@ const list = <T>(text: string | null, separator: string, read: (item: string) =>
   const items = text === null ? [] : text.split(separator).map(read);
   return items.every(item => item !== undefined) ? (items as T[]) : undefined;
 };
-const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
-const oneOf = <T extends string>(name: string, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
-const within = (name: string, limits: (offers: Offers) => readonly [number, number]): Field<number> => ({
+const text = (name: Name, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
+const oneOf = <T extends string>(name: Name, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
+const within = (name: Name, limits: (offers: Offers) => readonly [number, number]): Field<number> => ({
   name, write: String, read: (value, offers) => { const n = number(value), [low, high] = limits(offers); return n !== undefined && n >= low && n <= high ? n : undefined; },
 });
-const real = (name: string): Field<number> => within(name, offers => offers.limitsOf(name));
-const flag = (name: string): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
+const real = (name: Name): Field<number> => within(name, offers => offers.limitsOf(name));
+const flag = (name: Name): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
 const nullable = <T>(field: Field<T>): Field<T | null> => ({ name: field.name, write: value => (value === null ? "" : field.write(value)), read: field.read });
-const point = (name: string): Field<Vec3> => ({ name, write: value => value.join(","), read: value => numbers(value, 3) as Vec3 | undefined });
-const range = (name: string): Field<readonly [number, number]> => ({
+const point = (name: Name): Field<Vec3> => ({ name, write: value => value.join(","), read: value => numbers(value, 3) as Vec3 | undefined });
+const range = (name: Name): Field<readonly [number, number]> => ({
   name, write: value => value.join(":"),
   read: value => { const pair = numbers(value.replace(":", ","), 2); return pair && (pair[0] as number) < (pair[1] as number) ? (pair as [number, number]) : undefined; },
 });
@@ -64,11 +66,11 @@ const clipBox: Field<ClipBox> = {
     return axes?.length === 3 ? (axes as unknown as ClipBox) : undefined;
   },
 };
-const many = <T extends readonly number[]>(name: string, count: number): Field<readonly T[]> => ({
+const many = <T extends readonly number[]>(name: Name, count: number): Field<readonly T[]> => ({
   name, write: value => value.map(v => v.join(",")).join(";"), read: value => list(value, ";", item => numbers(item, count) as unknown as T | undefined),
 });
 const regions: Field<readonly Region[]> = {
-  name: "regions", write: value => value.map(({ corners, r, g, b, opacity, softness }) => [r, g, b, opacity, softness, ...corners.flatMap(({ value, slope }) => [value, slope])].join(",")).join(";"),
+  name: "", write: value => value.map(({ corners, r, g, b, opacity, softness }) => [r, g, b, opacity, softness, ...corners.flatMap(({ value, slope }) => [value, slope])].join(",")).join(";"),
   read: value => {
     const read = list(value, ";", (item): Region | undefined => {
       const given = item.split(",").map(number), [r, g, b, opacity, softness, ...numbers] = given as number[], corners = cornersOf(numbers);
@@ -100,7 +102,7 @@ const map: Field<ColorMap> = {
   },
 };
 // "0=100:4000,1=5:7": a value each.
-const each = <T>(name: string, key: RegExp, { write, read }: Pick<Field<T>, "write" | "read">): Field<Readonly<Record<string, T>>> => ({
+const each = <T>(name: Name, key: RegExp, { write, read }: Pick<Field<T>, "write" | "read">): Field<Readonly<Record<string, T>>> => ({
   name, write: value => Object.entries(value).map(([of, one]) => `${of}=${write(one)}`).join(","),
   read: (value, offers) => {
     const pairs = list(value, ",", item => { const [of, text] = item.split("="), one = text === undefined ? undefined : read(text, offers); return of && key.test(of) && one !== undefined ? ([of, one] as const) : undefined; });

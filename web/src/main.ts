@@ -34,7 +34,7 @@ function open(): void {
     keepTheme: chosen => { try { localStorage.setItem(KEPT_THEME, chosen); } catch { /* it holds for this visit */ } },
     changed: () => { if (timer === 0) show(); clearTimeout(timer); timer = setTimeout(show, ADDRESS_MS); },
     link: withToken => linkOf(viewer.state, withToken ? token : ""),
-    refused: why => askForToken(`The gateway says: ${why}. Each start of a gateway makes a new token.`),
+    refused: why => askForToken(`The gateway says: ${why}.`),
   });
   addEventListener("hashchange", () => {
     if ("token" in fieldsInAddress()) return location.reload(); // a link of another start of the gateway, perhaps

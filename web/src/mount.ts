@@ -1,5 +1,5 @@
 // A viewer in an element of a document: makes the parts and connects them.
-import { Api, type Dataset, type Value } from "./api";
+import { Api, ApiError, type Dataset, type Value } from "./api";
 import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
 import { carried } from "./carry";
 import { wholeBox } from "./clip_handles";
@@ -58,7 +58,7 @@ export interface Host {
   link?(withToken: boolean): string; // to what shows; without this no link can be copied
   picked?(value: Value): void; // at a click in the 3-D picture
   error?(message: string): void; // one line, which the viewer shows, too
-  refused?(why: string): void; // the gateway does not take the token
+  refused?(why: string): void; // the gateway does not take the token, and there is no picture
   reached?(isOpen: boolean): void; // a stream of pictures has opened, or is lost
 }
 
@@ -114,7 +114,7 @@ class Assembly {
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
       drawn: ({ frame: { header, view } }) => { notices.onFrame(header.statistics.missing); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); host.error?.(message); },
-      connection: (state, reason) => { notices.onConnection(state, reason); if (state !== "connecting") host.reached?.(state === "open"); if (state === "lost") void this.checkToken(); },
+      connection: (state, reason) => { notices.onConnection(state, reason); if (state !== "connecting") host.reached?.(state === "open"); if (state === "lost") void api.datasets().catch(() => undefined); }, // a socket does not say that it was refused; a request does
     });
     this.shell.panes.append(this.viewer.pane.element);
     this.slices = new Slices(context, this.shell.panes, this.measuring, ranges, at => this.pointed.atPoint(at));
@@ -129,6 +129,11 @@ class Assembly {
     element.addEventListener("pointerdown", () => store.press(), true);
     for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => store.letGo(), { capture: true, signal: ended });
     this.takesFiles(editor);
+    api.onRefused = () => {
+      const line = refusalText(api, host);
+      notices.onRefused(line);
+      host.error?.(line);
+    };
     this.shell.setPanel(host.panel && element.clientWidth > NARROW_PIXELS);
     this.show();
     if (isPage) this.viewer.pane.canvas.focus({ preventScroll: true });
@@ -250,15 +255,6 @@ class Assembly {
     return element;
   }
 
-  // A socket does not say why it was refused; a request does.
-  private async checkToken(): Promise<void> {
-    const answer = await this.api.connection.request("datasets", {}, {}).catch(() => null);
-    if (answer?.status !== 401) return;
-    const { error = "" } = (await answer.json().catch(() => ({}))) as { error?: string };
-    if (this.host.refused) this.host.refused(error);
-    else this.say(`The gateway says: ${error}.`, "error");
-  }
-
   // ---- what can be done
 
   private world(): string | undefined { return this.volume?.world ?? this.viewer.pane.shown?.frame.header.geometry.world; }
@@ -297,16 +293,16 @@ class Assembly {
   private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
 
   private copyLink(link: string, withToken: boolean): void {
-    void copyText(link).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it can use this gateway until it ends." : "The link is copied. It gives no access: others need their own."));
+    void copyText(link).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it may do what you may." : "The link is copied. It gives no access: others need their own."));
   }
 
   private actions(): Actions {
     const { store, host, element } = this;
     return {
-      dataset: name => this.showDataset(name), open: () => this.file.click(),
+      dataset: name => this.showDataset(name), open: this.offers.may("send") ? () => this.file.click() : null,
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
-      panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: () => this.switchTheme(), help: () => helpDialog(element, this.keyGroups()),
+      panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: () => this.switchTheme(), help: () => helpDialog(element, this.keyGroups(), this.offers.may("send")),
       projection: () => store.update({ projection: store.state.projection === "orthographic" ? "perspective" : "orthographic" }),
       copyLink: host.link ? withToken => this.copyLink(host.link?.(withToken) ?? "", withToken) : null, command: () => void commandDialog(this.context, ...this.pictureSize()),
       screenshot: () => screenshotDialog(this.context, [this.viewer.part(), ...this.slices.parts()], ...this.stageSize(), this.pictureSize()), movie: () => movieDialog(this.context, ...this.pictureSize(), this.world() === "patient" ? this.start() : null),
@@ -320,7 +316,7 @@ class Assembly {
   }
 
   private keyGroups(): KeyGroup[] {
-    const { store, viewer, player } = this, actions = this.actions(), { copyLink } = actions, timed = player.present;
+    const { store, viewer, player } = this, actions = this.actions(), { copyLink, open } = actions, timed = player.present;
     const turn = (right: number, up: number) => (far: boolean, at: number): void => {
       const step = far ? TURN.far : TURN.near, pixels = MOVE_PIXELS.near;
       viewer.move(far ? panned(store.state, right * pixels, -up * pixels, viewer.pixelSize()) : orbited(store.state, right * step, up * step), at);
@@ -353,18 +349,23 @@ class Assembly {
         { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => this.toggleBox() },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
         ...(copyLink ? [{ keys: ["c"], label: "C", does: "Copy link", run: () => copyLink(false) }] : []), { keys: ["k"], label: "K", does: "Command", run: actions.command },
-        { keys: ["f"], label: "F", does: "Open a file", run: actions.open }, { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["n"], label: "N", does: "Add a key frame", run: () => keepView(this.context) }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        ...(open ? [{ keys: ["f"], label: "F", does: "Open a file", run: open }] : []), { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["n"], label: "N", does: "Add a key frame", run: () => keepView(this.context) }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
         { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
       ] },
     ];
   }
 
-  // A file that is dropped or chosen: a colour map, or else a volume.
+  // A file that is dropped or chosen: a colour map, or else a volume, if the token lets one be sent.
   private takesFiles(editor: TransferEditor): void {
-    const take = (file: File | undefined): void => { if (file) void (file.name.toLowerCase().endsWith(".json") ? editor.open(file) : this.sending.send(file)); };
+    const sends = this.offers.may("send");
+    const take = (file: File | undefined): void => {
+      if (file?.name.toLowerCase().endsWith(".json")) void editor.open(file);
+      else if (file && sends) void this.sending.send(file);
+      else if (file) this.say(`${file.name} is not sent: you may not send files here.`, "error");
+    };
     this.file.addEventListener("change", () => { take(this.file.files?.[0]); this.file.value = ""; });
     const { element } = this;
-    element.addEventListener("dragover", event => { event.preventDefault(); element.dataset["drop"] = "over"; });
+    element.addEventListener("dragover", event => { event.preventDefault(); element.dataset["drop"] = sends ? "Drop a volume or a colour map" : "Drop a colour map"; });
     element.addEventListener("dragleave", event => { if (!(event.relatedTarget instanceof Node && element.contains(event.relatedTarget))) delete element.dataset["drop"]; });
     element.addEventListener("drop", event => {
       event.preventDefault();
@@ -372,6 +373,11 @@ class Assembly {
       take(event.dataTransfer?.files[0]);
     });
   }
+}
+
+// What to do then, in a line.
+function refusalText({ refusal }: Api, { isPage }: Host): string {
+  return `${refusal.charAt(0).toUpperCase()}${refusal.slice(1)}. ${isPage ? "Open a new link to go on." : "Load the page again to go on."}`;
 }
 
 export interface MountedViewer {
@@ -392,10 +398,11 @@ export function mountViewer(root: HTMLElement | ShadowRoot, connection: Connecti
     host.changed?.();
   }).catch((error: unknown) => {
     if (end.signal.aborted) return;
-    const message = `The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`;
+    const { message: why } = error as Error, message = api.refusal ? refusalText(api, host) : error instanceof ApiError ? `The gateway says: ${why}.` : error instanceof TypeError ? `The gateway does not answer: ${why}.` : why;
     showAlone(message);
     host.error?.(message);
-    timer = setTimeout(start, RETRY_MS);
+    if (!api.refusal) timer = setTimeout(start, RETRY_MS);
+    else host.refused?.(api.refusal);
   });
   showAlone("Connecting…");
   root.append(element);

@@ -15,6 +15,7 @@ export class Notices {
   private connection: Reached = "connecting";
   private everOpen = false;
   private reason = "";
+  private refusal = "";
   private service: ServiceStatus | null = null;
   private error = "";
   private phase = "";
@@ -37,6 +38,7 @@ export class Notices {
     this.draw();
   }
 
+  onRefused(line: string): void { this.refusal = line; this.draw(); } // for good
   onStatus(status: ServiceStatus): void { this.service = status; if (status.service !== "ready") this.setPhase(""); this.draw(); }
   onError(message: string): void { this.error = message; this.setPhase(""); this.draw(); }
 
@@ -83,6 +85,7 @@ export class Notices {
   }
 
   private problem(): string {
+    if (this.refusal) return this.refusal;
     if (this.connection === "lost") return `${this.everOpen ? "The gateway no longer answers." : "The gateway does not answer."}${this.reason ? ` It said: ${this.reason}.` : ""} Trying again.`;
     if (this.connection === "open" && this.service && this.service.service !== "ready") {
       const { service, reason } = this.service;

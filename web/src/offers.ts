@@ -1,4 +1,4 @@
-// What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options); and what the dataset that
+// What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options); what the token gives; and what the dataset that
 // a viewer shows has. Loaded before the viewer is made.
 import type { Api, Dataset } from "./api";
 
@@ -22,14 +22,17 @@ export class Offers {
   dataset: Dataset | null = null; // that is shown; null: nothing is known of it
   private readonly byName = new Map<string, Offer>();
 
-  constructor(private readonly ofPictures: readonly Offer[], ofSlices: readonly Offer[]) {
+  constructor(private readonly ofPictures: readonly Offer[], ofSlices: readonly Offer[], private readonly rights: readonly string[] | undefined) {
     for (const offer of [...ofSlices, ...ofPictures]) this.byName.set(offer.name, offer);
   }
 
   static async load(api: Api): Promise<Offers> {
-    const { slice, render } = (await (await api.ask("options")).json()) as { slice: Offer[]; render: Offer[] };
-    return new Offers(render, slice);
+    const [options, access] = await Promise.all([api.ask("options"), api.access()]), { slice, render } = (await options.json()) as { slice: Offer[]; render: Offer[] };
+    return new Offers(render, slice, access?.rights);
   }
+
+  // Whether the token gives a right: to change parameters of simulations, to send files. An older gateway does not say so.
+  may(right: "steer" | "send"): boolean { return this.rights?.includes(right) ?? true; }
 
   // Options of pictures under a heading that begins so.
   offered(group: string): readonly Offer[] { return this.ofPictures.filter(each => each.group.startsWith(group)); }

@@ -13,6 +13,7 @@ const MARKS_SIDE = 600; // pixels of the shorter side of a picture whose marks h
 // A lossless picture of a view.
 function draw(api: Api, view: View, canvas: HTMLCanvasElement, place: (frame: Frame) => void): Promise<Frame> {
   return new Promise((resolve, reject) => {
+    if (api.refusal) return reject(new Error(api.refusal));
     const session: Session = new Session(api, {
       frame: frame => {
         if (!frame.header.final) return;

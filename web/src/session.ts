@@ -130,6 +130,7 @@ export class Session {
   }
 
   private connect(): void {
+    if (this.api.refusal) return;
     this.events.connection?.("connecting", "");
     const stream = this.stream = this.api.connection.open();
     this.video.close();
@@ -151,7 +152,10 @@ export class Session {
       if (typeof data === "string") this.onText(data);
       else this.drawn = this.onPicture(stream, data, this.drawn);
     };
-    stream.onclose = reason => this.lose(stream, reason);
+    stream.onclose = (reason, expired) => {
+      if (expired) this.api.refuse(reason);
+      this.lose(stream, reason);
+    };
   }
 
   private onText(text: string): void {

@@ -4,7 +4,7 @@ import { button, choice, iconButton, menu, menuItem } from "./controls";
 import { h, put } from "./dom";
 
 export interface Actions {
-  dataset(name: string): void; open(): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
+  dataset(name: string): void; open: (() => void) | null; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
   copyLink: ((withToken: boolean) => void) | null; command(): void; screenshot(): void; movie(): void; projection(): void;
 }
 
@@ -27,7 +27,7 @@ export class Shell {
   // `isPage`: the viewer is all that the page has, so it has the page's landmarks.
   constructor(element: HTMLElement, isPage: boolean, private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, player: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
     this.stage = h(isPage ? "main" : "div", { class: "stage", role: isPage ? null : "group", "aria-label": "Pictures" });
-    const { copyLink } = actions, views = iconButton("Views", "views", () => undefined);
+    const { copyLink, open } = actions, views = iconButton("Views", "views", () => undefined);
     const share = button("Share", "link", () => undefined, "share");
     this.layoutButtons = [iconButton("One picture", "single", () => actions.layout(false), "L"), iconButton("With slices", "quad", () => actions.layout(true), "L")];
     this.machineButton = iconButton("Machine panel", "machine", actions.machine, "M");
@@ -35,7 +35,7 @@ export class Shell {
     for (const each of this.layoutButtons) each.classList.add("layout-button"); // a narrow page has them in menus
     this.machineButton.classList.add("machine-button");
     this.panelButton.setAttribute("aria-controls", "panel");
-    const header = h(isPage ? "header" : "div", { class: "bar" }, isPage && h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element, iconButton("Open a file", "open", actions.open, "F"),
+    const header = h(isPage ? "header" : "div", { class: "bar" }, isPage && h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element, open && iconButton("Open a file", "open", open, "F"),
       h("div", { class: "group", role: "group", "aria-label": "View" },
         menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection), menuItem("Slices beside the picture", "L", () => actions.layout(this.panes.dataset["layout"] !== "quad")), menuItem("Machine panel", "M", actions.machine)]),
         iconButton("Reset the view", "reset", actions.reset, "R")),

@@ -7,7 +7,7 @@ import { clamp } from "./vec";
 
 const ECHO_MS = 2500; // after a change: what the gateway tells until then may be older
 
-export function simulationSection({ api, say }: Context): { element: HTMLElement; set(dataset: Dataset | undefined): void } {
+export function simulationSection({ api, offers, say }: Context): { element: HTMLElement; set(dataset: Dataset | undefined): void } {
   const time = h("output", {}), list = h("div", { class: "list" });
   const element = section("Simulation", true, row("Time", time), list);
   let name = "", made = "", fields: { set(value: number): void }[] = [], changedAt = -Infinity;
@@ -23,6 +23,10 @@ export function simulationSection({ api, say }: Context): { element: HTMLElement
     sending = false;
   };
   const field = ({ name: parameter, least, most }: Parameter): { element: HTMLElement; set(value: number): void } => {
+    if (!offers.may("steer")) {
+      const output = h("output", {});
+      return { element: row(parameter, output), set: value => putText(output, shown(value)) };
+    }
     const id = `parameter-${parameter}`;
     const change = (value: number): void => {
       const chosen = clamp(value, least, most);

@@ -44,7 +44,13 @@ function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
   };
   let chosen = choose(model.get("_address"));
   const connection: Connection = {
-    request: async (path, query, init) => { await chosen; return (gateway ?? kernel).request(path, query, init); },
+    request: async (path, query, init) => {
+      await chosen;
+      const answer = await (gateway ?? kernel).request(path, query, init);
+      if (!gateway || answer.status !== 401) return answer;
+      chosen = choose(""); // another gateway is at that address now
+      return connection.request(path, query, init);
+    },
     open: () => (gateway ?? kernel).open(),
   };
 
