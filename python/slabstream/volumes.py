@@ -413,7 +413,7 @@ def on_grid(volume: Volume, grid: Grid | None) -> Volume:
 def file_type_of(volume: Volume) -> str:
     """That its samples are written as."""
     dtype = numpy.dtype(volume.samples.dtype)
-    name = dtype.newbyteorder("=").name
+    name: str = dtype.newbyteorder("=").name
     if volume.masked and (name == "bool" or name in _AS_THEY_ARE):
         return "float32"  # NaN is what is masked
     if name == "bool":
