@@ -11,13 +11,14 @@ import tempfile
 import weakref
 from typing import TYPE_CHECKING, Any, Callable, Iterator
 
+from .address import is_address
 from .drafts import draft_of
 from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
 from .frame import Frame
 from .image import Image
 from .local import lock, running
 from .options import takes_options_of
-from .service import Service, is_address
+from .service import Service
 from .viewer import VIEWER_OPTIONS, Viewer
 from .volumes import Grid, check_spacing, is_xarray, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
@@ -55,8 +56,6 @@ class Volume(contextlib.AbstractContextManager["Volume"]):
     def view(self, **options: Any) -> Widget | Viewer:
         """As Service.view."""
         return self.service.view(self.name, keep=self, **self._shows | options)
-
-    show = view  # its former name
 
     @takes_options_of("slice")
     def slice(self, **options: Any) -> Image:
@@ -215,6 +214,3 @@ def view(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     loaded = volume if isinstance(volume, Volume) else load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels,
                                                             overlay=overlay, service=service)
     return loaded.view(**options)
-
-
-show = view  # its former name
