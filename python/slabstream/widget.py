@@ -45,8 +45,8 @@ def _running_cell() -> str | None:
 
 
 def _close_gone(run: Any = None) -> None:
-    """Closes those that no page shows any more: their cell runs again, or the page has closed them, or marimo. ipywidgets would keep them, and they
-    their volumes. `run`: of a cell, which is about to begin."""
+    """Closes widgets that no page shows any more: those whose cell runs again, and those whose comm was closed, as marimo does. ipywidgets would
+    keep them, and they their volumes. `run`: of a cell, which is about to begin."""
     cell = getattr(run, "cell_id", None)
     for widget in list(_open):
         if getattr(widget.comm, "_closed", False) or (cell is not None and widget._cell == cell):
