@@ -18,7 +18,7 @@ from .errors import (
 from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
 from .insitu import Owner
-from .loading import Volume, load, render, show, view
+from .loading import Volume, load, render, view
 from .local import shutdown
 from .page_state import Camera
 from .presets import presets
@@ -37,7 +37,7 @@ __all__ = [
     "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner",
     "Parameter", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
     "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic",
-    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "show", "shutdown", "to_pyvista", "view",
+    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "shutdown", "to_pyvista", "view",
 ]
 
 

@@ -1,4 +1,5 @@
-"""Where a service is, and the keys to it: endpoints, service files (docs/security.md), and the service that one means by naming none."""
+"""Where a service is, and the keys to it: endpoints, service files (docs/security.md), and the service that one means by naming none. And where a
+store is."""
 from __future__ import annotations
 
 import dataclasses
@@ -6,6 +7,7 @@ import ipaddress
 import json
 import os
 import pathlib
+import re
 from typing import Any
 
 from .errors import InvalidArgument
@@ -31,6 +33,11 @@ class Address:
     endpoint: str
     keys: Keys | None = None
     file: pathlib.Path | None = None  # the service file that has the keys
+
+
+def is_address(path: str) -> bool:
+    """Of a store behind a web server or in a bucket."""
+    return re.match(r"[a-z][a-z0-9+]*://", path) is not None
 
 
 def is_loopback(host: str) -> bool:

@@ -41,7 +41,7 @@ Put = Callable[[Draft, Option, Any], None]
 _MESSAGES: dict[str, Callable[[str, Any], Any]] = {
     "ImageSize": values.size, "ScalarRange": values.scalar_range, "ClipBox": values.clip_box, "ClipPlane": values.clip_planes,
     "Isosurface": values.isosurfaces, "GradientOpacityPoint": values.gradient_opacities, "LabelOpacity": values.label_opacities,
-    "LabelRange": values.label_ranges,
+    "LabelRange": values.label_ranges, "Vec3": values.directions,
 }
 
 
@@ -84,7 +84,7 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     elif field.message_type is None:
         setattr(holder, name, _scalar(field, option, value))
     elif hasattr(getattr(holder, name), "extend"):  # repeated; protobuf 7 has no FieldDescriptor.label
-        getattr(holder, name).extend(_MESSAGES.get(field.message_type.name, values.directions)(option.name, value))
+        getattr(holder, name).extend(_MESSAGES[field.message_type.name](option.name, value))
     elif field.message_type.name == "Vec3":
         getattr(holder, name).CopyFrom(values.vec3(values.point(option.name, value)))
     else:

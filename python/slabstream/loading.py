@@ -5,19 +5,22 @@ import contextlib
 import itertools
 import os
 import pathlib
+import re
+import secrets
 import tempfile
 import weakref
 from typing import TYPE_CHECKING, Any, Callable, Iterator
 
+from .address import is_address
 from .drafts import draft_of
 from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
 from .frame import Frame
 from .image import Image
 from .local import lock, running
 from .options import takes_options_of
-from .service import Service, is_address
+from .service import Service
 from .viewer import VIEWER_OPTIONS, Viewer
-from .volumes import Grid, check_spacing, labels_of, on_grid, volume_of, write_nrrd
+from .volumes import Grid, check_spacing, is_xarray, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
 
 if TYPE_CHECKING:
@@ -53,8 +56,6 @@ class Volume(contextlib.AbstractContextManager["Volume"]):
     def view(self, **options: Any) -> Widget | Viewer:
         """As Service.view."""
         return self.service.view(self.name, keep=self, **self._shows | options)
-
-    show = view  # its former name
 
     @takes_options_of("slice")
     def slice(self, **options: Any) -> Image:
@@ -96,6 +97,28 @@ def path_text(path: Any, what: str) -> str:
     return os.path.abspath(file) + text[len(file):]
 
 
+_numbers = itertools.count(2)
+_given: set[str] = set()  # names
+
+
+def _name_of(volume: Any, service: Service | None) -> str:
+    """A dataset's name, which nothing else has had: that of the file or the xarray, or what it is. `service`: others may use it, too."""
+    if _is_path(volume):
+        own = os.path.basename(str(os.fspath(volume)).partition("?")[0].rstrip("/"))
+    elif is_xarray(volume) and volume.name:
+        own = str(volume.name)
+    else:
+        own = "array" if hasattr(volume, "shape") else type(volume).__name__
+    name = given = re.sub("[^a-zA-Z0-9._-]+", "-", own)[:64] or "volume"
+    if service is not None:
+        return f"{name}-{secrets.token_hex(3)}"
+    with lock:
+        while given in _given:
+            given = f"{name}-{next(_numbers)}"
+        _given.add(given)
+    return given
+
+
 def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
@@ -109,7 +132,7 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     """
     given = [layer for layer in (labels, overlay) if layer is not None]
     shows = {what: True for what, layer in (("labels", labels), ("overlay", overlay)) if layer is not None}
-    name = f"python-{os.getpid()}-{next(_numbers)}"
+    name = _name_of(volume, service)
     if service is not None and not any(map(_is_path, (volume, *given))):
         service.add(name, volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay)
         return Volume(service, name, shows, [])
@@ -162,9 +185,6 @@ def _check(options: dict[str, Any], others: tuple[str, ...]) -> None:
     draft_of("volume", {name: value for name, value in options.items() if name not in others})
 
 
-_numbers = itertools.count(1)  # of volumes, for their names
-
-
 @takes_options_of("render")
 def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
            overlay: Any = None, service: Service | None = None, **options: Any) -> Image:
@@ -194,6 +214,3 @@ def view(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     loaded = volume if isinstance(volume, Volume) else load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels,
                                                             overlay=overlay, service=service)
     return loaded.view(**options)
-
-
-show = view  # its former name

@@ -271,7 +271,7 @@ def _channel_options(state: Mapping[str, str], dataset: Dataset | None, own: Map
     fields = [field for field in dataset.fields if field.channel] if dataset is not None else []
     names = [field.name or str(number) for number, field in enumerate(fields)]
     told = channels_of(state)
-    if told is None or (dataset is not None and len(fields) < 2):
+    if told is None or len(fields) == 1:  # none: the dataset is being loaded, and what the state says holds
         return {}
     if not state.get("channel"):
         told = {name: told.get(name, told.get(str(number), {})) for number, (name, field) in enumerate(zip(names, fields)) if field.shown} or told

@@ -6,12 +6,11 @@ import contextlib
 import copy
 import functools
 import os
-import re
 import sys
 from typing import TYPE_CHECKING, Any, AsyncGenerator, Callable, Coroutine, Generator, Iterator, Sequence, TypeVar
 
 from . import probe, schema, values
-from .address import Address, find_service
+from .address import Address, find_service, is_address
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
 from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
@@ -33,11 +32,6 @@ _QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 _MOST_VIEWS = 1024  # of one question
-
-
-def is_address(path: str) -> bool:
-    """Of a store behind a web server or in a bucket."""
-    return re.match(r"[a-z][a-z0-9+]*://", path) is not None
 
 
 def _of(field: int | str | None, time: int | str | None) -> dict[str, str]:
@@ -423,8 +417,6 @@ class Service(contextlib.AbstractContextManager["Service"]):
         browser reaches this machine, with {port} for the gateway's port; without one, pictures come over the kernel. `keep` stays as long as
         the viewer."""
         return view(self, dataset, keep, height, panel, behind_proxy, options)
-
-    show = view  # its former name
 
     def __exit__(self, *error: object) -> None:
         self.close()

@@ -49,7 +49,7 @@ class Volume:
     masked: bool = False  # some samples may be masked, as numpy.ma has it
 
 
-def _is_xarray(volume: Any) -> bool:
+def is_xarray(volume: Any) -> bool:
     return hasattr(volume, "dims") and hasattr(volume, "coords") and hasattr(volume, "data")
 
 
@@ -163,7 +163,7 @@ def _first_of_others(array: Any) -> Any:
 
 def at_time(array: Any, number: int) -> Any:
     """Of an array of four axes, or a DataArray with times, what it holds at one of them."""
-    if _is_xarray(array):
+    if is_xarray(array):
         name = next((name for name in array.dims if _role(array, name) == "t"), None)
         if name is None:
             raise InvalidArgument(f"time is {number}, but the DataArray has no times: its axes are {', '.join(map(str, array.dims))}")
@@ -177,7 +177,7 @@ def channels_of(array: Any, axis: int | None) -> dict[str, Any]:
     """By names. Of an array without channels: itself, without a name. `axis`: as of DaskService.render."""
     if axis is not None and not (array.ndim == 4 and -4 <= axis < 4):
         raise InvalidArgument(f"channel_axis is {axis}, but the array has {array.ndim} axes: must have 4, and channel_axis be in [-4, 3]")
-    if _is_xarray(array):
+    if is_xarray(array):
         dim = next((dim for dim in array.dims if _role(array, dim) == "c"), None) if axis is None else array.dims[axis]
         if dim is None:
             return {"": array}
@@ -356,7 +356,7 @@ def _of_array(volume: Any) -> Volume:
 
 def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None) -> Volume:
     """Given arguments take precedence over what the object states. InvalidArgument names what is wrong with it."""
-    if _is_xarray(volume):
+    if is_xarray(volume):
         found = _from_xarray(volume, places=spacing is None)
     elif _is_nibabel(volume):
         found = _from_nibabel(volume)
@@ -413,7 +413,7 @@ def on_grid(volume: Volume, grid: Grid | None) -> Volume:
 def file_type_of(volume: Volume) -> str:
     """That its samples are written as."""
     dtype = numpy.dtype(volume.samples.dtype)
-    name = dtype.newbyteorder("=").name
+    name: str = dtype.newbyteorder("=").name
     if volume.masked and (name == "bool" or name in _AS_THEY_ARE):
         return "float32"  # NaN is what is masked
     if name == "bool":

@@ -10,12 +10,14 @@ import contextlib
 import dataclasses
 import functools
 import html
-import importlib
 import uuid
+import weakref
 from typing import Any, Callable, Mapping, Sequence
 
 import anywidget
 import traitlets
+from IPython import get_ipython
+from IPython.display import display
 from ipywidgets import CallbackDispatcher
 
 from .errors import InvalidArgument, SlabstreamError, warn
@@ -30,6 +32,29 @@ from .viewer import Viewer
 STILL = "A still picture of {}. Run the cell to turn it."
 _STILL_SECONDS = 10.0  # that a cell waits for its still picture
 _CAMERA_FIELDS = [field.name for field in dataclasses.fields(Camera)]
+
+
+_open: weakref.WeakSet[Widget] = weakref.WeakSet()
+
+
+def _running_cell() -> str | None:
+    """The cell of the notebook that runs. None: the page does not name it."""
+    shell: Any = get_ipython()
+    parent: Mapping[str, Any] = shell.get_parent() if hasattr(shell, "get_parent") else {}
+    return (parent.get("metadata") or {}).get("cellId")
+
+
+def _close_gone(run: Any = None) -> None:
+    """Closes widgets that no page shows any more: those whose cell runs again, and those whose comm was closed, as marimo does. ipywidgets would
+    keep them, and they their volumes. `run`: of a cell, which is about to begin."""
+    cell = getattr(run, "cell_id", None)
+    for widget in list(_open):
+        if getattr(widget.comm, "_closed", False) or (cell is not None and widget._cell == cell):
+            widget.close()
+
+
+if (_shell := get_ipython()) is not None:
+    _shell.events.register("pre_run_cell", _close_gone)
 
 
 @functools.lru_cache(1)
@@ -73,7 +98,8 @@ class Widget(anywidget.AnyWidget):
     state = traitlets.Dict(help="Texts by the names of the page's link")
 
     def __init__(self, viewer: Viewer, height: int | str = 512, panel: bool = False):
-        self._viewer = viewer
+        _close_gone()
+        self._viewer, self._cell = viewer, _running_cell()
         self._picked, self._failed = CallbackDispatcher(), CallbackDispatcher()
         self._relay = Relay(viewer.gateway, self._say, self._find_address)
         self._still = dict(viewer.first), self._begin_still(viewer.first)  # it is drawn while the gateway starts
@@ -81,6 +107,7 @@ class Widget(anywidget.AnyWidget):
                          _esm=_module_of(viewer.gateway()), _address=viewer.address, _state=dict(viewer.first), _panel=panel,
                          _height=f"{height}px" if isinstance(height, int) else height)
         self.on_msg(self._hear)
+        _open.add(self)
 
     @property
     def url(self) -> str | None:
@@ -101,7 +128,8 @@ class Widget(anywidget.AnyWidget):
         self._failed.register_callback(callback, remove=remove)
 
     def close(self) -> None:
-        """Takes it from the page, and lets go of the volume that was loaded for it."""
+        """Takes it from the page, and lets go of the volume that was loaded for it. So does running its cell again."""
+        _open.discard(self)
         self._relay.close()
         self._viewer.close()
         super().close()
@@ -174,7 +202,6 @@ class Widget(anywidget.AnyWidget):
     def _ipython_display_(self, **kwargs: Any) -> None:
         """The view, and then a picture as an output of its own: JupyterLab shows nothing else of an output whose widget is gone. Pages that are
         alive hide it."""
-        display: Any = importlib.import_module("IPython.display").display
         data, more = super()._repr_mimebundle_(**kwargs)
         display(data, metadata=more, raw=True)
         try:

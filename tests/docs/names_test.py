@@ -31,7 +31,7 @@ def files() -> dict[str, str]:
     """Path from the root -> text, of all files but documents and what a build makes; of folders, '' and a path that ends in /."""
     found = {}
     for folder, folders, names in os.walk(ROOT):
-        made = {f for f in folders if (ROOT / folder / f / "CMakeCache.txt").exists()} | {".git", "__pycache__", "node_modules"}
+        made = {f for f in folders if f.startswith("build-") or (ROOT / folder / f / "CMakeCache.txt").exists()} | {".git", "__pycache__", "node_modules"}
         folders[:] = [f for f in folders if f not in made]
         here = pathlib.Path(folder).relative_to(ROOT)
         found |= {f"{here / f}/": "" for f in folders}

@@ -149,6 +149,13 @@ class Kernel(Browsed):
         one.focus()
         np.testing.assert_array_equal(self.check_picture(one), second)
 
+    def test_a_cell_that_runs_again_lets_go_of_its_volume(self) -> None:
+        tab = self.notebook(LOAD, "widget = ss.view(array, azimuth=30, elevation=20, height=600)\nwidget", **KERNEL_ALONE)
+        tab.run_cell(1)
+        tab.has_run(1)
+        self.assertEqual(tab.ask("len(volume.service.datasets())"), "2")
+        self.check_picture(tab)
+
     def test_it_goes_on_after_a_silence(self) -> None:
         """As of a closed lid."""
         tab = self.notebook(LOAD, VIEW, **KERNEL_ALONE)

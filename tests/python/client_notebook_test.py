@@ -182,9 +182,10 @@ class Channels(InAFolder):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.addCleanup(server.shutdown)
         with unittest.mock.patch.dict(sys.modules, {"slabstream.widget": None}):
-            viewer = ss.view(f"http://127.0.0.1:{server.server_port}/{path.name}", size=40, time=1)
+            shown = dict(size=40, time=1, channels={"DAPI": {"color": "white"}})
+            viewer = ss.view(f"http://127.0.0.1:{server.server_port}/{path.name}", **shown)  # it is not loaded yet
             self.addCleanup(viewer.close)
-            np.testing.assert_array_equal(np.asarray(viewer.picture()), np.asarray(ss.view(path, size=40, time=1).picture()))
+            np.testing.assert_array_equal(np.asarray(viewer.picture()), np.asarray(ss.render(path, background="#0d1014", fit=True, **shown)))
 
     def test_states_of_channels_are_the_options_of_pictures(self) -> None:
         with unittest.mock.patch.dict(sys.modules, {"slabstream.widget": None}), ss.load(write_cells(self.folder)) as cells:

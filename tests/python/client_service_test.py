@@ -566,6 +566,15 @@ class OwnService(InAFolder):
         with ss.load(path) as volume:
             self.assertLessEqual(len(volume.service.datasets()), known + 1)
 
+    def test_names_of_volumes_say_what_they_are(self) -> None:
+        values, path = volume_arrays()[0], self.folder / "a scan.raw"
+        path.write_bytes(values.tobytes())
+        with ss.load(values) as one, ss.load(values) as other, ss.load(f"{path}?dims=28,24,20,type=uint8") as file:
+            names = [volume.name for volume in (one, other, file)]
+            for name, pattern in zip(names, (r"array(-\d+)?", r"array-\d+", "a-scan.raw")):
+                self.assertRegex(name, f"^{pattern}$")
+            self.assertEqual(len({*names} & {dataset.name for dataset in one.service.datasets()}), 3)
+
     def test_options_for_reading_stand_behind_a_path(self) -> None:
         values = volume_arrays()[0]
         (self.folder / "a.raw").write_bytes(values.tobytes())

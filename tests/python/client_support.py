@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import select
+import signal
 import struct
 import subprocess
 import sys
@@ -24,6 +25,8 @@ os.environ["SLABSTREAM_PROGRAMS"] = str(PROGRAMS)
 PROGRAM = str(PROGRAMS / "slabstream")
 
 from slabstream import volumes  # noqa: E402
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # where this runs in a shell's background, it and its children would ignore it
 
 START_SECONDS = 60
 HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)  # options of a frame that takes seconds

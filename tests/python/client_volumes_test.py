@@ -12,6 +12,7 @@ import numpy as np
 from client_support import PROGRAM, InAFolder
 
 import slabstream as ss  # noqa: E402
+from slabstream import loading  # noqa: E402
 from slabstream.volumes import Grid, grid_of, labels_of, volume_of, write_nrrd  # noqa: E402
 
 
@@ -221,6 +222,10 @@ class Files(InAFolder):
         with self.assertRaisesRegex(ss.InvalidArgument, "the coordinates of 'x' do not lie evenly"):
             volume_of(xarray.DataArray(values, dims=("z", "y", "x"), coords={"x": [0, 1, 2, 4]}))
         volume_of(xarray.DataArray(values, dims=("z", "y", "x"), coords={"x": [0, 1, 2, 4]}), spacing=1)
+
+    def test_an_xarray_gives_its_dataset_its_name(self) -> None:
+        array = need("xarray").DataArray(np.zeros((2, 3, 4), np.uint8), name="sea ice")
+        self.assertRegex(loading._name_of(array, None), r"^sea-ice(-\d+)?$")
 
     def test_axes_of_xarray_are_known_by_name(self) -> None:
         xarray = need("xarray")

@@ -21,6 +21,7 @@ import numpy as np
 from client_support import ROOT, WithAService, read_png, volume_arrays
 
 try:
+    import IPython.core.interactiveshell
     import anywidget  # noqa: F401
     import comm
     import comm.base_comm
@@ -32,6 +33,7 @@ except ImportError as missing:
 
 import slabstream as ss  # noqa: E402
 from slabstream import gateway, relay  # noqa: E402
+from slabstream import widget as widget_module  # noqa: E402
 
 SECONDS = 60  # far above what anything needs
 
@@ -251,6 +253,17 @@ class Widgets(WithAService):
                 thread.join(SECONDS)
                 self.assertFalse(thread.is_alive())
         self.assertEqual(len(self.service.datasets()), 1)
+
+    def test_a_cell_that_runs_again_lets_go_of_its_volumes(self) -> None:
+        shell = IPython.core.interactiveshell.InteractiveShell()
+        shell.get_parent = lambda: {"metadata": {"cellId": running}}  # as a kernel's
+        shell.events.register("pre_run_cell", widget_module._close_gone)
+        shell.user_ns["view"] = lambda: ss.view(np.full((8, 9, 10), 3, np.uint8), service=self.service)
+        with unittest.mock.patch.object(widget_module, "get_ipython", lambda: shell):
+            for running, code, datasets in (("a", "two = view(), view()", 3), ("b", "other = view()", 4), ("a", "two = view(), view()", 4), (None, "3", 4),
+                                            ("a", "3", 2), ("d", "other.comm._closed = True", 2), ("c", "last = view()", 2), ("c", "last.close()", 1)):
+                shell.run_cell(code, cell_id=running).raise_error()
+                self.assertEqual(len(self.service.datasets()), datasets, (running, code))
 
     def test_the_tutorial_runs(self) -> None:
         text = (ROOT / "docs" / "python.md").read_text()
