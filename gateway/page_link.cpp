@@ -6,6 +6,7 @@ namespace slabstream {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::seconds(10);         // of the least delay: ways change
+constexpr std::size_t kMostUnderWay = 16;                       // whatever the page says
 constexpr Duration kQuickest = std::chrono::milliseconds(25);  // more pictures a second are not sent ahead
 
 Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
@@ -47,7 +48,7 @@ bool PageLink::OnAck(std::uint64_t frame, Duration in_page, Time now) {
 std::size_t PageLink::most_under_way() const {
   if (picture_time_ == Duration::zero() || delay() < kQuickest) return 1;
   const Duration each = std::max(picture_time_, kQuickest);
-  return 1 + std::size_t((delay() + each - Duration(1)) / each);
+  return std::min(1 + std::size_t((delay() + each - Duration(1)) / each), kMostUnderWay);
 }
 
 Time PageLink::ready() const {

@@ -1,5 +1,5 @@
-// VideoEncoder: the pictures of a view that moves as video: VP9 (profile 0, 4:2:0, BT.709), one chunk a picture, of constant
-// quality. A chunk says what differs from the picture before, so a page needs all of them, in order. One thread at a time.
+// VideoEncoder: encodes the pictures of a moving view as VP9 (profile 0, 4:2:0, BT.709), one chunk a picture, of constant quality. A chunk says
+// what differs from the picture before, so a page needs all of them, in order. One thread at a time.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +20,9 @@ class VideoEncoder {
 
   struct Chunk {
     std::vector<std::byte> bytes;
-    bool key = false;  // it needs none before it: the first one, and one of another size than the one before
+    bool key = false;  // it can be decoded without earlier ones: the first one, and the first one of another size
   };
-  // Over black, as far as the picture is transparent. Internal: libvpx refused; the next chunk is a key then.
+  // Transparent parts become black. Internal: libvpx refused; the next chunk is a key then.
   Result<Chunk> Encode(const ComposedPicture& picture);
 
  private:

@@ -19,8 +19,8 @@ constexpr Duration kVideoAbove = milliseconds(40), kFar = milliseconds(10), kVid
 // Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
 constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
-// Where there is no coarser level, as of grids, pictures while moving get half the width and height above the first, and twice as much
-// below the second: a quarter of the pixels takes at least a quarter of the time. If it takes more than this share of the time before, the
+// Where there is no coarser level, as of grids, pictures while moving get half the width and height if two in turn are above the first, and
+// twice as much below the second: a quarter of the pixels takes at least a quarter of the time. If it takes more than this share of the time before, the
 // voxels take the time and not the pixels, so pictures are whole again for a while.
 constexpr Duration kSmallerAbove = milliseconds(120), kWiderBelow = milliseconds(25), kWholeFor = std::chrono::seconds(20);
 constexpr double kLeastScale = 0.25, kHelpfulShare = 0.7;
@@ -78,12 +78,13 @@ void ViewMachine::AdaptScale(bool no_coarser, Duration time, Time now) {
   if (scale_ < 1 && double(time.count()) > kHelpfulShare * double(wider_time_.count())) {
     scale_ = 1;
     whole_until_ = now + kWholeFor;
-  } else if (no_coarser && time > kSmallerAbove && now >= whole_until_ && scale_ > kLeastScale) {
+  } else if (no_coarser && std::min(time, time_before_) > kSmallerAbove && now >= whole_until_ && scale_ > kLeastScale) {
     wider_time_ = time;
     scale_ /= 2;
   } else if (time < kWiderBelow) {
     scale_ = std::min(2 * scale_, 1.0);
   }
+  time_before_ = time;
 }
 
 void ViewMachine::OnLoading(Time now) {

@@ -113,6 +113,7 @@ class ViewMachine {
   Time video_until_{};                    // pictures while moving are video
   bool small_ = false;                    // pictures while moving have half the size, for the connection's sake
   double scale_ = 1;                      // the scale of pictures while moving, below 1 for the service's sake
+  Duration time_before_{};                // what the last picture while moving took
   Duration wider_time_{};                 // what the last picture of twice the scale took
   Time whole_until_{};                    // scale_ stays 1
   double coarseness_ = kFirstCoarseness;  // the coarseness of pictures while the view moves

@@ -92,6 +92,12 @@ TEST(PageLink, OnASlowWayPicturesDoNotQueue) {
   EXPECT_LE(way.longest, 190);
 }
 
+TEST(PageLink, AtMost16AreUnderWay) {
+  Way way{.delay = 900, .time = 1, .pace = 5};  // a page may hold its answers back
+  way.Run(0, 10000);
+  EXPECT_EQ(way.most, 16);
+}
+
 TEST(PageLink, LosslessPicturesDoNotCount) {
   PageLink link;
   link.OnSent(1, true, Clock(0));

@@ -265,7 +265,8 @@ TEST_F(SmallPictures, MoveWhereThereIsNoCoarserLevel) {
 }
 
 TEST_F(SmallPictures, DoNotMoveWhereTheyTakeAsLong) {
-  EXPECT_EQ(ScaleOf(1000, 500), 1);
+  EXPECT_EQ(ScaleOf(500, 500), 1);
+  EXPECT_EQ(ScaleOf(1200, 500), 1) << "one is no rule";
   EXPECT_EQ(ScaleOf(2000, 450), 0.5);
   EXPECT_EQ(ScaleOf(3000, 500), 1) << "the voxels take the time";
   EXPECT_EQ(ScaleOf(4000, 500), 1);

@@ -1,5 +1,6 @@
-// Pictures that come as video: VP9, each chunk one picture, which needs those before it. Browsers have a decoder for pages over https and on
-// localhost (WebCodecs).
+// Decodes pictures that come as VP9. Each chunk is one picture, and can be decoded after all chunks before it. Browsers have a decoder for pages
+// over https and on localhost (WebCodecs). A connection whose decoder has failed once has no video any more.
+// Profile 0, level 5.1, 8 bits.
 const CONFIG = { codec: "vp09.00.51.08", optimizeForLatency: true };
 
 let supported = false;
@@ -21,7 +22,7 @@ export class VideoPictures {
           this.decoder = new VideoDecoder({ output: picture => this.keep(picture), error: error => this.fail(error) });
           this.decoder.configure(CONFIG);
         }
-        this.decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: this.chunks++, data }));
+        this.decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: this.chunks++ /* only their order counts */, data }));
       } catch (error) {
         this.fail(error as Error);
       }
