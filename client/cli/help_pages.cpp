@@ -58,7 +58,7 @@ std::vector<CommandPage> CommandPages() {
        {.options = {"output", "isovalue", "label", "level", "caps", "progress", "time", "channel", "series", "array", "dataset"},
         .examples = {{"slabstream isosurface ct.nrrd --isovalue 300 -o bone.ply", "The surface of bones, for a mesh viewer"},
                      {"slabstream isosurface seg.nrrd --label 3 -o organ.stl --caps", "A closed solid of a segment, to be printed"},
-                     {"slabstream isosurface large.ome.zarr --isovalue 90 --level 2 -o coarse.obj", "From a coarse level"}}}},
+                     {"slabstream isosurface large.ome.zarr --isovalue 90 --level 2 -o coarse.ply", "From a coarse level"}}}},
       {"transfer",
        {.options = {"list", "preview", "scalar-range"},
         .examples = {{"slabstream transfer --list", "The names of all presets"},

@@ -47,83 +47,66 @@ class MappedFile {
   void* data_ = MAP_FAILED;
 };
 
-struct Surface {
-  const MappedFile<SurfaceVertex>& vertices;
-  const MappedFile<SurfaceTriangle>& triangles;
-  std::string about, world;  // lines for people, without an end
-};
-
 template <class T>
 void Put(std::vector<std::byte>& bytes, const T& value) {
   const auto* const begin = reinterpret_cast<const std::byte*>(&value);
   bytes.insert(bytes.end(), begin, begin + sizeof value);
 }
 
-// Appends what put(buffer, element) makes of each element, some at a time.
-template <class T, class Put>
-bool AppendAll(const MappedFile<T>& from, OutputFile& out, const std::function<bool()>& goes_on, const Surface& surface, Put&& put) {
-  std::vector<std::byte> buffer;
-  for (std::span<const T> rest = from.all(); !rest.empty() && out.ok();) {
-    if (!goes_on()) return false;
-    const std::size_t count = std::min(kAtOnce, rest.size());
-    buffer.clear();
-    for (const T& each : rest.first(count)) put(buffer, each);
-    out.Append(buffer);
-    rest = rest.subspan(count);
-    surface.vertices.Forget();
-    surface.triangles.Forget();
-  }
-  return true;
-}
+struct Joining {
+  const MappedFile<SurfaceVertex> vertices;
+  const MappedFile<SurfaceTriangle> triangles;
+  const std::string about, world;  // lines for people, without an end
+  const std::function<bool()>& goes_on;
+  OutputFile& out;
 
-bool WritePly(const Surface& surface, OutputFile& out, const std::function<bool()>& goes_on) {
-  out.Append(fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}\ncomment {}\nelement vertex {}\n", surface.about, surface.world,
-                         surface.vertices.all().size()));
-  for (const char* const name : {"x", "y", "z", "nx", "ny", "nz"}) out.Append(fmt::format("property float {}\n", name));
-  out.Append(fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", surface.triangles.all().size()));
-  return AppendAll(surface.vertices, out, goes_on, surface, Put<SurfaceVertex>) &&
-         AppendAll(surface.triangles, out, goes_on, surface, [](std::vector<std::byte>& buffer, const SurfaceTriangle& triangle) {
-           Put(buffer, std::uint8_t{3});
-           Put(buffer, triangle);
+  // Appends what put(bytes, element) makes of each element of `from`, some at a time. Whether it went on to the end.
+  template <class T, class Put>
+  bool Append(const MappedFile<T>& from, Put&& put) {
+    std::vector<std::byte> bytes;
+    for (std::span<const T> rest = from.all(); !rest.empty() && out.ok();) {
+      if (!goes_on()) return false;
+      const std::size_t count = std::min(kAtOnce, rest.size());
+      bytes.clear();
+      for (const T& each : rest.first(count)) put(bytes, each);
+      out.Append(bytes);
+      rest = rest.subspan(count);
+      vertices.Forget();
+      triangles.Forget();
+    }
+    return true;
+  }
+};
+
+bool WritePly(Joining& of) {
+  of.out.Append(
+      fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}\ncomment {}\nelement vertex {}\nproperty float x\nproperty float y\n"
+                  "property float z\nproperty float nx\nproperty float ny\nproperty float nz\nelement face {}\n"
+                  "property list uchar int vertex_indices\nend_header\n",
+                  of.about, of.world, of.vertices.all().size(), of.triangles.all().size()));
+  return of.Append(of.vertices, Put<SurfaceVertex>) &&
+         of.Append(of.triangles, [](std::vector<std::byte>& bytes, const SurfaceTriangle& triangle) {
+           Put(bytes, std::uint8_t{3});
+           Put(bytes, triangle);
          });
 }
 
-bool WriteStl(const Surface& surface, OutputFile& out, const std::function<bool()>& goes_on) {
-  std::string header = "binary STL: " + surface.about;
-  header.resize(80, ' ');
-  out.Append(header);
+bool WriteStl(Joining& of) {
   std::vector<std::byte> count;
-  Put(count, std::uint32_t(surface.triangles.all().size()));
-  out.Append(count);
-  return AppendAll(surface.triangles, out, goes_on, surface, [&](std::vector<std::byte>& buffer, const SurfaceTriangle& triangle) {
+  Put(count, std::uint32_t(of.triangles.all().size()));
+  of.out.Append(fmt::format("{:<80.80}", "binary STL: " + of.about));
+  of.out.Append(count);
+  return of.Append(of.triangles, [&](std::vector<std::byte>& bytes, const SurfaceTriangle& triangle) {
     std::array<Vec3, 3> corners;
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::array<float, 3>& position = surface.vertices.all()[std::size_t(triangle[i])].position;
+      const std::array<float, 3>& position = of.vertices.all()[std::size_t(triangle[i])].position;
       corners[i] = {position[0], position[1], position[2]};
     }
     const Vec3 normal = Cross(corners[1] - corners[0], corners[2] - corners[0]);
-    const Vec3 unit = Length(normal) > 0 ? Normalized(normal) : Vec3();
-    for (const Vec3& each : {unit, corners[0], corners[1], corners[2]})
-      Put(buffer, std::array<float, 3>{float(each.x), float(each.y), float(each.z)});
-    Put(buffer, std::uint16_t{0});
+    for (const Vec3& each : {Length(normal) > 0 ? Normalized(normal) : Vec3(), corners[0], corners[1], corners[2]})
+      Put(bytes, std::array<float, 3>{float(each.x), float(each.y), float(each.z)});
+    Put(bytes, std::uint16_t{0});
   });
-}
-
-bool WriteObj(const Surface& surface, OutputFile& out, const std::function<bool()>& goes_on) {
-  const auto put = [](std::vector<std::byte>& buffer, const std::string& text) {
-    const auto bytes = std::as_bytes(std::span(text));
-    buffer.insert(buffer.end(), bytes.begin(), bytes.end());
-  };
-  out.Append(fmt::format("# {}\n# {}\n", surface.about, surface.world));
-  return AppendAll(surface.vertices, out, goes_on, surface,
-                   [&](std::vector<std::byte>& buffer, const SurfaceVertex& vertex) {
-                     const auto& [p, n] = vertex;
-                     put(buffer, fmt::format(FMT_STRING("v {} {} {}\nvn {} {} {}\n"), p[0], p[1], p[2], n[0], n[1], n[2]));
-                   }) &&
-         AppendAll(surface.triangles, out, goes_on, surface, [&](std::vector<std::byte>& buffer, const SurfaceTriangle& triangle) {
-           const std::int64_t a = std::int64_t{triangle[0]} + 1, b = std::int64_t{triangle[1]} + 1, c = std::int64_t{triangle[2]} + 1;
-           put(buffer, fmt::format(FMT_STRING("f {0}//{0} {1}//{1} {2}//{2}\n"), a, b, c));
-         });
 }
 
 std::string WorldText(const Orientation& world) {
@@ -141,13 +124,12 @@ std::string WorldText(const Orientation& world) {
 struct MeshFormat {
   std::string_view ending;
   std::int64_t most_triangles;
-  bool (*write)(const Surface& surface, OutputFile& out, const std::function<bool()>& goes_on);  // false: was told not to go on
+  bool (*write)(Joining& of);  // false: was told not to go on
 };
 
 namespace {
 
-constexpr std::array<MeshFormat, 3> kFormats = {
-    {{".ply", INT64_MAX, WritePly}, {".stl", UINT32_MAX, WriteStl}, {".obj", INT64_MAX, WriteObj}}};
+constexpr std::array<MeshFormat, 2> kFormats = {{{".ply", INT64_MAX, WritePly}, {".stl", UINT32_MAX, WriteStl}}};
 
 }  // namespace
 
@@ -188,14 +170,13 @@ Status MeshFile::Finish(const std::string& surface, const Orientation& world, co
   for (OutputFile* const file : {&vertex_file_, &triangle_file_}) {
     if (Status closed = file->Close(); !closed.ok()) return closed;
   }
-  const MappedFile<SurfaceVertex> vertices(vertex_file_.written_path(), vertices_);
-  const MappedFile<SurfaceTriangle> triangles(triangle_file_.written_path(), triangles_);
   Result<OutputFile> out = OutputFile::Create(path_);
   if (!out.ok()) return out.status();
-  if (!vertices.ok() || !triangles.ok()) {
+  Joining of{
+      {vertex_file_.written_path(), vertices_}, {triangle_file_.written_path(), triangles_}, surface, WorldText(world), goes_on, *out};
+  if (!of.vertices.ok() || !of.triangles.ok())
     return Status::Unavailable(fmt::format("cannot write '{}': its parts cannot be read: {}", path_, std::strerror(errno)));
-  }
-  if (!format.write({vertices, triangles, surface, WorldText(world)}, *out, goes_on)) return Status::Cancelled("writing was stopped");
+  if (!format.write(of)) return Status::Cancelled("writing was stopped");
   return out->Finish();
 }
 

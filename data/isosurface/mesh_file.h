@@ -3,7 +3,6 @@
 //
 //   .ply   binary, little endian: vertices with normals as floats, triangles as numbers of vertices; vertices are shared
 //   .stl   binary: each triangle with its corners as floats
-//   .obj   text: as .ply
 //
 // Lengths are those of the world. No file is left behind unless Finish succeeds. One thread at a time.
 #pragma once
@@ -22,7 +21,7 @@ namespace slabstream {
 
 struct MeshFormat;
 const MeshFormat* FindMeshFormat(std::string_view path);  // null: its ending is that of none
-std::string MeshEndings();                                // ".ply, .stl, .obj"
+std::string MeshEndings();                                // ".ply, .stl"
 
 class MeshFile {
  public:

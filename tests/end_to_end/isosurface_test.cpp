@@ -1,33 +1,18 @@
 // `isosurface`: from the file to the mesh in the world.
 #include <gmock/gmock.h>
 
-#include <array>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "tests/data/isosurface/surface.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
 
-class IsosurfaceTest : public EndToEndTest {
- protected:
-  // Vertices: position and normal.
-  std::vector<std::array<float, 6>> Vertices(const std::string& name) const {
-    std::istringstream obj(ReadFile(name));
-    std::vector<std::array<float, 6>> vertices;
-    for (std::string word; obj >> word;) {
-      if (word == "v") {
-        std::array<float, 6>& v = vertices.emplace_back();
-        obj >> v[0] >> v[1] >> v[2] >> word >> v[3] >> v[4] >> v[5];
-      }
-    }
-    return vertices;
-  }
-};
+class IsosurfaceTest : public EndToEndTest {};
 
 TEST_F(IsosurfaceTest, EveryFormatAndEveryWayToReadGiveTheSameSurface) {
   MakeSphere("s.nrrd", 2, 70);
@@ -37,14 +22,14 @@ TEST_F(IsosurfaceTest, EveryFormatAndEveryWayToReadGiveTheSameSurface) {
   const std::string counts = made.out.substr(made.out.find(':'));
   EXPECT_THAT(counts, HasSubstr(" triangles\n"));
   for (const char* const name : {"s.nrrd", "s.nii.gz", "s.ome.zarr", "s.npy"}) {
-    for (const char* const mesh : {"b.stl", "b.obj", "b.ply"}) {
+    for (const char* const mesh : {"b.stl", "b.ply"}) {
       EXPECT_EQ(MustRun({"isosurface", name, "--isovalue", "100", "-o", mesh}).out, std::string("wrote ") + mesh + counts) << name;
     }
     EXPECT_EQ(ReadFile("b.ply").size(), ReadFile("a.ply").size());
   }
   const std::string coarse = MustRun({"isosurface", "s.ome.zarr", "--isovalue", "100", "--level", "1", "-o", "c.ply"}).out;
   EXPECT_LT(ReadFile("c.ply").size(), ReadFile("a.ply").size() / 2) << coarse;
-  EXPECT_EQ(Files(), (std::vector<std::string>{"a.ply", "b.obj", "b.ply", "b.stl", "c.ply", "s.nii.gz", "s.npy", "s.nrrd"}));
+  EXPECT_EQ(Files(), (std::vector<std::string>{"a.ply", "b.ply", "b.stl", "c.ply", "s.nii.gz", "s.npy", "s.nrrd"}));
 }
 
 TEST_F(IsosurfaceTest, LiesInThePatientsWorld) {
@@ -62,15 +47,15 @@ TEST_F(IsosurfaceTest, LiesInThePatientsWorld) {
     }
   }
   file.close();
-  MustRun({"isosurface", "p.nrrd", "--isovalue", "-15.1", "-o", "p.obj"});
-  const auto vertices = Vertices("p.obj");
-  ASSERT_GT(vertices.size(), 10U);
-  for (const std::array<float, 6>& v : vertices) {
+  MustRun({"isosurface", "p.nrrd", "--isovalue", "-15.1", "-o", "p.ply"});
+  const SurfacePart surface = ReadPly(ReadFile("p.ply"));
+  ASSERT_GT(surface.vertices.size(), 10U);
+  for (const auto& [v, normal] : surface.vertices) {
     EXPECT_NEAR(v[0], -15.1, 1e-3);
     EXPECT_TRUE(v[1] <= -11 && v[1] >= -26 && v[2] >= 30 && v[2] <= 39) << v[1] << " " << v[2];
-    EXPECT_NEAR(v[3], -1, 1e-4);
+    EXPECT_NEAR(normal[0], -1, 1e-4);
   }
-  EXPECT_THAT(ReadFile("p.obj"), HasSubstr("# world: patient, RAS: x to the right, y to anterior, z to superior; unit: mm\n"));
+  EXPECT_THAT(ReadFile("p.ply"), HasSubstr("comment world: patient, RAS: x to the right, y to anterior, z to superior; unit: mm\n"));
 }
 
 TEST_F(IsosurfaceTest, BadInputEndsInOneLine) {
@@ -85,7 +70,7 @@ TEST_F(IsosurfaceTest, BadInputEndsInOneLine) {
                         {{"-o", "x.ply", "--label", "200"}, "--label 200: no surface"},
                         {{"-o", "x.ply", "--isovalue", "256"}, "--isovalue 256: no surface; values are 0 to "},
                         {{"-o", "x.ply", "--isovalue", "9", "--level", "1"}, "--level is 1, but 's.nrrd' has level 0"},
-                        {{"-o", "x.vtk", "--isovalue", "9"}, "--output 'x.vtk' must end in one of .ply, .stl, .obj"},
+                        {{"-o", "x.vtk", "--isovalue", "9"}, "--output 'x.vtk' must end in one of .ply, .stl"},
                         {{"-o", "no/x.ply", "--isovalue", "9"}, "the directory 'no' does not exist"},
                     });
   ExpectRefused({"isosurface", "none.nrrd", "--isovalue", "9", "-o", "x.ply"}, "none.nrrd");
@@ -94,7 +79,7 @@ TEST_F(IsosurfaceTest, BadInputEndsInOneLine) {
 
 TEST_F(IsosurfaceTest, AFullDiskLeavesNothingBehind) {
   MakeSphere("s.nrrd", 2, 40);
-  for (const char* const mesh : {"m.ply", "m.obj"}) {
+  for (const char* const mesh : {"m.ply", "m.stl"}) {
     const ProgramResult full = OnFullDisk(20000, [&] { return Slabstream({"isosurface", "s.nrrd", "--isovalue", "9", "-o", mesh}); });
     EXPECT_EQ(full.exit_status, 1);
     EXPECT_THAT(full.err, HasSubstr("File too large"));

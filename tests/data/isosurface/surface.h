@@ -1,15 +1,18 @@
-// What tests ask of a surface: its edges, area, volume, and the same surface in another order.
+// What tests ask of a surface: its edges, area, volume, the same surface in another order, and what a file holds.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <numbers>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "common/base/check.h"
 #include "common/math/vec.h"
 #include "data/isosurface/surface_maker.h"
 
@@ -74,6 +77,24 @@ inline std::vector<std::array<std::array<float, 6>, 3>> Sorted(const SurfacePart
   }
   std::ranges::sort(triangles);
   return triangles;
+}
+
+inline SurfacePart ReadPly(const std::string& bytes) {
+  const std::size_t end = bytes.find("end_header\n") + 11;
+  const auto count = [&](const std::string& element) {
+    return std::size_t(std::stoll(bytes.substr(bytes.find("element " + element + " ") + 9 + element.size())));
+  };
+  SurfacePart surface;
+  surface.vertices.resize(count("vertex"));
+  surface.triangles.resize(count("face"));
+  const std::size_t vertices = surface.vertices.size() * sizeof(SurfaceVertex);
+  CHECK_EQ(bytes.size(), end + vertices + 13 * surface.triangles.size());
+  std::memcpy(surface.vertices.data(), &bytes[end], vertices);
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    CHECK_EQ(bytes[end + vertices + 13 * i], 3);
+    std::memcpy(surface.triangles[i].data(), &bytes[end + vertices + 13 * i + 1], 12);
+  }
+  return surface;
 }
 
 }  // namespace slabstream
