@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 #include <stop_token>
 #include <tuple>
 #include <utility>
@@ -16,6 +14,7 @@
 #include "data/isosurface/mesh_file.h"
 #include "data/isosurface/surface_maker.h"
 #include "data/survey/pieces.h"
+#include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {
@@ -78,57 +77,35 @@ class Work {
         file_(file) {}
 
   Status Make() {
-    done_bytes_ = 0;
-    return Read([this](const VoxelBlock& read, const Box& piece) { return Take(read, piece); }, reach_);
-  }
-
-  // The least and the greatest value of the level, for an error. Reads all once more.
-  Result<std::pair<double, double>> Range() {
-    double least = std::numeric_limits<double>::infinity(), most = -least;
-    const Status status = Read(
-        [&](const VoxelBlock& read, const Box&) {
-          VisitStoredType(read.type, [&]<class T>(const T*) {
-            for (std::int64_t i = 0; i < read.box.voxel_count(); ++i) {
-              const double value = level_.mapping.FromStored(double(read.samples<T>()[i]));
-              least = std::min(least, std::isnan(value) ? least : value);
-              most = std::max(most, std::isnan(value) ? most : value);
-            }
-          });
-          return Status::Ok();
-        },
-        0);
-    return status.ok() ? Result(std::pair(least, most)) : status;
-  }
-
- private:
-  // take(voxels of a piece grown by `halo` along x and y, the piece) -> Status, for each piece.
-  template <class Take>
-  Status Read(Take&& take, std::int32_t halo) {
     std::vector<Box> boxes = pieces_;
     for (Box& box : boxes) {
-      const Box grown = Grown(box, halo, level_.geometry.bounds());
+      const Box grown = Grown(box, reach_, level_.geometry.bounds());
       box = {{grown.begin.x, grown.begin.y, box.begin.z}, {grown.end.x, grown.end.y, box.end.z}};
     }
+    const std::uint64_t all_bytes = std::uint64_t(level_.voxel_bytes());
+    std::uint64_t done_bytes = 0;
     std::size_t next = 0;
     std::stop_source stop;
     Status failure;
-    const auto take_next = [&](const VoxelBlock& read) {
+    const auto take = [&](const VoxelBlock& read) {
+      if (!failure.ok()) return;  // this piece had been read before it was told to stop
       const Box& piece = pieces_[next++];
-      if (failure.ok()) failure = take(read, piece);
-      done_bytes_ += std::uint64_t(piece.voxel_count()) * BytesPerSample(level_.type);
-      if (failure.ok() && !options_.progress(std::min(done_bytes_, all_bytes_), all_bytes_)) failure = Status::Cancelled("was stopped");
+      failure = Take(read, piece);
+      done_bytes += std::uint64_t(piece.voxel_count()) * BytesPerSample(level_.type);
+      if (failure.ok() && !options_.progress(done_bytes, all_bytes)) failure = Status::Cancelled("was stopped");
       if (!failure.ok()) stop.request_stop();
     };
     Status status;
     if (whole_ != nullptr) {
-      for (std::size_t i = 0; i < boxes.size() && failure.ok(); ++i) take_next(CutBlock(whole_->volume->block, boxes[i]));
+      for (std::size_t i = 0; i < boxes.size() && failure.ok(); ++i) take(CutBlock(whole_->volume->block, boxes[i]));
     } else {
       // A stream that is read in two places at a time would begin anew.
-      status = ReadPieces(source_, options_.level, boxes, source_.info().slices ? 0 : 2, take_next, stop.get_token());
+      status = ReadPieces(source_, options_.level, boxes, source_.info().slices ? 0 : 2, take, stop.get_token());
     }
     return failure.ok() ? status : failure;
   }
 
+ private:
   Status Take(const VoxelBlock& read, const Box& piece) {
     if (read.box.begin.z == 0) {
       window_ = {read.box, read.type, {}};
@@ -181,8 +158,6 @@ class Work {
   const std::vector<Box> pieces_;
   SurfaceMaker maker_;
   MeshFile& file_;
-  const std::uint64_t all_bytes_ = std::uint64_t(level_.voxel_bytes());
-  std::uint64_t done_bytes_ = 0;
   VoxelBlock window_;      // the slices of a column that blocks still need
   std::int32_t done_ = 0;  // where the next block of the column begins, along z
 };
@@ -205,10 +180,10 @@ Result<MeshCounts> MakeIsosurface(VolumeSource& source, const IsosurfaceOptions&
   if (file->triangles() == 0) {
     if (options.label)
       return Status::InvalidArgument(fmt::format("--label {}: no surface; no voxel has it, or it is too thin", *options.label));
-    const Result<std::pair<double, double>> range = work.Range();
-    if (!range.ok()) return range.status();
-    return Status::InvalidArgument(
-        fmt::format("--isovalue {}: no surface; values are {} to {}", options.isovalue, range->first, range->second));
+    const Result<Survey> survey = SurveySource(source);
+    if (!survey.ok()) return survey.status();
+    const ValueRange& range = survey->summary->range;
+    return Status::InvalidArgument(fmt::format("--isovalue {}: no surface; values are {} to {}", options.isovalue, range.min, range.max));
   }
   const std::uint64_t bytes = std::uint64_t(level.voxel_bytes());
   const std::string about = options.label ? fmt::format("label {}", *options.label) : fmt::format("isovalue {}", options.isovalue);

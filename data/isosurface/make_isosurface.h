@@ -33,8 +33,8 @@ struct MeshCounts {
   std::int64_t vertices = 0, triangles = 0;
 };
 
-// `path` ends as FindMeshFormat wants it. InvalidArgument: there is no such surface; the message names the range of the values. Cancelled:
-// `progress` returned false. Errors of reading, of SurfaceMaker::Add, and of MeshFile.
+// `path` ends as FindMeshFormat wants it. InvalidArgument: there is no such surface; the message names the range of the values (survey.h).
+// Cancelled: `progress` returned false. Errors of reading, of SurfaceMaker::Add, and of MeshFile.
 Result<MeshCounts> MakeIsosurface(VolumeSource& source, const IsosurfaceOptions& options, const std::string& path);
 
 }  // namespace slabstream

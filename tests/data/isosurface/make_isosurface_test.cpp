@@ -60,6 +60,10 @@ TEST_F(MakeIsosurfaceTest, PiecesAndTheOrderOfSlicesDoNotMatter) {
     StreamSource stream(source, order);
     EXPECT_EQ(Sorted(Make(stream, {.isovalue = 1.1})), expected);
   }
+  int calls = 0;
+  const auto stop_at_once = [&](std::uint64_t, std::uint64_t) { return calls++ < 0; };
+  EXPECT_EQ(MakeIsosurface(*source, {.isovalue = 1.1, .progress = stop_at_once}, Path("b.ply")).status().code(), StatusCode::kCancelled);
+  EXPECT_EQ(calls, 1);
   EXPECT_EQ(FileCount(), 1U);
 }
 
