@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <iostream>
+#include <memory>
 
 #include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
@@ -10,6 +11,7 @@
 #include "data/isosurface/make_isosurface.h"
 #include "data/isosurface/mesh_file.h"
 #include "data/open/open_source.h"
+#include "data/sources/read_context.h"
 #include "data/stores/object_cache.h"
 
 namespace slabstream {
@@ -25,7 +27,8 @@ Status RunIsosurface(const IsosurfaceCommandOptions& options) {
   source->options.describe = true;
   if (options.label) source->options.labels = true;
   if (Status status = CheckInputVolume(*source); !status.ok()) return status;
-  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source->path, source->options, ProcessReadContext());
+  const Result<std::shared_ptr<VolumeSource>> opened =
+      OpenSource(source->path, source->options, std::make_shared<ReadContext>(ReadContext::Limits()));
   if (!opened.ok()) return opened.status();
   const SourceInfo& info = (*opened)->info();
   WarnOfPart(source->path, source->options, info);
