@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::int64_t kBlockVoxels = std::int64_t{1} << 20;  // of most blocks of the surface
 constexpr std::array<int, 3> kSpline = {1, 4, 1};             // 6 times the cubic B-spline at -1, 0 and 1
-constexpr int kSplineSum = 6 * 6 * 6;
+constexpr double kHalf = 6 * 6 * 6 / 2.0;
 
 // 216 times how much of what lies around each voxel of `box` is of the label. Beyond the border, the voxels there go on.
 VoxelBlock Membership(const VoxelBlock& labels, std::uint64_t label, const Box& box) {
@@ -72,8 +72,8 @@ class Work {
         level_(level),
         reach_(kSurfaceReach + (options.label ? 1 : 0)),
         pieces_(Columns(source.info(), source.info().levels[std::size_t(options.level)])),
-        maker_(options.label ? VolumeDescription{level.geometry, ScalarType::kUint8, {}} : level,
-               options.label ? kSplineSum / 2 : options.isovalue, options.caps),
+        maker_(options.label ? VolumeDescription{level.geometry, ScalarType::kUint8, {}} : level, options.label ? kHalf : options.isovalue,
+               options.caps),
         file_(file) {}
 
   Status Make() {

@@ -72,7 +72,7 @@ inline std::vector<std::array<std::array<float, 6>, 3>> Sorted(const SurfacePart
       std::ranges::copy(vertex.position, corners.at(i).begin());
       std::ranges::copy(vertex.normal, corners.at(i).begin() + 3);
     }
-    std::ranges::rotate(corners, std::ranges::min_element(corners));
+    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
     triangles.push_back(corners);
   }
   std::ranges::sort(triangles);
