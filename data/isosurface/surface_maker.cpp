@@ -204,18 +204,20 @@ class SurfaceMaker::Block {
                                           : std::numeric_limits<double>::quiet_NaN();
   }
 
-  // Of stored samples, along the voxels' axes, in lengths of the world. Neighbours without a value do not count.
+  // Of stored samples, along the voxels' axes, in lengths of the world. The voxel has a value; neighbours without one do not count.
   Vec3 Gradient(const Index3& voxel) const {
+    const VolumeGeometry& geometry = maker_.geometry_;
+    const T* const at = samples_.samples<T>() + samples_.Offset(voxel);
+    std::int64_t step = 1;  // samples to the next voxel
     Vec3 gradient;
     for (const Axis axis : kAxes) {
-      Index3 low = Back(voxel, axis), high = voxel;
-      ++high[axis];
-      if (!std::isfinite(Value(low))) low = voxel;
-      if (!std::isfinite(Value(high))) high = voxel;
-      if (low == high) continue;
-      const Stretch& stretch = maker_.geometry_.stretch;
-      const double length = (stretch.ToData(high[axis], axis) - stretch.ToData(low[axis], axis)) * maker_.geometry_.spacing[axis];
-      gradient[axis] = (Value(high) - Value(low)) / length;
+      const int low = voxel[axis] > 0 && std::isfinite(double(at[-step])) ? 1 : 0;
+      const int high = voxel[axis] + 1 < geometry.size[axis] && std::isfinite(double(at[step])) ? 1 : 0;
+      const double voxels = geometry.rectilinear()
+                                ? geometry.stretch.ToData(voxel[axis] + high, axis) - geometry.stretch.ToData(voxel[axis] - low, axis)
+                                : high + low;
+      if (voxels > 0) gradient[axis] = (double(at[high * step]) - double(at[-low * step])) / (voxels * geometry.spacing[axis]);
+      step *= samples_.box.size()[axis];
     }
     return gradient;
   }
