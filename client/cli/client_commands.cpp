@@ -19,9 +19,11 @@
 #include "client/request/picture_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
+#include "common/text/parse_number.h"
 #include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/catalogue.h"
+#include "data/isosurface/mesh_file.h"
 #include "data/open/cache_option.h"
 #include "data/volume_io/formats.h"
 
@@ -241,6 +243,38 @@ void DeclareIndex(const CommandLine& line) {
   AddCacheOption(sub, options.cache);
   sub.AddFlag("--progress", options.progress, "Show progress on stderr");
   AddReadOptions(sub);
+  TakeReadOptions(sub, options.source);
+}
+
+void DeclareIsosurface(const CommandLine& line) {
+  const Command sub = line.app.AddCommand("isosurface", "Write the surface of an isovalue or of a label as a mesh");
+  IsosurfaceCommandOptions& options = OptionsOf(line, sub, RunIsosurface);
+  sub.AddText("SOURCE", options.source, "A volume file, or a folder such as an OME-Zarr").Required();
+  sub.AddText("-o,--output", options.output, "The mesh: " + MeshEndings()).Required().TypeName("FILE").Group(kOutputGroup);
+  const Option isovalue = AddParsed(
+                              sub, "--isovalue", options.isovalue,
+                              [](const std::string& option, const std::string& text) -> Result<std::optional<double>> {
+                                const double most = std::numeric_limits<double>::max();
+                                const Result<double> value = ParseNumber(option, text, {-most, most});
+                                return value.ok() ? Result(std::optional(*value)) : value.status();
+                              },
+                              "The value of the surface")
+                              .TypeName("NUMBER");
+  AddParsed(
+      sub, "--label", options.label,
+      [](const std::string& option, const std::string& text) -> Result<std::optional<std::uint64_t>> {
+        const std::optional<std::uint64_t> label = ParseNumber<std::uint64_t>(text);
+        if (label && *label > 0) return label;
+        return Status::InvalidArgument(fmt::format("{}: expected a whole number of at least 1, not '{}'", option, text));
+      },
+      "The label whose smooth surface is wanted; the values of SOURCE are labels then")
+      .TypeName("N")
+      .Excludes(isovalue);
+  AddInteger(sub, "--level", options.level, 0, kMaxLevels - 1, "The level of SOURCE; 0 is the finest one");
+  sub.AddFlag("--caps", options.caps, "Close the surface where it leaves the volume");
+  AddCacheOption(sub, options.cache);
+  sub.AddFlag("--progress", options.progress, "Show progress on stderr");
+  AddReadOptions(sub, {"ids"});
   TakeReadOptions(sub, options.source);
 }
 
@@ -498,11 +532,11 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,      DeclareInfo,       DeclareValue,
-                                                 DeclareMeasure,  DeclareTransfer,  DeclareConvert,    DeclareIndex,      DeclareSphere,
-                                                 DeclareClusters, DeclareUp,        DeclareView,       DeclareToken,      DeclareDown,
-                                                 DeclareStatus,   DeclareAnnotate,  DeclareKeys,       DeclareData,       DeclareSteer,
-                                                 DeclareLogs,     DeclareSlurm,     DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
+  static constexpr DeclareCommand kCommands[] = {
+      DeclareRender,  DeclareTurntable, DeclareSlice,      DeclareInfo,       DeclareValue,    DeclareMeasure, DeclareTransfer,
+      DeclareConvert, DeclareIndex,     DeclareIsosurface, DeclareSphere,     DeclareClusters, DeclareUp,      DeclareView,
+      DeclareToken,   DeclareDown,      DeclareStatus,     DeclareAnnotate,   DeclareKeys,     DeclareData,    DeclareSteer,
+      DeclareLogs,    DeclareSlurm,     DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
   return kCommands;
 }
 

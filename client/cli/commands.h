@@ -26,6 +26,7 @@ Status RunMeasure(const MeasureOptions& options);
 Status RunTransfer(const TransferOptions& options);
 Status RunConvert(const ConvertOptions& options);
 Status RunIndex(const IndexingOptions& options);
+Status RunIsosurface(const IsosurfaceCommandOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunClusters(const ClustersOptions& options);
 Status RunUp(const UpOptions& options);

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <utility>
-#include <vector>
 
+#include "client/cli/input_volume.h"
 #include "data/open/open_source.h"
 #include "data/sources/part_source.h"
 
@@ -20,13 +20,8 @@ Result<SourceToConvert> OpenToConvert(const ConvertOptions& options, const Sourc
   }
   const std::size_t held = info.whole ? CountIn(info.finest().geometry.size) * BytesPerSample(info.exact.type) : 0;
   if (!options.converts_part()) return SourceToConvert{*std::move(opened), held};
-  const std::vector<SourceLevel>& levels = info.levels;
-  if (std::size_t(options.level) >= levels.size()) {
-    return Status::InvalidArgument(
-        levels.size() == 1 ? fmt::format("--level is {}, but '{}' has level 0 alone", options.level, source.path)
-                           : fmt::format("--level is {}, but '{}' has levels 0 to {}", options.level, source.path, levels.size() - 1));
-  }
-  const Index3& size = levels[std::size_t(options.level)].description.geometry.size;
+  if (Status status = CheckLevel(options.level, info, source.path); !status.ok()) return status;
+  const Index3& size = info.levels[std::size_t(options.level)].description.geometry.size;
   Box box = options.box;
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     if (box.end[axis] == 0) box.end[axis] = size[axis];

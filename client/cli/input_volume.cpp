@@ -1,5 +1,7 @@
 #include "client/cli/input_volume.h"
 
+#include <fmt/format.h>
+
 #include "data/open/open_source.h"
 #include "data/volume_io/formats.h"
 
@@ -13,6 +15,13 @@ Status CheckInputVolume(const std::string& source) {
 Status CheckInputVolume(const SourceText& source) {
   const Status status = CheckVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
+}
+
+Status CheckLevel(int level, const SourceInfo& info, const std::string& path) {
+  const std::size_t levels = info.levels.size();
+  if (std::size_t(level) < levels) return Status::Ok();
+  return Status::InvalidArgument(levels == 1 ? fmt::format("--level is {}, but '{}' has level 0 alone", level, path)
+                                             : fmt::format("--level is {}, but '{}' has levels 0 to {}", level, path, levels - 1));
 }
 
 Status CheckInputHeaders(const std::string& source) {

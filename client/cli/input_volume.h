@@ -5,6 +5,7 @@
 
 #include "common/base/status.h"
 #include "data/open/read_volume.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
 
@@ -14,6 +15,9 @@ namespace slabstream {
 // samples.
 Status CheckInputVolume(const std::string& source);
 Status CheckInputVolume(const SourceText& source);
+
+// InvalidArgument: --level names a level that the source has not; the message says which it has.
+Status CheckLevel(int level, const SourceInfo& info, const std::string& path);
 
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
 Status CheckInputHeaders(const std::string& source);

@@ -150,6 +150,17 @@ struct IndexingOptions {
   bool progress = false;
 };
 
+struct IsosurfaceCommandOptions {
+  std::string source;                  // a path, with options for reading it or without
+  std::string output;                  // the mesh
+  std::optional<double> isovalue;      // this or the label
+  std::optional<std::uint64_t> label;  // at least 1
+  int level = 0;                       // the level of `source`
+  bool caps = false;
+  std::uint64_t cache = 0;  // bytes on disk, for what web servers send; 0: none
+  bool progress = false;
+};
+
 struct SphereOptions {
   SphereRequest request;
   std::string output;

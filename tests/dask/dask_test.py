@@ -302,16 +302,20 @@ class ServiceTest(unittest.TestCase):
             self.assertTrue(pathlib.Path(folder, "a.png").exists())
 
     def test_the_notebook(self):
+        def pictures(notebook):
+            outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+            return [read_png(base64.b64decode(output.data["image/png"])).astype(int) for output in outputs if "image/png" in output.get("data", {})]
+
         notebook = nbformat.read(ROOT / "docs" / "dask.ipynb", nbformat.NO_CONVERT)
-        self.assertFalse(any(cell.get("outputs") for cell in notebook.cells), "it is kept without outputs")
+        kept = pictures(notebook)
         with tempfile.TemporaryDirectory() as folder:
             private = {name: folder for name in ("HOME", "IPYTHONDIR")}
             nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute(env=os.environ | private)
-        outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-        shown = [read_png(base64.b64decode(output.data["image/png"])).astype(int) for output in outputs if "image/png" in output.get("data", {})]
+        shown = pictures(notebook)
         self.assertEqual([picture.shape[0] for picture in shown], [320, 320, 200, 200, 200, 320, 320])
-        for picture in shown:
-            self.assertGreater((picture[..., 3] > 50).mean(), 0.01)  # of the pixels
+        for one, other in zip(shown, kept, strict=True):
+            self.assertGreater((one[..., 3] > 50).mean(), 0.01)  # of the pixels
+            self.assertLessEqual(np.abs(one - other).max(), 1, "it is the picture that is kept")
         array, lazy, first, second, third, channel, later = shown
         self.assertLessEqual(np.abs(later - array).max(), 1)
         for one, other in ((array, lazy), (array, channel), (first, second), (second, third)):
