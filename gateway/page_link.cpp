@@ -6,7 +6,7 @@ namespace slabstream {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::seconds(10);         // of the least delay: ways change
-constexpr std::size_t kMostUnderWay = 16;                       // whatever the page says
+constexpr std::size_t kMostUnderWay = 16;                      // whatever the page says
 constexpr Duration kQuickest = std::chrono::milliseconds(25);  // more pictures a second are not sent ahead
 
 Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }

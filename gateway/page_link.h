@@ -1,10 +1,10 @@
-// PageLink: estimates from a page's answers how long a picture takes to get there, how many may be under way, and when the next one should be
-// sent. Pure: events and the time go in.
+// PageLink: estimates from a page's answers how long a picture takes to get there, how many may be under way, and when the next one should
+// be sent. Pure: events and the time go in.
 //
 // A picture's round trip has two parts. The delay is what an empty message takes there and back, however fast the connection is: while it
 // passes, more pictures can be sent. The rest is the picture's own time, on the connection and in the page: only when it is over, the next
-// picture gets there. Far away the delay is long and pictures are quick; on a slow connection it is the other way round. The page reports how
-// long it worked on each picture itself.
+// picture gets there. Far away the delay is long and pictures are quick; on a slow connection it is the other way round. The page reports
+// how long it worked on each picture itself.
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ class PageLink {
   // The page has drawn `frame` and all before it, and took the time `in_page` for it. false: it is not under way.
   bool OnAck(std::uint64_t frame, Duration in_page, Time now);
 
-  // true: the page should acknowledge a picture before the next one is sent. Under way may be one, and one more for each picture's time, but
-  // at least 25 ms, that fits into the delay; at most 16. Only one, if the delay is below 25 ms, or no picture's time is known yet.
+  // true: the page should acknowledge a picture before the next one is sent. Under way may be one, and one more for each picture's time,
+  // but at least 25 ms, that fits into the delay; at most 16. Only one, if the delay is below 25 ms, or no picture's time is known yet.
   bool is_full() const { return under_way_.size() >= most_under_way(); }
   // When the next picture can get through at once; passed, if it can now.
   Time ready() const;

@@ -1,5 +1,5 @@
-// VideoEncoder: encodes the pictures of a moving view as VP9 (profile 0, 4:2:0, BT.709), one chunk a picture, of constant quality. A chunk says
-// what differs from the picture before, so a page needs all of them, in order. One thread at a time.
+// VideoEncoder: encodes the pictures of a moving view as VP9 (profile 0, 4:2:0, BT.709), one chunk a picture, of constant quality. A chunk
+// says what differs from the picture before, so a page needs all of them, in order. One thread at a time.
 #pragma once
 
 #include <cstddef>

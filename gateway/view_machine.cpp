@@ -20,8 +20,8 @@ constexpr Duration kVideoAbove = milliseconds(40), kFar = milliseconds(10), kVid
 constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
 // Where there is no coarser level, as of grids, pictures while moving get half the width and height if two in turn are above the first, and
-// twice as much below the second: a quarter of the pixels takes at least a quarter of the time. If it takes more than this share of the time before, the
-// voxels take the time and not the pixels, so pictures are whole again for a while.
+// twice as much below the second: a quarter of the pixels takes at least a quarter of the time. If it takes more than this share of the
+// time before, the voxels take the time and not the pixels, so pictures are whole again for a while.
 constexpr Duration kSmallerAbove = milliseconds(120), kWiderBelow = milliseconds(25), kWholeFor = std::chrono::seconds(20);
 constexpr double kLeastScale = 0.25, kHelpfulShare = 0.7;
 
