@@ -1652,9 +1652,13 @@ class PageTest(unittest.TestCase):
                 else if (window.last) { const sums = [0, 0, 0]; let far = 0;
                     for (let i = 0; i < codes.length; i++) if (i % 4 < 3) { const d = codes[i] - last.codes[i]; sums[i % 4] += d; far += Math.abs(d); }
                     window.compared = { type: last.type, seq: last.seq, final: header.seq, bias: sums.map(s => 4 * s / codes.length), far: 4 / 3 * far / codes.length }; } }); })()""")
-        for _ in range(6):
+        for _ in range(20):  # a busy machine may draw no moving picture of the last view
+            viewer.js("window.compared = null")
             viewer.drag(20, 3, steps=4)
-        compared = viewer.until("(() => { const c = window.compared; return c && c.type === 'video/vp9' && c.seq === c.final ? c : null; })()")
+            compared = viewer.until("window.compared")
+            if compared["type"] == "video/vp9" and compared["seq"] == compared["final"]:
+                break
+        self.assertEqual((compared["type"], compared["seq"]), ("video/vp9", compared["final"]))
         self.assertLess(max(abs(bias) for bias in compared["bias"]), 2, f"the colours are others: {compared}")
         self.assertLess(compared["far"], 4, f"the picture is another: {compared}")
 
