@@ -9,9 +9,9 @@ constexpr Duration kPeriod = std::chrono::seconds(10);         // of the least d
 constexpr std::size_t kMostUnderWay = 16;                      // whatever the page says
 constexpr Duration kQuickest = std::chrono::milliseconds(25);  // more pictures a second are not sent ahead
 
-Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
-
 }  // namespace
+
+Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
 
 void PageLink::OnEcho(Duration round_trip, Time now) {
   if (now - period_since_ >= kPeriod) {

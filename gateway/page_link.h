@@ -16,6 +16,9 @@
 
 namespace slabstream {
 
+// The mean of samples so far with one more; the latest ones count most. 0 before: there is none yet.
+Duration Smoothed(Duration before, Duration sample);
+
 class PageLink {
  public:
   // A round trip of a message that is next to nothing. The least one of the last 10 to 20 s is the delay: 0 before the first.

@@ -13,7 +13,7 @@ namespace slabstream {
 namespace {
 
 // Constant quality, [0, 63], 0 is the best: 20 is about as good as a JPEG of 70, with a third of the bytes (docs/performance.md).
-constexpr unsigned kQuality = 20;
+constexpr int kQuality = 20;
 constexpr int kSpeed = 8;  // [0, 9] of encoding in real time
 
 // Two rows of RGBA codes as luma, and as chroma of 2 x 2 pixels, in fixed point: ITU-R BT.709-6 with codes of 16 to 235 and 16 to 240,
@@ -65,10 +65,7 @@ struct VideoEncoder::Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  template <class Value>
-  bool Set(int control, Value value) {
-    return vpx_codec_control_(&codec, control, int(value)) == VPX_CODEC_OK;
-  }
+  bool Set(int control, int value) { return vpx_codec_control_(&codec, control, value) == VPX_CODEC_OK; }
 
   ImageSize size;
   vpx_codec_enc_cfg_t config{};

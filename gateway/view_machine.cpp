@@ -28,8 +28,6 @@ constexpr double kLeastScale = 0.25, kHelpfulShare = 0.7;
 // Pictures while moving lose their shadows above the first, and get them back below the second: at most they double the time.
 constexpr Duration kPlainAbove = milliseconds(50), kShadowedBelow = milliseconds(25);
 
-Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
-
 }  // namespace
 
 int ViewMachine::Quality() const {

@@ -276,7 +276,7 @@ void ViewSession::Encode(PictureCoding coding, int quality) {
   given_up_ = std::make_shared<std::atomic<bool>>(false);
   const std::uint64_t number = ++encoding_;
   asio::post(around_.encoders, [self = shared_from_this(), view = rendered_, coding, quality, given_up = given_up_, number]() mutable {
-    Result<EncodedView> encoded = Guarded("the picture", [&] { return EncodeView(*view, coding, quality, *self->video_, *given_up); });
+    Result<EncodedView> encoded = Guarded("the picture", [&] { return EncodeView(*view, coding, quality, self->video_, *given_up); });
     view.reset();
     auto& io = self->around_.io;
     asio::post(io,

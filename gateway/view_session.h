@@ -78,9 +78,9 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   };
   std::optional<Rendering> rendering_;
   std::shared_ptr<const RenderedView> rendered_;
-  FrameRequest shown_;                                                            // the first frame of `rendered_`
-  ServiceLink::Ticket fetching_ = 0;                                              // times ahead; 0: none
-  const std::shared_ptr<VideoEncoder> video_ = std::make_shared<VideoEncoder>();  // used by one encoding at a time
+  FrameRequest shown_;                           // the first frame of `rendered_`
+  ServiceLink::Ticket fetching_ = 0;             // times ahead; 0: none
+  VideoEncoder video_;                           // used by one encoding at a time
   std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;

@@ -16,7 +16,7 @@ namespace slabstream {
 Status CheckInputVolume(const std::string& source);
 Status CheckInputVolume(const SourceText& source);
 
-// InvalidArgument: --level names a level that the source has not; the message says which it has.
+// InvalidArgument: the source lacks the level of --level; the message lists the levels that it has.
 Status CheckLevel(int level, const SourceInfo& info, const std::string& path);
 
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.

@@ -187,7 +187,7 @@ Result<MeshCounts> MakeIsosurface(VolumeSource& source, const IsosurfaceOptions&
   }
   const std::uint64_t bytes = std::uint64_t(level.voxel_bytes());
   const std::string about = options.label ? fmt::format("label {}", *options.label) : fmt::format("isovalue {}", options.isovalue);
-  const Status status = file->Finish(about, level.geometry.orientation, [&] { return options.progress(bytes, bytes); });
+  const Status status = file->Finish(about, level.geometry, [&] { return options.progress(bytes, bytes); });
   if (!status.ok()) return status;
   return MeshCounts{file->vertices(), file->triangles()};
 }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "common/files/file_descriptor.h"
+#include "common/view/picture_geometry.h"
 
 namespace slabstream {
 namespace {
@@ -39,7 +40,7 @@ class MappedFile {
 
   bool ok() const { return data_ != MAP_FAILED; }
   std::span<const T> all() const { return {static_cast<const T*>(data_), bytes_ / sizeof(T)}; }
-  // Pages that were read are no longer this process's; they come back when they are read again.
+  // Lets go of the memory of pages that were read. Reading them again brings them back.
   void Forget() const { ::madvise(data_, bytes_, MADV_DONTNEED); }
 
  private:
@@ -109,14 +110,13 @@ bool WriteStl(Joining& of) {
   });
 }
 
-std::string WorldText(const Orientation& world) {
-  const std::string_view axes = world.world == World::kPatient ? "patient, RAS: x to the right, y to anterior, z to superior"
-                                : world.world == World::kScene ? "axes of the file"
-                                                               : "axes of the voxels";
-  const std::string_view unit = world.unit                       ? NameOf(*world.unit)
-                                : world.world == World::kPatient ? NameOf(LengthUnit::kMillimetre)
-                                                                 : "not stated";
-  return fmt::format("world: {}; unit: {}", axes, unit);
+std::string WorldText(const VolumeGeometry& volume) {
+  const World world = volume.orientation.world;
+  const std::string_view axes = world == World::kPatient ? "patient, RAS: x to the right, y to anterior, z to superior"
+                                : world == World::kScene ? "axes of the file"
+                                                         : "axes of the voxels";
+  const LengthUnit unit = UnitOf(volume);
+  return fmt::format("world: {}; unit: {}", axes, unit > LengthUnit::kFile ? NameOf(unit) : "not stated");
 }
 
 }  // namespace
@@ -161,7 +161,7 @@ void MeshFile::Add(const SurfacePart& part) {
   triangles_ += std::int64_t(part.triangles.size());
 }
 
-Status MeshFile::Finish(const std::string& surface, const Orientation& world, const std::function<bool()>& goes_on) {
+Status MeshFile::Finish(const std::string& surface, const VolumeGeometry& volume, const std::function<bool()>& goes_on) {
   const MeshFormat& format = *FindMeshFormat(path_);
   if (triangles_ > format.most_triangles) {
     return Status::ResourceExhausted(
@@ -173,7 +173,7 @@ Status MeshFile::Finish(const std::string& surface, const Orientation& world, co
   Result<OutputFile> out = OutputFile::Create(path_);
   if (!out.ok()) return out.status();
   Joining of{
-      {vertex_file_.written_path(), vertices_}, {triangle_file_.written_path(), triangles_}, surface, WorldText(world), goes_on, *out};
+      {vertex_file_.written_path(), vertices_}, {triangle_file_.written_path(), triangles_}, surface, WorldText(volume), goes_on, *out};
   if (!of.vertices.ok() || !of.triangles.ok())
     return Status::Unavailable(fmt::format("cannot write '{}': its parts cannot be read: {}", path_, std::strerror(errno)));
   if (!format.write(of)) return Status::Cancelled("writing was stopped");

@@ -14,7 +14,7 @@
 
 #include "common/base/status.h"
 #include "common/files/files.h"
-#include "common/volume/orientation.h"
+#include "common/volume/volume.h"
 #include "data/isosurface/surface_maker.h"
 
 namespace slabstream {
@@ -34,7 +34,7 @@ class MeshFile {
 
   // `surface`: what it is, for the header: "isovalue 300". Calls goes_on() often. Cancelled: that returned false. ResourceExhausted: more
   // triangles than the format can count. Unavailable: it cannot be written.
-  Status Finish(const std::string& surface, const Orientation& world, const std::function<bool()>& goes_on);
+  Status Finish(const std::string& surface, const VolumeGeometry& volume, const std::function<bool()>& goes_on);
 
  private:
   MeshFile(std::string path, OutputFile vertex_file, OutputFile triangle_file);

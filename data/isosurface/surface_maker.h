@@ -3,9 +3,8 @@
 // same time. Surface nets (Gibson, 1998) make better triangles, but four of them may meet in an edge; here always two do.
 //
 //   inside     a voxel whose value is at least the isovalue; one without a value (NaN) is outside
-//   vertex     one for each edge between a voxel inside and one outside, where the value is interpolated linearly, but not nearer to a
-//   voxel
-//              than kLeastDistance: so no two vertices coincide. Half-way if a value is not finite
+//   vertex     one for each edge between a voxel inside and one outside, where the value is interpolated linearly; at least
+//              kLeastDistance from both, so that no two vertices coincide. Half-way if a value is not finite
 //   normal     of unit length, towards lower values: the interpolated gradient of central differences
 //   triangle   counterclockwise for who looks from lower values
 //

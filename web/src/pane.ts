@@ -5,7 +5,7 @@ import { type Placing, placing } from "./camera";
 import { h, put } from "./dom";
 import { LevelBadge } from "./level_badge";
 import { type Frame, Session, type SessionEvents, type View } from "./session";
-import type { Shown } from "./shown";
+import { pageGeometry, type Shown } from "./shown";
 
 export interface PaneEvents extends Omit<SessionEvents, "frame"> {
   drawn?(shown: Shown): void;
@@ -123,8 +123,7 @@ export class Pane {
   private place(): void {
     const { wanted, shown, canvas, context } = this;
     if (!wanted || !shown || this.last.width === 0 || wanted.picture !== "render") return;
-    const { header, view } = shown.frame, geometry = { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / canvas.width };
-    const at = placing(geometry, canvas.width, canvas.height, view.options, wanted.options);
+    const at = placing(pageGeometry({ ...shown, cssWidth: canvas.width }), canvas.width, canvas.height, shown.frame.view.options, wanted.options);
     if (!at) return;
     const same = at.zoom === 1 && at.roll === 0 && Math.hypot(at.x - canvas.width / 2, at.y - canvas.height / 2) < 0.01;
     if (same && !this.placed) return;

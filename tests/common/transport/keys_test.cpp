@@ -60,7 +60,7 @@ TEST_P(ConnectionsWithKeys, UsersAreKnownByTheirKeys) {
   }
 }
 
-// Each of these sends first; only the friend's message comes. Who is refused already cannot send, and that is no failure.
+// Each of these sends first; only the friend's message comes. A dealer that is refused before it sends cannot send: that is no failure.
 TEST_P(ConnectionsWithKeys, OthersAreNotHeard) {
   context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
   ClientKeys other_way = KeysOf(friend_), deceived = KeysOf(friend_), false_name = KeysOf(friend_);
