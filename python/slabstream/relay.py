@@ -12,7 +12,7 @@ A page has this channel where it cannot reach the gateway itself. The messages a
 
 A stream is a WebSocket of docs/http.md; ids are numbers that a page chooses at random. The kernel's threads never wait: each request and each
 stream has threads of its own. What waits for the page is bounded: a stream is read no further while the kernel has messages of it to send, and
-the gateway sends no picture before the page acknowledges the last one.
+the gateway sends at most 16 pictures that the page has not acknowledged.
 """
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ const ALIVE_MS = 2000;
 // A kernel answers within 150 s, if only by an error (python/slabstream/relay.py), unless a cell keeps it busy. A movie is sent when it is whole.
 const ANSWER_MINUTES = 3, MOVIE_MINUTES = 60;
 const VIEW_MS = 50, UNANSWERED_MS = 250;
-const VIEW = /^\{"type":"view"/;
+const VIEW = /^\{"type":"view"/, ACK = /^\{"type":"ack"/;
 
 const bufferOf = (bytes: Bytes | undefined): ArrayBuffer =>
   bytes === undefined ? new ArrayBuffer(0) : bytes instanceof ArrayBuffer ? bytes : (bytes.buffer as ArrayBuffer).slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
@@ -49,7 +49,7 @@ class KernelStream implements Stream {
   // sooner than 50 ms after the last one; or later, if no picture comes.
   send(text: string): void {
     if (VIEW.test(text)) { this.view = text; return this.flush([]); }
-    this.answered = true;
+    if (ACK.test(text)) this.answered = true;
     this.flush([text]);
   }
 
