@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "client/pictures/picture_writer.h"
@@ -59,7 +60,16 @@ PictureGeometry Geometry(const JsonValue& value) {
                 {"forward", into(geometry.forward)},
                 {"target", into(geometry.target)},
                 {"target_depth", JsonValue::Into(geometry.target_depth, {-kMost, kMost})},
-                {"pixel_size", JsonValue::Into(geometry.pixel_size, {0, kMost, true})}});
+                {"pixel_size", JsonValue::Into(geometry.pixel_size, {0, kMost, true})},
+                {"box_corner", into(geometry.box_corner)},
+                {"box_edges", [&](const JsonValue& v) {
+                   std::size_t edge = 0;
+                   v.Each(
+                       [&](const JsonValue& e) {
+                         if (edge < 3) geometry.box_edges[edge++] = Vector(e);
+                       },
+                       3);
+                 }}});
   return geometry;
 }
 
@@ -100,12 +110,12 @@ Result<Order> ParseOrder(const std::string& text) {
     for (const double side : sides) {
       if (!(side >= 1 && side <= kMaxImageSide)) return v.Complain("is no size");
     }
+    if (sides[0] * sides[1] > double(kMaxImagePixels)) return v.Complain("is no size");
     order.size = {int(sides[0]), int(sides[1])};
   };
   const auto background = [&](const JsonValue& v) {
     const std::vector<double> channels = Numbers(v, 4);
-    const bool opaque = channels[3] == 1;  // of another one only the pixels tell
-    if (opaque) order.format.background = {float(channels[0]), float(channels[1]), float(channels[2]), 1};
+    order.format.background = {float(channels[0]), float(channels[1]), float(channels[2]), float(channels[3])};
   };
   const auto file = [&](const JsonValue& v) {
     order.file = PictureFileTypeOf("picture." + v.Text());
@@ -125,15 +135,19 @@ Result<Order> ParseOrder(const std::string& text) {
   return order;
 }
 
-bool ReadRow(std::span<float> rgba) {
-  return bool(std::cin.read(reinterpret_cast<char*>(rgba.data()), std::streamsize(rgba.size_bytes())));
+// The pixels, and on them the annotations.
+Status WritePixels(const Order& order, const PictureImage& image) {
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, order.size, order.format, order.panes, order.key);
+  if (!picture.ok()) return picture.status();
+  std::vector<float> row(4 * std::size_t(order.size.width));
+  for (int y = 0; y < order.size.height; ++y) {
+    picture->Row(y, row, {});
+    std::cout.write(reinterpret_cast<const char*>(row.data()), std::streamsize(row.size() * sizeof(float)));
+  }
+  return FlushOutput();
 }
 
-Status TooFewPixels() { return Status::InvalidArgument("there are fewer pixels than the size says"); }
-
-Status WriteFile(const Order& order) {
-  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, order.size.width, order.size.height});
-  if (!ReadRow(image.rgba)) return TooFewPixels();
+Status WriteFile(const Order& order, const PictureImage& image) {
   PictureNotes notes{.geometry = order.panes.front(), .panes = order.panes, .key = order.key, .record = {}};
   const Result<std::vector<std::byte>> file = PictureFile(*order.file, image, order.size, order.format, notes);
   if (!file.ok()) return file.status();
@@ -148,18 +162,12 @@ Status RunAnnotate() {
   std::getline(std::cin, text);
   const Result<Order> order = ParseOrder(text);
   if (!order.ok()) return order.status();
-  if (order->file) return WriteFile(*order);
-  const Result<std::vector<Mark>> marks = MarksOf(order->format, order->size, order->panes, order->key);
-  if (!marks.ok()) return marks.status();
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(*marks);
-  if (!layers.ok()) return layers.status();
-  std::vector<float> row(4 * std::size_t(order->size.width));
-  for (int y = 0; y < order->size.height; ++y) {
-    if (!ReadRow(row)) return TooFewPixels();
-    layers->PutOver(y, row);
-    std::cout.write(reinterpret_cast<const char*>(row.data()), std::streamsize(row.size() * sizeof(float)));
+  LocalImage pixels = MakeLocalImage(PixelFormat::kRgba, {0, 0, order->size.width, order->size.height});
+  if (!std::cin.read(reinterpret_cast<char*>(pixels.rgba.data()), std::streamsize(pixels.rgba.size() * sizeof(float)))) {
+    return Status::InvalidArgument("there are fewer pixels than the size says");
   }
-  return FlushOutput();
+  const PictureImage image(std::move(pixels));
+  return order->file ? WriteFile(*order, image) : WritePixels(*order, image);
 }
 
 }  // namespace slabstream

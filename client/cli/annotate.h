@@ -3,7 +3,7 @@
 //
 // stdin: a line of JSON, and behind it the pixels: width * height * 4 floats of this machine, premultiplied, row 0 first.
 //   {"size": [W, H], "panes": [the "geometry" of a picture's record, ...], "title", "scale_bar", "orientation_marker", "sides_only",
-//    "color_bar", "legend", "font_size", "dpi", "background": [R, G, B, A] (it lies behind the pixels already),
+//    "axes", "color_bar", "legend", "font_size", "dpi", "background": [R, G, B, A] (behind the pixels),
 //    "file": "jpg" or another ending, "depth", "quality",
 //    "key": {"bars": [{"name", "colors": [[value, r, g, b], ...]}, ...], "entries": [{"name", "color": [r, g, b]}, ...]}}
 // Only size and panes must be there. stdout: the file; without "file" the pixels with the annotations on them.

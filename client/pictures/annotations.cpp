@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "client/pictures/picture_labels.h"
+#include "client/pictures/volume_box.h"
 #include "common/base/check.h"
 #include "common/text/utf8.h"
 
@@ -84,7 +85,9 @@ Shapes Arrow(InkPoint from, InkPoint to, const Scale& scale) {
 InkPoint MovedRight(InkPoint point, int x) { return {point.x + x, point.y}; }
 Shape MovedRight(Shape shape, int x) {
   const auto move = [x](auto& moved) {
-    if constexpr (requires { moved.corners; }) {
+    if constexpr (requires { moved.strokes; }) {
+      for (Stroke& stroke : moved.strokes) stroke = {MovedRight(stroke.begin, x), MovedRight(stroke.end, x), stroke.width};
+    } else if constexpr (requires { moved.corners; }) {
       for (InkPoint& corner : moved.corners) corner = MovedRight(corner, x);
     } else {
       moved.begin = MovedRight(moved.begin, x);
@@ -99,6 +102,7 @@ Ink InkOf(const Rectangle& shape, Font&) { return RectangleInk(shape.begin, shap
 Ink InkOf(const Stroke& shape, Font&) { return StrokeInk(shape.begin, shape.end, shape.width); }
 Ink InkOf(const Polygon& shape, Font&) { return PolygonInk(shape.corners); }
 Ink InkOf(const ColorRows& shape, Font&) { return RectangleInk(shape.begin, shape.end); }
+Ink InkOf(const Lines&, Font&) { return {}; }  // drawn row by row
 Ink InkOf(const TextLine& shape, Font& font) {
   return Shifted(font.Draw(shape.text, shape.size), int(std::lround(shape.begin.x)), int(std::lround(shape.begin.y)));
 }
@@ -131,12 +135,11 @@ class Artist {
       : font_(&font), size_(size), left_(left), geometry_(geometry), scale_(scale), palette_(palette) {}
 
   // What others have drawn at the top and on the right, in pixels from the edges.
-  void KeepClear(double top, double right) {
-    top_ = top;
-    right_ = right;
+  void KeepClear(const Artist& whole, bool rightmost) {
+    top_ = whole.top_;
+    right_ = rightmost ? whole.right_ : 0;
+    taken_ = whole.taken_;
   }
-  double top() const { return top_; }
-  double right() const { return right_; }
 
   void DrawTitle(const std::string& title) {
     top_ += kAscender * scale_.letters;
@@ -233,6 +236,31 @@ class Artist {
     if (shown < count) put(MoreText(count - shown), left);
   }
 
+  // The box of the volume. Numbers keep clear of each other and of all that was drawn before.
+  void DrawVolumeAxes(VolumeAxes which) {
+    const std::optional<VolumeBox> box = VolumeBox::Of(geometry_, size_);
+    if (!box) return;
+    std::vector<Stroke> grid, hidden, front;
+    const double width = 0.8 * scale_.line;
+    for (const VolumeBox::Edge& edge : box->Edges()) AddLine(edge.hidden ? hidden : front, box->LineOf(edge, width));
+    std::vector<Mark> labels;
+    for (const Axis axis : kAxes) {
+      if (which == VolumeAxes::kBox) break;
+      const std::vector<double> ticks = LabelAxis(*box, axis, front, labels);
+      if (which == VolumeAxes::kGrid) AddGrid(*box, axis, ticks, grid);
+    }
+    const auto mixed = [this](float share) {
+      const auto [letters, halo] = std::pair(palette_.letters, palette_.halo);
+      return MarkColor{std::lerp(halo.red, letters.red, share), std::lerp(halo.green, letters.green, share),
+                       std::lerp(halo.blue, letters.blue, share)};
+    };
+    marks_.push_back({.shapes = {Lines{std::move(grid)}}, .color = mixed(0.3F), .halo_color = {}, .under = true});
+    marks_.push_back({.shapes = {Lines{std::move(hidden)}}, .color = mixed(0.5F), .halo_color = {}, .under = true});
+    Put({Lines{std::move(front)}}, palette_.letters);
+    marks_.back().halo *= 0.5;
+    std::ranges::move(labels, std::back_inserter(marks_));
+  }
+
   std::vector<Mark> TakeMarks() { return std::move(marks_); }
 
  private:
@@ -271,9 +299,107 @@ class Artist {
     right_ = std::max(right_, scale_.margin + width + 2 * tick + widest);
   }
 
+  void AddLine(std::vector<Stroke>& lines, const Stroke& line) const {
+    if (const std::optional<Stroke> shown = Clipped(line, size_, line.width + 2 * scale_.halo)) lines.push_back(*shown);
+  }
+
+  // Lines at these places of an axis, across the faces that do not face the viewer.
+  void AddGrid(const VolumeBox& box, Axis axis, const std::vector<double>& places, std::vector<Stroke>& grid) const {
+    for (const Axis across : kAxes) {
+      if (across == axis) continue;
+      const Axis normal = Axis(3 - Number(axis) - Number(across));
+      for (const bool far : {false, true}) {
+        if (box.Faces(normal, far)) continue;
+        VolumeBox::Edge line{.axis = across};
+        line.begin[normal] = far ? 1 : 0;
+        for (const double place : places) {
+          line.begin[axis] = place;
+          AddLine(grid, box.LineOf(line, std::max(0.5 * scale_.line, 0.7)));
+        }
+      }
+    }
+  }
+
+  // Ticks and numbers along one edge, as many as have room, and its name. Returns the places of the ticks on the axis, in [0, 1].
+  std::vector<double> LabelAxis(const VolumeBox& box, Axis axis, std::vector<Stroke>& ticks, std::vector<Mark>& labels) {
+    const std::optional<VolumeBox::Edge> edge = box.LabelledEdge(axis);
+    if (!edge) return {};
+    const auto [begin, end, width] = box.LineOf(*edge, 0.8 * scale_.line);
+    const double length = std::hypot(end.x - begin.x, end.y - begin.y), em = scale_.letters;
+    if (!(length > 3 * em)) return {};
+    const InkPoint along = {(end.x - begin.x) / length, (end.y - begin.y) / length}, middle = box.At({0.5, 0.5, 0.5});
+    const bool left = (middle.x - begin.x) * along.y - (middle.y - begin.y) * along.x > 0;  // of the edge lies the box
+    const InkPoint out = left ? InkPoint{-along.y, along.x} : InkPoint{along.y, -along.x};
+    const auto [first, last] = box.ValuesOf(axis);
+    const double tick = 0.4 * em, gap = 0.3 * em;
+
+    // A text beyond a point, this far away in this direction.
+    const auto text_beyond = [&](const std::string& text, InkPoint at, InkPoint direction, double distance) {
+      TextLine line{.text = text, .size = scale_.letters, .begin = {}, .width = font_->Width(text, scale_.letters)};
+      const double half_width = 0.5 * line.width, half_height = 0.5 * kCapital * em;
+      distance += std::abs(direction.x) * half_width + std::abs(direction.y) * half_height;
+      line.begin = {std::round(at.x + distance * direction.x - half_width), std::round(at.y + distance * direction.y + half_height)};
+      return line;
+    };
+    const auto point_of = [&](double value) {
+      Vec3 place = edge->begin;
+      place[axis] = (value - first) / (last - first);
+      return box.At(place);
+    };
+    std::vector<double> values;
+    std::vector<TextLine> numbers;
+    for (int most = 8; most >= 3; --most) {
+      values = TicksOf(first, last, most);
+      numbers.clear();
+      bool apart = true;
+      for (const double value : values) {
+        numbers.push_back(text_beyond(fmt::format("{:.10g}", value), point_of(value), out, tick + gap));
+        apart = apart && (numbers.size() < 2 || Intersection(AreaOf(numbers.end()[-2], 0.6 * em), AreaOf(numbers.back(), 0)).empty());
+      }
+      if (apart) break;
+    }
+    std::vector<double> places;
+    double widest = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      places.push_back((values[i] - first) / (last - first));
+      const InkPoint at = point_of(values[i]);
+      AddLine(ticks, {at, {at.x + tick * out.x, at.y + tick * out.y}, width});
+      if (!PutIfFree(numbers[i], labels)) continue;
+      widest = std::max(widest, std::abs(out.x) * numbers[i].width + std::abs(out.y) * kCapital * em);
+    }
+    const std::string name = box.NameOf(axis);
+    const InkPoint back = {-along.x, -along.y}, centre = {0.5 * (begin.x + end.x), 0.5 * (begin.y + end.y)};
+    if (!PutIfFree(text_beyond(name, centre, out, tick + gap + widest + 0.6 * em), labels) &&
+        !PutIfFree(text_beyond(name, end, along, gap), labels)) {
+      PutIfFree(text_beyond(name, begin, back, gap), labels);
+    }
+    return places;
+  }
+
+  // Where a text lies, with so many pixels on every side.
+  static PixelBounds AreaOf(const TextLine& text, double margin) {
+    return {int(text.begin.x - margin), int(text.begin.y - kCapital * text.size - margin), int(text.begin.x + text.width + margin),
+            int(text.begin.y + kDescender * text.size + margin)};
+  }
+
+  // If it lies within the picture and beside all other texts.
+  bool PutIfFree(const TextLine& text, std::vector<Mark>& labels) {
+    const PixelBounds area = AreaOf(text, 0.2 * scale_.letters);
+    if (!PixelBounds{0, 0, size_.width, size_.height}.Contains(area)) return false;
+    for (const PixelBounds& taken : taken_) {
+      if (!Intersection(area, taken).empty()) return false;
+    }
+    taken_.push_back(AreaOf(text, 0));
+    labels.push_back({.shapes = {text}, .color = palette_.letters, .halo = scale_.halo, .halo_color = palette_.halo});
+    return true;
+  }
+
   // The shapes on their halo.
   void Put(Shapes shapes, MarkColor color) {
-    for (Shape& shape : shapes) shape = MovedRight(std::move(shape), left_);
+    for (Shape& shape : shapes) {
+      if (const auto* text = std::get_if<TextLine>(&shape)) taken_.push_back(AreaOf(*text, 0));
+      shape = MovedRight(std::move(shape), left_);
+    }
     marks_.push_back({.shapes = std::move(shapes), .color = color, .halo = scale_.halo, .halo_color = palette_.halo});
   }
   void PutPlain(Shape shape, MarkColor color) {
@@ -318,8 +444,9 @@ class Artist {
   PictureGeometry geometry_;
   Scale scale_;
   Palette palette_;
-  double top_ = scale_.margin;  // of the room that is left
-  double right_ = 0;            // what is taken of it
+  double top_ = scale_.margin;      // of the room that is left
+  double right_ = 0;                // what is taken of it
+  std::vector<PixelBounds> taken_;  // by texts
   std::vector<Mark> marks_;
 };
 
@@ -366,22 +493,34 @@ Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, s
   for (std::size_t i = 0; i < panes.size(); ++i) {
     const PictureGeometry& geometry = panes[i];
     Artist artist(*font, pane, int(i) * pane.width, geometry, scale, palette);
-    artist.KeepClear(whole.top(), i + 1 == panes.size() ? whole.right() : 0);
+    artist.KeepClear(whole, i + 1 == panes.size());
     const bool sides = annotations.orientation_marker && geometry.world == World::kPatient;
     if (sides) artist.DrawSides();
     if (annotations.orientation_marker && !(sides && annotations.sides_only)) artist.DrawAxes();
     if (annotations.scale_bar) artist.DrawScaleBar();
     keep(artist.TakeMarks());
+    if (annotations.axes == VolumeAxes::kOff) continue;
+    artist.DrawVolumeAxes(annotations.axes);  // below all others
+    std::vector<Mark> axes = artist.TakeMarks();
+    axes.insert(axes.end(), std::make_move_iterator(marks.begin()), std::make_move_iterator(marks.end()));
+    marks = std::move(axes);
   }
   return marks;
 }
 
-Result<AnnotationLayers> AnnotationLayers::Draw(const std::vector<Mark>& marks) {
+Result<AnnotationLayers> AnnotationLayers::Draw(std::span<const Mark> marks) {
   AnnotationLayers drawn;
   if (marks.empty()) return drawn;
   Result<Font> font = Font::Open();
   if (!font.ok()) return font.status();
   for (const Mark& mark : marks) {
+    if (const auto* lines = mark.shapes.empty() ? nullptr : std::get_if<Lines>(&mark.shapes.front())) {
+      std::vector<Stroke> grown = lines->strokes;
+      for (Stroke& stroke : grown) stroke.width += 2 * mark.halo;
+      if (mark.halo > 0) drawn.layers_.push_back({{}, std::move(grown), {mark.halo_color}, kHaloOpacity});
+      drawn.layers_.push_back({{}, lines->strokes, {mark.color}, 1});
+      continue;
+    }
     std::optional<Ink> ink;
     std::vector<MarkColor> colors = {mark.color};
     for (const Shape& shape : mark.shapes) {
@@ -390,21 +529,28 @@ Result<AnnotationLayers> AnnotationLayers::Draw(const std::vector<Mark>& marks) 
       if (const auto* rows = std::get_if<ColorRows>(&shape)) colors = rows->colors;
     }
     if (!ink) continue;
-    if (mark.halo > 0) drawn.layers_.push_back({Grown(*ink, mark.halo), {mark.halo_color}, kHaloOpacity});
-    drawn.layers_.push_back({*std::move(ink), std::move(colors), 1});
+    if (mark.halo > 0) drawn.layers_.push_back({Grown(*ink, mark.halo), {}, {mark.halo_color}, kHaloOpacity});
+    drawn.layers_.push_back({*std::move(ink), {}, std::move(colors), 1});
   }
   return drawn;
 }
 
 void AnnotationLayers::PutOver(int y, std::span<float> rgba) const {
   const auto width = std::int32_t(rgba.size() / 4);
+  std::vector<float> of_strokes;
   for (const ColoredInk& layer : layers_) {
-    const PixelBounds& b = layer.ink.bounds;
+    PixelBounds b = layer.ink.bounds;
+    if (!layer.strokes.empty()) {
+      b = {0, y, width, y + 1};
+      of_strokes.assign(std::size_t(width), 0);
+      for (const Stroke& stroke : layer.strokes) CoverRow(stroke, y, of_strokes);
+    }
     if (y < b.y_begin || y >= b.y_end) continue;
-    const float* row = &layer.ink.coverage[std::size_t(y - b.y_begin) * std::size_t(b.width())];
-    const MarkColor color = layer.colors[layer.colors.size() == 1 ? 0 : std::size_t(y - b.y_begin)];
+    const auto row = std::size_t(y - b.y_begin);
+    const float* coverage = layer.strokes.empty() ? &layer.ink.coverage[row * std::size_t(b.width())] : of_strokes.data();
+    const MarkColor color = layer.colors[layer.colors.size() == 1 ? 0 : row];
     for (std::int32_t x = std::max(b.x_begin, 0); x < std::min(b.x_end, width); ++x) {
-      const float alpha = layer.opacity * row[x - b.x_begin];
+      const float alpha = layer.opacity * coverage[x - b.x_begin];
       if (alpha == 0) continue;
       const float front[4] = {color.red, color.green, color.blue, 1};
       float* out = &rgba[4 * std::size_t(x)];

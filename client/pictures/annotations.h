@@ -1,5 +1,6 @@
 // Annotations: what is drawn onto a finished picture by whoever writes its file. They lie over the picture and its background, and change
-// no pixel beside them.
+// no pixel beside them. Of a volume's box, what lies behind the volume is drawn below the picture, so it shows where the picture lets
+// something through.
 //
 //   top centre     the title; a patient's side below it
 //   top left       the legend, below the title
@@ -35,13 +36,14 @@ Status CheckTitle(std::string_view name, std::string_view title);
 // For a message before the work begins. NotFound: the font (AnnotationFont).
 Status CheckCanDraw(const Annotations& annotations);
 
-// What is drawn onto a picture of this format, the last one on top. Title and caption have passed CheckTitle. `panes`: of the pictures side
-// by side, of equal widths, at least one. Errors as Font::Open.
+// What is drawn onto a picture of this format, the last one on top, first those below the picture. Title and caption have passed
+// CheckTitle. `panes`: of the pictures side by side, of equal widths, at least one. Errors as Font::Open.
 Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
                                   const PictureKey& key = {});
 
 struct ColoredInk {
   Ink ink;
+  std::vector<Stroke> strokes;    // of Lines, instead of the ink
   std::vector<MarkColor> colors;  // one, or one for each row of the ink
   float opacity = 1;
 };
@@ -50,7 +52,7 @@ struct ColoredInk {
 class AnnotationLayers {
  public:
   // Errors as Font::Open.
-  static Result<AnnotationLayers> Draw(const std::vector<Mark>& marks);
+  static Result<AnnotationLayers> Draw(std::span<const Mark> marks);
 
   // Puts row y of the annotations over that of the picture: premultiplied RGBA.
   void PutOver(int y, std::span<float> rgba) const;

@@ -100,6 +100,9 @@ class Painter {
   }
 
   void PaintHalo(const Stroke& stroke, double halo) { PaintShape(Stroke{stroke.begin, stroke.end, stroke.width + 2 * halo}); }
+  void PaintHalo(const Lines& lines, double halo) {
+    for (const Stroke& stroke : lines.strokes) PaintHalo(stroke, halo);
+  }
   void PaintHalo(const ColorRows& rows, double halo) { PaintHalo(Rectangle{rows.begin, rows.end}, halo); }
   void PaintHalo(const auto& shape, double halo) {
     Trace(shape);
@@ -115,6 +118,9 @@ class Painter {
     cairo_move_to(out_, stroke.begin.x, stroke.begin.y);
     cairo_line_to(out_, stroke.end.x, stroke.end.y);
     cairo_stroke(out_);
+  }
+  void PaintShape(const Lines& lines) {
+    for (const Stroke& stroke : lines.strokes) PaintShape(stroke);
   }
   void PaintShape(const TextLine& line) {
     MoveTo(line);

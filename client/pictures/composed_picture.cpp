@@ -13,17 +13,21 @@ Result<ComposedPicture> ComposedPicture::Make(const PictureImage& image, ImageSi
                                               std::span<const PictureGeometry> panes, const PictureKey& key) {
   const Result<std::vector<Mark>> marks = MarksOf(format, size, panes, key);
   if (!marks.ok()) return marks.status();
-  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(*marks);
-  if (!annotations.ok()) return annotations.status();
-  return ComposedPicture(image, size, format.background, *std::move(annotations));
+  return WithMarks(image, size, format.background, *marks);
 }
 
-ComposedPicture ComposedPicture::WithoutAnnotations(const PictureImage& image, ImageSize size, const PictureFormat& format) {
-  return {image, size, format.background, {}};
+Result<ComposedPicture> ComposedPicture::WithMarks(const PictureImage& image, ImageSize size, const StraightColor& background,
+                                                   std::span<const Mark> marks) {
+  const auto below = std::size_t(std::ranges::find(marks, false, &Mark::under) - marks.begin());
+  Result<AnnotationLayers> under = AnnotationLayers::Draw(marks.first(below)), over = AnnotationLayers::Draw(marks.subspan(below));
+  if (!under.ok()) return under.status();
+  if (!over.ok()) return over.status();
+  return ComposedPicture(image, size, background, *std::move(under), *std::move(over));
 }
 
-ComposedPicture::ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
-    : image_(&image), size_(size), background_(background), annotations_(std::move(annotations)) {
+ComposedPicture::ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers under,
+                                 AnnotationLayers over)
+    : image_(&image), size_(size), background_(background), under_(std::move(under)), over_(std::move(over)) {
   CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds())));
 }
 
@@ -31,6 +35,7 @@ void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) 
   const float alpha = background_.a;
   const float behind[4] = {background_.r * alpha, background_.g * alpha, background_.b * alpha, alpha};
   for (std::size_t i = 0; i < rgba.size(); i += 4) std::copy_n(behind, 4, &rgba[i]);
+  under_.PutOver(y, rgba);
   std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
   const PixelBounds& b = image_->bounds();
   if (!b.empty() && y >= b.y_begin && y < b.y_end) {
@@ -41,7 +46,7 @@ void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) 
     OverRow(colors.data(), out, out, width);
     if (!depth.empty()) image_->ReadDepths(y, depth.data() + left);
   }
-  annotations_.PutOver(y, rgba);
+  over_.PutOver(y, rgba);
 }
 
 template <class Code>

@@ -26,8 +26,9 @@ class ComposedPicture {
     return Make(image, size, format, {&geometry, 1}, key);
   }
 
-  // The same without annotations, for files that keep them as marks (MarksOf). `image` must outlive this.
-  static ComposedPicture WithoutAnnotations(const PictureImage& image, ImageSize size, const PictureFormat& format);
+  // The same with these annotations alone, such as those below the picture for files that keep the others as marks. Those below come first.
+  static Result<ComposedPicture> WithMarks(const PictureImage& image, ImageSize size, const StraightColor& background,
+                                           std::span<const Mark> marks);
 
   ImageSize size() const { return size_; }
   bool has_depth() const { return image_->has_depth(); }
@@ -42,16 +43,17 @@ class ComposedPicture {
   void OpaqueRow(int y, std::span<std::uint8_t> codes) const;
 
  private:
-  ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations);
+  ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers under,
+                  AnnotationLayers over);
 
   template <class Code>
   void CodeRow(int y, std::span<Code> codes) const;
-  bool IsImageAlone() const { return background_.a == 0 && annotations_.empty(); }
+  bool IsImageAlone() const { return background_.a == 0 && under_.empty() && over_.empty(); }
 
   const PictureImage* image_;
   ImageSize size_;
   StraightColor background_;
-  AnnotationLayers annotations_;
+  AnnotationLayers under_, over_;  // the picture
 };
 
 // A frame of a movie: size.width * size.height * 3 bytes, red, green and blue, row 0 first. A movie has no transparency: behind whatever

@@ -65,12 +65,42 @@ Ink RectangleInk(InkPoint begin, InkPoint end) {
   return ink;
 }
 
+namespace {
+
+// The signed distance of a point to the edge of a stroke, negative inside.
+double DistanceTo(const Stroke& stroke, InkPoint p) {
+  const InkPoint begin = stroke.begin;
+  const double dx = stroke.end.x - begin.x, dy = stroke.end.y - begin.y, square = dx * dx + dy * dy;
+  const double along = square > 0 ? std::clamp(((p.x - begin.x) * dx + (p.y - begin.y) * dy) / square, 0.0, 1.0) : 0.0;
+  return std::hypot(p.x - begin.x - along * dx, p.y - begin.y - along * dy) - 0.5 * stroke.width;
+}
+
+}  // namespace
+
 Ink StrokeInk(InkPoint begin, InkPoint end, double width) {
-  const double dx = end.x - begin.x, dy = end.y - begin.y, square = dx * dx + dy * dy;
-  return ShapeInk(BoundsOf(std::array{begin, end}, 0.5 * width + 1), [&](InkPoint p) {
-    const double along = square > 0 ? std::clamp(((p.x - begin.x) * dx + (p.y - begin.y) * dy) / square, 0.0, 1.0) : 0.0;
-    return std::hypot(p.x - begin.x - along * dx, p.y - begin.y - along * dy) - 0.5 * width;
-  });
+  return ShapeInk(BoundsOf(std::array{begin, end}, 0.5 * width + 1), [&](InkPoint p) { return DistanceTo({begin, end, width}, p); });
+}
+
+void CoverRow(const Stroke& stroke, int y, std::span<float> coverage) {
+  // The part of the line near the row says which pixels can be covered.
+  const double reach = 0.5 * stroke.width + 1, dx = stroke.end.x - stroke.begin.x, dy = stroke.end.y - stroke.begin.y;
+  const double middle = y + 0.5 - stroke.begin.y;
+  double first = 0, last = 1;
+  if (std::abs(dy) > 1) {
+    const auto [low, high] = std::minmax({(middle - reach) / dy, (middle + reach) / dy});
+    first = std::max(first, low);
+    last = std::min(last, high);
+  } else if (std::abs(middle) > reach + 1) {
+    return;
+  }
+  if (first > last) return;
+  const auto [left, right] = std::minmax({stroke.begin.x + first * dx, stroke.begin.x + last * dx});
+  const double width = double(coverage.size());
+  const int end = int(std::clamp(right + reach, 0.0, width));
+  for (int x = int(std::clamp(left - reach, 0.0, width)); x < end; ++x) {
+    float& here = coverage[std::size_t(x)];
+    here = std::max(here, float(std::clamp(0.5 - DistanceTo(stroke, {x + 0.5, y + 0.5}), 0.0, 1.0)));
+  }
 }
 
 Ink PolygonInk(std::span<const InkPoint> corners) {

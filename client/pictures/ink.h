@@ -25,10 +25,12 @@ struct Ink {
 
 Ink RectangleInk(InkPoint begin, InkPoint end);             // begin: upper left corner
 Ink StrokeInk(InkPoint begin, InkPoint end, double width);  // with round ends; begin == end: a disc
-Ink PolygonInk(std::span<const InkPoint> corners);          // convex, clockwise as seen in the picture
-Ink Union(const Ink& a, const Ink& b);                      // the larger coverage
-Ink Grown(const Ink& ink, double radius);                   // everything within `radius` pixels of it
-Ink Shifted(Ink ink, int x, int y);                         // by whole pixels
+// Its coverage of row y, into that of the row's pixels, from column 0: the larger one of both. For long lines, as it takes no memory.
+void CoverRow(const Stroke& stroke, int y, std::span<float> coverage);
+Ink PolygonInk(std::span<const InkPoint> corners);  // convex, clockwise as seen in the picture
+Ink Union(const Ink& a, const Ink& b);              // the larger coverage
+Ink Grown(const Ink& ink, double radius);           // everything within `radius` pixels of it
+Ink Shifted(Ink ink, int x, int y);                 // by whole pixels
 
 // The font of annotations: the file that $SLABSTREAM_FONT names, or DejaVu Sans Bold, from beside the program or from where
 // Debian has it. NotFound: there is no such file; the message says what to install.

@@ -40,11 +40,17 @@ struct ColorRows {
   std::vector<MarkColor> colors;
 };
 
+// Strokes that may be long.
+struct Lines {
+  std::vector<Stroke> strokes;
+};
+
 struct Mark {
-  std::vector<std::variant<Rectangle, Stroke, Polygon, TextLine, ColorRows>> shapes;  // drawn as one
-  MarkColor color;                                                                    // not of ColorRows
-  double halo = 0;                                                                    // pixels round the shapes, drawn before them; 0: none
+  std::vector<std::variant<Rectangle, Stroke, Polygon, TextLine, ColorRows, Lines>> shapes;  // drawn as one; Lines stand alone
+  MarkColor color;                                                                           // not of ColorRows
+  double halo = 0;  // pixels round the shapes, drawn before them; 0: none
   MarkColor halo_color;
+  bool under = false;  // below the picture, over its background
 };
 
 }  // namespace slabstream

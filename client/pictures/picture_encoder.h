@@ -28,7 +28,7 @@ struct EncodedFormat {
   int quality = 90;                           // the quality of JPEG and WebP, [1, 100]
   std::optional<double> density;              // pixels a metre
   std::string software, record_name, record;  // texts for the file's header; an empty record: none of them
-  // What PDF and SVG show over the pixels; in other formats the pixels hold it.
+  // What PDF and SVG show over the pixels; in other formats the pixels hold it, and so they hold what lies below the picture.
   std::span<const Mark> marks = {};
   std::string font;  // the file of the letters; only with marks
 };

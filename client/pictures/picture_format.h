@@ -1,8 +1,11 @@
 // PictureFormat: how pixels become the picture that a file shows.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace slabstream {
 
@@ -11,17 +14,22 @@ struct StraightColor {
   friend bool operator==(const StraightColor&, const StraightColor&) = default;
 };
 
+// What shows where a volume lies, round it: the edges of its box; with numbers along three of them; with lines on the faces behind it, too.
+enum class VolumeAxes : std::uint8_t { kOff, kBox, kTicks, kGrid };
+inline constexpr std::array<std::string_view, 4> kVolumeAxesNames = {"off", "box", "axes", "grid"};
+
 struct Annotations {
   bool scale_bar = false;
   bool orientation_marker = false;  // the axes of the world; of patients also the letters of the sides
   bool sides_only = false;          // a patient's sides as letters, without axes, as is usual in slices
-  std::string title;                // empty: none
+  VolumeAxes axes = VolumeAxes::kOff;
+  std::string title;  // empty: none
   // What the picture's key says (PictureKey); a key that has nothing of it leaves them out.
   std::optional<std::string> color_bar;  // its caption, such as a unit; "": none
   bool legend = false;
   std::optional<double> font_size;  // points, [kMinFontSize, kMaxFontSize]; none: as the picture's size suggests (annotations.h)
 
-  bool any() const { return scale_bar || orientation_marker || !title.empty() || needs_key(); }
+  bool any() const { return scale_bar || orientation_marker || axes != VolumeAxes::kOff || !title.empty() || needs_key(); }
   bool needs_key() const { return color_bar || legend; }
   friend bool operator==(const Annotations&, const Annotations&) = default;
 };

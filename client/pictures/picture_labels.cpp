@@ -65,8 +65,9 @@ std::array<ShownAxis, 3> ShownAxes(const PictureGeometry& geometry) {
   return shown;
 }
 
-std::vector<double> TicksOf(double low, double high) {
-  constexpr int kMost = 7;
+std::vector<double> TicksOf(double low, double high, int most) {
+  constexpr int kLeast = 3, kFew = 8;  // of two steps in a row, the finer one makes at most 8 ticks if the coarser one makes less than 3
+  std::vector<double> finer;
   const double range = high - low;
   if (!std::isnormal(range)) return {low};
   for (int exponent = int(std::floor(std::log10(range))) - 1;; ++exponent) {
@@ -75,10 +76,12 @@ std::vector<double> TicksOf(double low, double high) {
       const double power = std::pow(10, std::abs(exponent));
       const auto tick = [&](double n) { return exponent < 0 ? n * digit / power : n * digit * power; };
       const double first = std::ceil(low / tick(1) - 1e-9), last = std::floor(high / tick(1) + 1e-9);
-      if (last - first + 1 > kMost) continue;
+      if (last - first + 1 > kFew) continue;
       std::vector<double> ticks;
       for (double n = first; n <= last; ++n) ticks.push_back(std::clamp(tick(n), low, high) + 0.0);
-      return ticks;
+      if (int(ticks.size()) < kLeast && !finer.empty()) return finer;
+      if (int(ticks.size()) <= most) return ticks;
+      finer = std::move(ticks);
     }
   }
 }

@@ -37,7 +37,8 @@ struct ShownAxis {
 // Farthest tip first, which is the order to draw them in.
 std::array<ShownAxis, 3> ShownAxes(const PictureGeometry& geometry);
 
-// Values for the ticks of a bar: multiples of 1, 2 or 5 times a power of ten in [low, high], 3 to 7 of them. low < high, both finite.
-std::vector<double> TicksOf(double low, double high);
+// Values for ticks: multiples of 1, 2 or 5 times a power of ten in [low, high], as many as possible up to `most`, at least 3. low < high,
+// both finite. `most`: [3, 8].
+std::vector<double> TicksOf(double low, double high, int most = 7);
 
 }  // namespace slabstream

@@ -118,7 +118,10 @@ Result<Prepared> Prepare(PictureFileType type, const PictureImage& image, ImageS
       if (!font.ok()) return font.status();
       encoded.font = *std::move(font);
     }
-    Prepared prepared{encoder, ComposedPicture::WithoutAnnotations(image, size, format), std::move(encoded), *std::move(marks)};
+    const auto over = std::ranges::find(*marks, false, &Mark::under);
+    Result<ComposedPicture> below = ComposedPicture::WithMarks(image, size, format.background, {marks->begin(), over});
+    if (!below.ok()) return below.status();
+    Prepared prepared{encoder, *std::move(below), std::move(encoded), {over, marks->end()}};
     prepared.encoded.marks = prepared.marks;
     return prepared;
   }

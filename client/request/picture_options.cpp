@@ -219,6 +219,11 @@ void AddRenderPictureOptions(const Command& app, FrameRequest& request, PictureF
   if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddPictureFormat(app, format);
   AddAnnotationOptions(app, format.annotations);
+  AddChoice<VolumeAxes, 4>(
+      app, "--axes", format.annotations.axes, kVolumeAxesNames, {VolumeAxes::kOff, VolumeAxes::kBox, VolumeAxes::kTicks, VolumeAxes::kGrid},
+      "Round the volume: the edges of its box (box), ticks with the world's coordinates along three of them (axes), and "
+      "lines at the ticks on the faces behind it (grid)")
+      .Default("off");
 }
 
 void AddSlicePictureOptions(const Command& app, SliceRequest& slice, LayerFiles* files) {

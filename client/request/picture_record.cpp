@@ -24,6 +24,7 @@ Json FormatJson(const PictureFormat& format) {
   if (!format.annotations.title.empty()) json["title"] = format.annotations.title;
   if (format.annotations.scale_bar) json["scale_bar"] = true;
   if (format.annotations.orientation_marker) json["orientation_marker"] = true;
+  if (format.annotations.axes != VolumeAxes::kOff) json["axes"] = kVolumeAxesNames.at(std::size_t(format.annotations.axes));
   if (format.annotations.color_bar) json["color_bar"] = *format.annotations.color_bar;
   if (format.annotations.legend) json["legend"] = true;
   if (format.annotations.font_size) json["font_size"] = *format.annotations.font_size;
@@ -92,7 +93,8 @@ void AddRequest(OptionList& out, const FrameRequest& request) {
 void AddFormat(OptionList& out, const PictureFormat& format) {
   const PictureFormat usual;
   const auto& [png_bits, quality, background, annotations, dots_per_inch] = format;
-  const auto& [scale_bar, orientation_marker, sides_only, title, color_bar, legend, font_size] = annotations;  // sides_only: of slices
+  const auto& [scale_bar, orientation_marker, sides_only, axes, title, color_bar, legend, font_size] =
+      annotations;  // sides_only: of slices
   if (background != usual.background) {
     out.Add("--background", fmt::format("{},{},{},{}", background.r, background.g, background.b, background.a));
   }
@@ -100,6 +102,7 @@ void AddFormat(OptionList& out, const PictureFormat& format) {
   out.Name("--title", title, "");
   out.Flag("--scale-bar", scale_bar);
   out.Flag("--orientation-marker", orientation_marker);
+  out.Name("--axes", kVolumeAxesNames.at(std::size_t(axes)), kVolumeAxesNames.front());
   if (color_bar) out.Add(color_bar->empty() ? "--color-bar" : "--color-bar=" + *color_bar);
   out.Flag("--legend", legend);
   if (font_size) out.Add("--font-size", fmt::format("{}", *font_size));
@@ -156,13 +159,23 @@ std::vector<std::pair<std::string, JsonValue::Read>> FormatFields(PictureFormat&
           {"color_bar", [&annotations, line](const JsonValue& v) { line(annotations.color_bar.emplace())(v); }},
           {"legend", JsonValue::Into(annotations.legend)},
           {"scale_bar", JsonValue::Into(annotations.scale_bar)},
-          {"orientation_marker", JsonValue::Into(annotations.orientation_marker)}};
+          {"orientation_marker", JsonValue::Into(annotations.orientation_marker)},
+          {"axes", [&annotations](const JsonValue& v) { annotations.axes = VolumeAxes(v.OneOf(kVolumeAxesNames)); }}};
 }
 
 Json GeometryJson(const PictureGeometry& geometry) {
-  return {{"world", NameOf(geometry.world)},       {"unit", NameOf(geometry.unit)},         {"projection", NameOf(geometry.projection)},
-          {"right", VectorJson(geometry.right)},   {"up", VectorJson(geometry.up)},         {"forward", VectorJson(geometry.forward)},
-          {"target", VectorJson(geometry.target)}, {"target_depth", geometry.target_depth}, {"pixel_size", geometry.pixel_size}};
+  return {{"world", NameOf(geometry.world)},
+          {"unit", NameOf(geometry.unit)},
+          {"projection", NameOf(geometry.projection)},
+          {"right", VectorJson(geometry.right)},
+          {"up", VectorJson(geometry.up)},
+          {"forward", VectorJson(geometry.forward)},
+          {"target", VectorJson(geometry.target)},
+          {"target_depth", geometry.target_depth},
+          {"pixel_size", geometry.pixel_size},
+          {"box_corner", VectorJson(geometry.box_corner)},
+          {"box_edges",
+           Json::array({VectorJson(geometry.box_edges[0]), VectorJson(geometry.box_edges[1]), VectorJson(geometry.box_edges[2])})}};
 }
 
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {

@@ -3,9 +3,10 @@
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
 //    "layers": {"labels", "overlay"},                                     paths as they were typed, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
-//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend", "font_size",
+//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "axes", "color_bar", "legend", "font_size",
 //                "quality", "dpi"},
-//    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"},
+//    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size",
+//                 "box_corner", "box_edges"},
 //    "levels": [2]}                                                       that the picture was drawn from, if not from level 0 alone
 //
 // It names no host, no time and no place of the service, so the same picture has the same record wherever and whenever it is made.

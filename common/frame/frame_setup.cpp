@@ -14,6 +14,8 @@ PictureGeometry PictureGeometryOf(const FrameSetup& setup) {
   geometry.target = setup.unit * geometry.target;
   geometry.target_depth *= setup.unit;
   geometry.pixel_size *= setup.unit;
+  geometry.box_corner = setup.unit * geometry.box_corner;
+  for (Vec3& edge : geometry.box_edges) edge = setup.unit * edge;
   return geometry;
 }
 

@@ -22,6 +22,11 @@ PictureGeometry GeometryOf(const Camera& camera, const VolumeGeometry& volume) {
   geometry.target = orientation.origin + orientation.ToWorld(eye + camera.target_depth * camera.view_direction);
   geometry.target_depth = camera.target_depth;
   geometry.pixel_size = camera.PixelSizeAt(camera.target_depth);
+  geometry.box_corner = volume.ToWorld({-0.5, -0.5, -0.5});
+  for (const Axis axis : kAxes) {
+    const auto i = std::size_t(Number(axis));
+    geometry.box_edges[i] = volume.size[axis] * volume.spacing[axis] * orientation.axes[i];
+  }
   return geometry;
 }
 

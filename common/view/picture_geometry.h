@@ -6,6 +6,8 @@
 // with k = 1 for orthographic pictures and k = d / target_depth for perspective ones.
 #pragma once
 
+#include <array>
+
 #include "common/view/camera.h"
 #include "common/volume/orientation.h"
 
@@ -20,6 +22,9 @@ struct PictureGeometry {
   Vec3 target;              // the point that the picture's centre shows
   double target_depth = 1;  // perspective: > 0
   double pixel_size = 1;    // > 0: side of a pixel at the target's depth; in orthographic pictures at any depth
+  // The volume's box, its outer faces: the corner where the axes of its voxels begin, and from there the edges along them. Zero: not known.
+  Vec3 box_corner;
+  std::array<Vec3, 3> box_edges;
   friend bool operator==(const PictureGeometry&, const PictureGeometry&) = default;
 };
 

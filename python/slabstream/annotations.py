@@ -1,4 +1,4 @@
-"""Annotations of pictures (title, scale bar, sides of a patient, colour bar and legend), drawn by the program `slabstream`, so that they are
+"""Annotations of pictures (title, scale bar, sides of a patient, axes, colour bar and legend), drawn by the program `slabstream`, so that they are
 those of the command line; and files of types that it alone writes."""
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ class Annotations:
     scale_bar: bool = False
     orientation_marker: bool = False
     sides_only: bool = False       # of a patient the letters without the axes, as in slices
+    axes: str = "off"              # round the volume: "box", "axes" or "grid"
     color_bar: str | None = None   # its caption; "": none
     legend: bool = False
     font_size: float | None = None  # points
 
     def any(self) -> bool:
-        return bool(self.title) or self.scale_bar or self.orientation_marker or self.color_bar is not None or self.legend
+        return bool(self.title) or self.scale_bar or self.orientation_marker or self.axes != "off" or self.need_key()
 
     def need_key(self) -> bool:
         return self.color_bar is not None or self.legend
@@ -50,7 +51,7 @@ def _geometry_fields(geometry: Any) -> dict[str, Any]:
 
 
 def _run(rgba: Floats, format: Any, panes: Sequence[Any], purpose: str, **more: Any) -> bytes:
-    """What `slabstream annotate` makes of the pixels. `panes`: the geometries of pictures of equal widths, from left to right."""
+    """What `slabstream annotate` makes of the pixels, over the format's background. `panes`: the geometries of pictures of equal widths, from left to right."""
     height, width = rgba.shape[:2]
     order = {"size": [width, height], "panes": [_geometry_fields(pane) for pane in panes] or [{}], "background": format.background,
              **dataclasses.asdict(format.annotations), "dpi": format.dots_per_inch, "key": format.key, **more}

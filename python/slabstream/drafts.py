@@ -291,6 +291,7 @@ _PUT: dict[str, Put] = {
     "title": _in("annotations", _line),
     "scale_bar": _in("annotations", _flag),
     "orientation_marker": _in("annotations", _flag),
+    "axes": _in("annotations", _choice),
     "color_bar": _in("annotations", _caption),
     "legend": _in("annotations", _flag),
     "labels": _layer,

@@ -13,7 +13,7 @@ from .annotations import key_of
 from .connection import Connection
 from .drafts import Draft
 from .errors import DataLoss, DeadlineExceeded, SlabstreamError
-from .image import Image, compose, geometry_of, statistics_of
+from .image import Image, PictureFormat, compose, geometry_of, statistics_of
 from .runs import read_runs
 from .waiting import ASYNCIO, BLOCKING, Changes, Front, each, run
 
@@ -55,11 +55,13 @@ class _Waiting:
             raise DataLoss(f"FrameReply.size is {reply.size.width}x{reply.size.height}, asked for was {width}x{height}")
         if len(reply.shares) != 1:  # several come straight from workers alone
             raise DataLoss(f"FrameReply.shares are {len(reply.shares)}, asked for was 1")
-        rgba, depth = compose(read_runs(reply.shares[0].runs, payload, width, height), width, height, self.draft.format)
+        part = read_runs(reply.shares[0].runs, payload, width, height)
+        rgba, depth = compose(part, width, height, self.draft.format)
+        bare = compose(part, width, height, PictureFormat())[0] if self.draft.format.annotations.axes != "off" else None
         preview = reply.groups_done != reply.group_count
         format = dataclasses.replace(self.draft.format, key=key_of(reply.key))
         image = Image(rgba, depth, format=format, geometry=geometry_of(reply.geometry),
-                      statistics=None if preview else statistics_of(reply.statistics, latency), preview=preview)
+                      statistics=None if preview else statistics_of(reply.statistics, latency), preview=preview, bare=bare)
         if preview:
             self.preview = image
             self.changed.tell()

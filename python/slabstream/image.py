@@ -52,6 +52,8 @@ class Geometry:
     target: Vector      # the point that the picture's centre shows
     target_depth: float
     pixel_size: float   # side of a pixel at the target's depth; in orthographic pictures at any depth
+    box_corner: Vector = (0.0, 0.0, 0.0)  # of the volume's box, where the axes of its voxels begin
+    box_edges: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0),) * 3  # from there, along these axes; zero: not known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,8 +83,8 @@ class Statistics:
 
 
 def geometry_of(message: Any) -> Geometry:
-    vectors = {name: schema.xyz(getattr(message, name)) for name in ("right", "up", "forward", "target")}
-    return schema.read(Geometry, message, world=schema.word(message, "world", "voxels"), unit=schema.word(message, "unit", "voxel"),
+    vectors = {name: schema.xyz(getattr(message, name)) for name in ("right", "up", "forward", "target", "box_corner")}
+    return schema.read(Geometry, message, box_edges=tuple(map(schema.xyz, (message.box_x, message.box_y, message.box_z))), world=schema.word(message, "world", "voxels"), unit=schema.word(message, "unit", "voxel"),
                        perspective=message.projection == schema.PROJECTION_PERSPECTIVE, **vectors)
 
 
@@ -121,7 +123,7 @@ class Image:
 
     def __init__(self, rgba: Floats, depth: Floats | None = None, *, format: PictureFormat = PictureFormat(),
                  geometry: Geometry | None = None, statistics: Statistics | None = None, preview: bool = False,
-                 panes: Sequence[Geometry] = ()):
+                 panes: Sequence[Geometry] = (), bare: Floats | None = None):
         self.rgba = rgba                #: float32, height, width, 4: premultiplied, linear
         self.depth = depth              #: float32, height, width: camera depth, +infinity where nothing is seen; None: has none
         self.format = format
@@ -129,6 +131,9 @@ class Image:
         self.statistics = statistics    #: None for previews, and pictures put together of several
         self.preview = preview          #: some groups are still missing
         self._panes = list(panes) or ([geometry] if geometry is not None else [])
+        # What annotations are drawn onto, and over which background: what lies behind the volume needs the pixels without it.
+        clear = dataclasses.replace(format, background=(0.0, 0.0, 0.0, 0.0))
+        self._ground = (bare, format) if bare is not None else (rgba, format if format.background[3] == 1 else clear)
         self._drawn: Floats | None = None  # with annotations
 
     @property
@@ -146,7 +151,7 @@ class Image:
         if not annotations.any() or not self._panes:
             return self.rgba
         if self._drawn is None:
-            self._drawn = draw(self.rgba, self.format, self._panes)
+            self._drawn = draw(*self._ground, self._panes)
         return self._drawn
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> numpy.typing.NDArray[Any]:
@@ -185,7 +190,7 @@ class Image:
         elif kind == ".png":
             content = self.png(bits)
         else:
-            content = encode(self.rgba, self.format, self._panes, kind, bits or self.format.png_bits, self.format.quality)
+            content = encode(*self._ground, self._panes, kind, bits or self.format.png_bits, self.format.quality)
         temporary = file.with_name(f".{secrets.token_hex(8)}.tmp")
         try:
             try:

@@ -24,7 +24,7 @@ _LABELS = ("label_mode", "label_tint", "label_surface", "labels_shown", "label_o
 _LISTS = ("light", "clip_plane")  # with semicolons between
 #: Options that the page has a place for, by the same name, beside parameters of renderers. transfer, channels and layers have more than one.
 _SHOWN = {*_CAMERA, *_TRANSFER, *_FLAGS, *_LABELS, *_LISTS, "renderer", "shading", "shadows", "ambient_occlusion", "clip_box", "clip_mode", "blend",
-          "time", "background"}
+          "time", "background", "axes"}
 _MADE_OF_OTHERS = {"view", "camera", "fit", "of_patient", "channels", "labels", "overlay", "overlay_transfer", "overlay_range", "overlay_weight"}
 _OF_PICTURES = {"size", "depth", "quality", "dpi", "title", "font_size"}
 _MATERIAL = ("ambient", "diffuse", "specular", "shininess")
@@ -33,7 +33,7 @@ _LOOKS = {"channel-transfer": "transfer", "channel-color": "color", "channel-ran
 #: What the page begins with, and so leaves out. What it leaves out is not said here either: it would correct it.
 _FIRST = {"roll": "0", "zoom": "1", "projection": "orthographic", "shading": "phong", "shadows": "0", "ambient-occlusion": "0", "transfer": "auto",
           "opacity-distance": "1", "surfaces-alone": "1", "clip-mode": "keep", "label-tint": "0.5", "label-surface": "blocky", "overlay": "0",
-          "blend": "auto", "background": BACKGROUND, "legend": "1", "orientation-marker": "1", "scale-bar": "1", "color-bar": "0"}
+          "blend": "auto", "background": BACKGROUND, "legend": "1", "orientation-marker": "1", "scale-bar": "1", "axes": "off", "color-bar": "0"}
 
 #: Of which names each property of a widget is made.
 PARTS: dict[str, tuple[str, ...]] = {
@@ -187,6 +187,8 @@ def texts_of(draft: Draft, options: Mapping[str, Any]) -> Texts:
         found["overlay"] = "1"
     if "background" in given and draft.format.background[3] == 1:
         found["background"] = _hex(*draft.format.background[:3])
+    if "axes" in given:
+        found["axes"] = annotations.axes
     for name in given & set(_FLAGS):
         found[name.replace("_", "-")] = "0" if getattr(annotations, name) in (False, None) else "1"
     return {name: text for name, text in found.items() if _FIRST.get(name) != text}

@@ -120,6 +120,8 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      [*RAYCAST, "--overlay-transfer", "opaque", "--overlay-range", "0.2:0.9", "--overlay-weight", "0.5"]),
     ({"size": 96, "title": "A ball", "scale_bar": True, "orientation_marker": True, "color_bar": "HU"},
      ["--size", "96", "--title", "A ball", "--scale-bar", "--orientation-marker", "--color-bar=HU"]),
+    ({"size": 96, "axes": "grid", "background": "#e0e0ff"}, ["--size", "96", "--axes", "grid", "--background", "#e0e0ff"]),
+    ({"size": 96, "axes": "axes", "background": "0.2,0.4,0.1,0.5"}, ["--size", "96", "--axes", "axes", "--background", "0.2,0.4,0.1,0.5"]),
     ({"renderer": "raycast", "label_mode": "highlight", "labels_shown": ["left_?", 3]},
      [*RAYCAST, "--label-mode", "highlight", "--labels-shown", "left_?,3"]),
     ({"renderer": "raycast", "size": 96, "label_mode": "surface", "labels_shown": "1,*_2", "legend": True, "color_bar": True},

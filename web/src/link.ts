@@ -157,7 +157,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   channelGammas: each(NAMES.channelGammas, CHANNEL, within("", () => GAMMAS)), channelOpacities: each(NAMES.channelOpacities, CHANNEL, share), blend: oneOf(NAMES.blend, "auto", "add", "over", "max"),
   time: text(NAMES.time, /^(last|\d{1,9}|[\d.]+[a-zµ]{1,3})$/),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
-  measures, path, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), colorBar: flag("color-bar"), machine: flag("machine"),
+  measures, path, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), axes: text("axes", NAME), colorBar: flag("color-bar"), machine: flag("machine"),
 };
 
 // Spaces and most marks are legible as they are in a fragment.

@@ -50,8 +50,11 @@ export function renderingSection(context: Context): HTMLElement {
   const shadingRow = row("Shading", shading.element);
   const projection = segmented("Projection", [["orthographic", "Parallel"], ["perspective", "Perspective"]], value => store.update({ projection: value as "orthographic" }));
   const background = colorField("Background", value => store.update({ background: value }, "background"));
+  const offered = offers.offered("Annotations").find(({ name }) => name === "axes")?.choices ?? [];
+  const axes = choice("Round the volume", offered.map(each => [each, words(each)] as const), value => store.update({ axes: value }));
   const update = (): void => {
     const { state } = store;
+    axes.set(state.axes);
     renderer.fill(rendererChoices(offers, (volume()?.cells ?? 0) > 0 || (state.renderer !== offers.automaticRenderer && offers.can("cells", state.renderer))));
     renderer.set(state.renderer);
     parameters.set(state);
@@ -62,8 +65,8 @@ export function renderingSection(context: Context): HTMLElement {
     background.set(state.background);
     shadingRow.hidden = !offers.can("lights", state.renderer);
   };
-  follow(context, [...LOOK, "projection"], update);
-  return section("Rendering", true, renderer.element, parameters.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
+  follow(context, [...LOOK, "projection", "axes"], update);
+  return section("Rendering", true, renderer.element, parameters.element, shadingRow, row("Projection", projection.element), row("Background", background.element), axes.element);
 }
 
 const without = <T>(list: readonly T[], index: number): T[] => list.filter((_, i) => i !== index);

@@ -58,6 +58,7 @@ export function renderOptions(offers: Offers, state: State): Options {
   if (surfaces.length > 0) look["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
   if (offers.can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(look, transferOptions(offers, state));
   Object.assign(options, channelOptions(offers, state, look, offers.can("fields", renderer)), timeOptions(offers, state));
+  if (state.axes !== "off") options["axes"] = state.axes;
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;

@@ -61,6 +61,7 @@ export interface State extends Viewpoint {
   legend: boolean; // the legend of labels
   marker: boolean;
   scaleBar: boolean;
+  axes: string; // round the volume, in the 3-D picture: "off" or what the service draws into it
   colorBar: boolean;
   machine: boolean;
 }
@@ -75,7 +76,7 @@ export const INITIAL: State = {
   labels: "off", labelTint: 0.5, labelSurface: "blocky", labelsShown: "", labelOpacities: {},
   overlay: false, channels: null, channelTransfers: {}, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
   layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
-  marker: true, scaleBar: true, colorBar: false, machine: false,
+  marker: true, scaleBar: true, axes: "off", colorBar: false, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.

@@ -20,6 +20,8 @@ import { rounded, roundedPoint, type Vec3 } from "./vec";
 
 const LEAST_WINDOW = 1e-3; // as a share of the data's range
 
+const LETTERS = 13; // pixels of the page
+
 export class Viewer {
   readonly pane: Pane;
   private readonly handles: ClipHandles;
@@ -108,7 +110,8 @@ export class Viewer {
   private send(): void {
     const { state } = this.context.store;
     if (!state.dataset) return;
-    this.pane.show({ picture: "render", timeline: state.machine, options: renderOptions(this.context.offers, state) }, this.inputAt);
+    const letters = state.axes === "off" ? {} : { "font-size": LETTERS * devicePixelRatio };
+    this.pane.show({ picture: "render", timeline: state.machine, options: { ...renderOptions(this.context.offers, state), ...letters } }, this.inputAt);
     this.inputAt = undefined;
   }
 

@@ -40,7 +40,7 @@ const std::vector<PictureFields> kFields = {
     {{"renderer", "raycast"}, {"isovalue", "300"}, {"transfer", "auto"}, {"sampling-rate", "2"}},
     {{"clip-box", "0:1,:,-3:v"}, {"clip-plane", "1,0,0,5"}, {"clip-plane", "0,-1,0,5"}, {"clip-mode", "cut-away"}},
     {{"light", "-1,0,0"}, {"light", "0,1,0"}, {"shading", "none"}, {"termination", "0"}},
-    {{"background", "#102030"}, {"depth", "16"}, {"title", "A & B = \"C\" --size=1"}, {"scale-bar", ""}},
+    {{"background", "#102030"}, {"depth", "16"}, {"title", "A & B = \"C\" --size=1"}, {"scale-bar", ""}, {"axes", "box"}},
     {{"color-bar", "K"}, {"legend", "true"}, {"orientation-marker", ""}},
     {{"color-bar", ""}, {"legend", ""}},
     {{"dpi", "300"}, {"font-size", "9.5"}, {"quality", "40"}, {"title", "x"}},

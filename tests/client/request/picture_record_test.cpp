@@ -108,6 +108,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--termination", "0"},
     {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "greedy", "--balance", "dynamic"},
     {"--groups", "3", "--teams", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
+    {"--axes", "grid"},
     {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
     {"--title=-x"},
     {"--color-bar", "--legend"},

@@ -1,0 +1,149 @@
+#include "client/pictures/volume_box.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "client/pictures/picture_labels.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kSmall = 1e-9;  // of angles: what is seen from its edge does not face the viewer
+
+Vec3 EndOf(const VolumeBox::Edge& edge) {
+  Vec3 end = edge.begin;
+  end[edge.axis] = 1;
+  return end;
+}
+
+std::array<Axis, 2> OthersThan(Axis axis) {
+  const auto i = std::size_t(Number(axis));
+  return {kAxes[(i + 1) % 3], kAxes[(i + 2) % 3]};
+}
+
+}  // namespace
+
+std::optional<InkPoint> Project(const PictureGeometry& geometry, ImageSize size, const Vec3& point) {
+  const Vec3 from = point - geometry.target;
+  double pixel = geometry.pixel_size;
+  if (geometry.projection == Projection::kPerspective) {
+    const double k = 1 + Dot(from, geometry.forward) / geometry.target_depth;
+    if (!(k > kSmall)) return std::nullopt;
+    pixel *= k;
+  }
+  return InkPoint{0.5 * size.width + Dot(from, geometry.right) / pixel, 0.5 * size.height - Dot(from, geometry.up) / pixel};
+}
+
+// Liang and Barsky, 1984.
+std::optional<Stroke> Clipped(Stroke line, ImageSize size, double margin) {
+  const InkPoint from = line.begin;
+  const double dx = line.end.x - from.x, dy = line.end.y - from.y;
+  double first = 0, last = 1;
+  // Keeps where start + t * step >= 0.
+  const auto keep = [&](double start, double step) {
+    if (step > 0) first = std::max(first, -start / step);
+    if (step < 0) last = std::min(last, -start / step);
+    if (step == 0 && start < 0) last = -1;
+  };
+  keep(from.x + margin, dx);
+  keep(size.width + margin - from.x, -dx);
+  keep(from.y + margin, dy);
+  keep(size.height + margin - from.y, -dy);
+  if (!(first <= last)) return std::nullopt;
+  line.begin = {from.x + first * dx, from.y + first * dy};
+  line.end = {from.x + last * dx, from.y + last * dy};
+  return line;
+}
+
+std::optional<VolumeBox> VolumeBox::Of(const PictureGeometry& geometry, ImageSize size) {
+  const VolumeBox box(geometry, size);
+  for (const Axis axis : kAxes) {
+    if (!(Length(box.EdgeOf(axis)) > 0)) return std::nullopt;
+  }
+  for (const Edge& edge : box.Edges()) {
+    for (const Vec3& place : {edge.begin, EndOf(edge)}) {
+      const std::optional<InkPoint> point = Project(geometry, size, box.PointAt(place));
+      if (!point || !std::isfinite(point->x) || !std::isfinite(point->y)) return std::nullopt;
+    }
+  }
+  return box;
+}
+
+std::array<VolumeBox::Edge, 12> VolumeBox::Edges() const {
+  std::array<Edge, 12> edges;
+  std::size_t count = 0;
+  for (const Axis axis : kAxes) {
+    const auto [u, v] = OthersThan(axis);
+    for (const bool far_u : {false, true}) {
+      for (const bool far_v : {false, true}) {
+        Edge& edge = edges[count++];
+        edge.axis = axis;
+        edge.begin[u] = far_u ? 1 : 0;
+        edge.begin[v] = far_v ? 1 : 0;
+        const bool one = Faces(u, far_u), other = Faces(v, far_v);
+        edge.hidden = !one && !other;
+        edge.outline = one != other;
+      }
+    }
+  }
+  return edges;
+}
+
+std::optional<VolumeBox::Edge> VolumeBox::LabelledEdge(Axis axis) const {
+  std::optional<Edge> best;
+  double farthest = 0;
+  for (const Edge& edge : Edges()) {
+    if (edge.axis != axis || !edge.outline) continue;
+    const auto [begin, end, width] = LineOf(edge, 0);
+    const bool sideways = std::abs(end.x - begin.x) >= std::abs(end.y - begin.y);
+    const double far = sideways ? begin.y + end.y : -(begin.x + end.x);
+    if (best && !(far > farthest)) continue;
+    best = edge;
+    farthest = far;
+  }
+  return best;
+}
+
+Vec3 VolumeBox::PointAt(const Vec3& place) const {
+  Vec3 point = geometry_.box_corner;
+  for (const Axis axis : kAxes) point = point + place[axis] * EdgeOf(axis);
+  return point;
+}
+
+InkPoint VolumeBox::At(const Vec3& place) const { return *Project(geometry_, size_, PointAt(place)); }
+
+Stroke VolumeBox::LineOf(const Edge& edge, double width) const { return {At(edge.begin), At(EndOf(edge)), width}; }
+
+bool VolumeBox::Faces(Axis axis, bool far) const {
+  const Vec3& edge = EdgeOf(axis);
+  const Vec3 outwards = (far ? 1 : -1) / Length(edge) * edge;
+  Vec3 to_viewer = -geometry_.forward;
+  if (geometry_.projection == Projection::kPerspective) {
+    const Vec3 face = far ? geometry_.box_corner + edge : geometry_.box_corner;
+    to_viewer = 1 / geometry_.target_depth * (geometry_.target - face) - geometry_.forward;
+  }
+  return Dot(outwards, to_viewer) > kSmall;
+}
+
+bool VolumeBox::RunsAlongTheWorlds(Axis axis) const {
+  const Vec3& edge = EdgeOf(axis);
+  return edge[axis] > (1 - kSmall) * Length(edge);
+}
+
+std::array<double, 2> VolumeBox::ValuesOf(Axis axis) const {
+  const double first = RunsAlongTheWorlds(axis) ? geometry_.box_corner[axis] : 0;
+  return {first, first + Length(EdgeOf(axis))};
+}
+
+std::string VolumeBox::NameOf(Axis axis) const {
+  static constexpr std::array<std::string_view, 3> kNames = {"x", "y", "z"};
+  const Vec3& edge = EdgeOf(axis);
+  const bool of_patient = geometry_.world == World::kPatient;
+  const std::string name = of_patient ? PatientSides(1 / Length(edge) * edge) : std::string(kNames[std::size_t(Number(axis))]);
+  return geometry_.unit == LengthUnit::kFile ? name : fmt::format("{} ({})", name, PluralOf(geometry_.unit));
+}
+
+}  // namespace slabstream
