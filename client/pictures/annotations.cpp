@@ -82,6 +82,8 @@ Shapes Arrow(InkPoint from, InkPoint to, const Scale& scale) {
           Polygon{{to, {neck.x - half * along.y, neck.y + half * along.x}, {neck.x + half * along.y, neck.y - half * along.x}}}};
 }
 
+InkPoint Between(InkPoint a, InkPoint b) { return {0.5 * (a.x + b.x), 0.5 * (a.y + b.y)}; }
+
 InkPoint MovedRight(InkPoint point, int x) { return {point.x + x, point.y}; }
 Shape MovedRight(Shape shape, int x) {
   const auto move = [x](auto& moved) {
@@ -300,7 +302,8 @@ class Artist {
   }
 
   void AddLine(std::vector<Stroke>& lines, const Stroke& line) const {
-    if (const std::optional<Stroke> shown = Clipped(line, size_, line.width + 2 * scale_.halo)) lines.push_back(*shown);
+    const int beyond = int(line.width + 2 * scale_.halo) + 1;
+    if (const auto shown = Clipped(line, {-beyond, -beyond, size_.width + beyond, size_.height + beyond})) lines.push_back(*shown);
   }
 
   // Lines at these places of an axis, across the faces that do not face the viewer.
@@ -321,7 +324,7 @@ class Artist {
   }
 
   // Ticks and numbers along one edge, as many as have room, and its name. Returns the places of the ticks on the axis, in [0, 1].
-  std::vector<double> LabelAxis(const VolumeBox& box, Axis axis, std::vector<Stroke>& ticks, std::vector<Mark>& labels) {
+  std::vector<double> LabelAxis(const VolumeBox& box, Axis axis, std::vector<Stroke>& lines, std::vector<Mark>& labels) {
     const std::optional<VolumeBox::Edge> edge = box.LabelledEdge(axis);
     if (!edge) return {};
     const auto [begin, end, width] = box.LineOf(*edge, 0.8 * scale_.line);
@@ -338,6 +341,7 @@ class Artist {
       TextLine line{.text = text, .size = scale_.letters, .begin = {}, .width = font_->Width(text, scale_.letters)};
       const double half_width = 0.5 * line.width, half_height = 0.5 * kCapital * em;
       distance += std::abs(direction.x) * half_width + std::abs(direction.y) * half_height;
+      at = {std::clamp(at.x, -1e6, 1e6), std::clamp(at.y, -1e6, 1e6)};
       line.begin = {std::round(at.x + distance * direction.x - half_width), std::round(at.y + distance * direction.y + half_height)};
       return line;
     };
@@ -363,16 +367,26 @@ class Artist {
     for (std::size_t i = 0; i < values.size(); ++i) {
       places.push_back((values[i] - first) / (last - first));
       const InkPoint at = point_of(values[i]);
-      AddLine(ticks, {at, {at.x + tick * out.x, at.y + tick * out.y}, width});
-      if (!PutIfFree(numbers[i], labels)) continue;
+      AddLine(lines, {at, {at.x + tick * out.x, at.y + tick * out.y}, width});
+      if (!PutIfFree(numbers[i], lines, labels)) continue;
       widest = std::max(widest, std::abs(out.x) * numbers[i].width + std::abs(out.y) * kCapital * em);
     }
+    // The name stands beyond the numbers, or between two of them, or at an end; without its unit if there is room for no more.
+    const auto put_name = [&](const std::string& name) {
+      const auto put = [&](InkPoint at, InkPoint direction, double distance) {
+        return PutIfFree(text_beyond(name, at, direction, distance), lines, labels);
+      };
+      if (put(Between(begin, end), out, tick + gap + widest + 0.6 * em)) return true;
+      for (std::size_t i = values.size(); i-- > 1;) {
+        if (put(Between(point_of(values[i - 1]), point_of(values[i])), out, tick + gap)) return true;
+      }
+      const double diagonal = std::sqrt(0.5);
+      return put(end, {diagonal * (out.x + along.x), diagonal * (out.y + along.y)}, gap) || put(end, along, gap) ||
+             put(begin, {diagonal * (out.x - along.x), diagonal * (out.y - along.y)}, gap);
+    };
     const std::string name = box.NameOf(axis);
-    const InkPoint back = {-along.x, -along.y}, centre = {0.5 * (begin.x + end.x), 0.5 * (begin.y + end.y)};
-    if (!PutIfFree(text_beyond(name, centre, out, tick + gap + widest + 0.6 * em), labels) &&
-        !PutIfFree(text_beyond(name, end, along, gap), labels)) {
-      PutIfFree(text_beyond(name, begin, back, gap), labels);
-    }
+    const bool with_unit = geometry_.unit != LengthUnit::kFile && put_name(fmt::format("{} ({})", name, PluralOf(geometry_.unit)));
+    if (!with_unit) put_name(name);
     return places;
   }
 
@@ -382,12 +396,15 @@ class Artist {
             int(text.begin.y + kDescender * text.size + margin)};
   }
 
-  // If it lies within the picture and beside all other texts.
-  bool PutIfFree(const TextLine& text, std::vector<Mark>& labels) {
+  // If it lies within the picture and beside all other texts and the lines.
+  bool PutIfFree(const TextLine& text, const std::vector<Stroke>& lines, std::vector<Mark>& labels) {
     const PixelBounds area = AreaOf(text, 0.2 * scale_.letters);
     if (!PixelBounds{0, 0, size_.width, size_.height}.Contains(area)) return false;
     for (const PixelBounds& taken : taken_) {
       if (!Intersection(area, taken).empty()) return false;
+    }
+    for (const Stroke& line : lines) {
+      if (Clipped(line, AreaOf(text, 0))) return false;
     }
     taken_.push_back(AreaOf(text, 0));
     labels.push_back({.shapes = {text}, .color = palette_.letters, .halo = scale_.halo, .halo_color = palette_.halo});

@@ -1,7 +1,5 @@
 #include "client/pictures/volume_box.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -38,7 +36,7 @@ std::optional<InkPoint> Project(const PictureGeometry& geometry, ImageSize size,
 }
 
 // Liang and Barsky, 1984.
-std::optional<Stroke> Clipped(Stroke line, ImageSize size, double margin) {
+std::optional<Stroke> Clipped(Stroke line, const PixelBounds& area) {
   const InkPoint from = line.begin;
   const double dx = line.end.x - from.x, dy = line.end.y - from.y;
   double first = 0, last = 1;
@@ -48,10 +46,10 @@ std::optional<Stroke> Clipped(Stroke line, ImageSize size, double margin) {
     if (step < 0) last = std::min(last, -start / step);
     if (step == 0 && start < 0) last = -1;
   };
-  keep(from.x + margin, dx);
-  keep(size.width + margin - from.x, -dx);
-  keep(from.y + margin, dy);
-  keep(size.height + margin - from.y, -dy);
+  keep(from.x - area.x_begin, dx);
+  keep(area.x_end - from.x, -dx);
+  keep(from.y - area.y_begin, dy);
+  keep(area.y_end - from.y, -dy);
   if (!(first <= last)) return std::nullopt;
   line.begin = {from.x + first * dx, from.y + first * dy};
   line.end = {from.x + last * dx, from.y + last * dy};
@@ -139,11 +137,8 @@ std::array<double, 2> VolumeBox::ValuesOf(Axis axis) const {
 }
 
 std::string VolumeBox::NameOf(Axis axis) const {
-  static constexpr std::array<std::string_view, 3> kNames = {"x", "y", "z"};
   const Vec3& edge = EdgeOf(axis);
-  const bool of_patient = geometry_.world == World::kPatient;
-  const std::string name = of_patient ? PatientSides(1 / Length(edge) * edge) : std::string(kNames[std::size_t(Number(axis))]);
-  return geometry_.unit == LengthUnit::kFile ? name : fmt::format("{} ({})", name, PluralOf(geometry_.unit));
+  return geometry_.world == World::kPatient ? PatientSides(1 / Length(edge) * edge) : std::string(1, Letter(axis));
 }
 
 }  // namespace slabstream

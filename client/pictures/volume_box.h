@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/pictures/mark.h"
+#include "common/image/pixel_bounds.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
@@ -14,8 +15,8 @@ namespace slabstream {
 // Where the picture shows a point of the world. None: it is not before the eye.
 std::optional<InkPoint> Project(const PictureGeometry& geometry, ImageSize size, const Vec3& point);
 
-// The part of a line within `margin` pixels of the picture. None: it passes by.
-std::optional<Stroke> Clipped(Stroke line, ImageSize size, double margin);
+// The part of a line's middle within these pixels. None: it passes by.
+std::optional<Stroke> Clipped(Stroke line, const PixelBounds& area);
 
 class VolumeBox {
  public:
@@ -42,7 +43,7 @@ class VolumeBox {
   // What stands at the two ends of an axis: coordinates of the world if it runs along that axis of the world, else distances from the
   // first.
   std::array<double, 2> ValuesOf(Axis axis) const;
-  std::string NameOf(Axis axis) const;  // with its unit: "x (mm)"; of patients the side that it runs to: "R (mm)"
+  std::string NameOf(Axis axis) const;  // "x"; of patients the side that it runs to: "R"
 
  private:
   VolumeBox(const PictureGeometry& geometry, ImageSize size) : geometry_(geometry), size_(size) {}
