@@ -269,6 +269,7 @@ class HttpTest(WithService):
             ("render", {"size": 200, "color-bar": "true", "brightness": 0.5, "transfer": "viridis"}),
             ("render", {"size": 200, "color-bar": "Density, kg/m³", "title": "Both", "scale-bar": "true", "transfer": "auto", "renderer": "raycast",
                         "isovalue": "1:blue:0.5", "legend": "true"}),
+            ("render", {"size": 200, "axes": "grid", "background": "white", "azimuth": 30}),
             ("slice", {"size": 160, "plane": "zyx", "color-bar": "T", "title": "Planes", "scale-bar": "true", "orientation-marker": "true"}),
             ("slice", {"size": 160, "label-mode": "tint", "legend": "true", "dataset": "c"}),
             ("render", {"dataset": "channels", "channel": "1", "channel-color": "1=green,0=#f0f", "channel-range": "1=0:30"}),
@@ -980,7 +981,7 @@ class ViewTest(WithService):
         self.assertEqual(page.receive()["type"], "hello")
         self.assertEqual(page.text("status")["service"], "ready")
         for options in ({"azimuth": 30, "renderer": "raycast"}, {"clip-box": ":,:,3:", "scale-bar": True}, {"renderer": "mip", "size": "64x40"},
-                        {"clip-box": "500:600,:,:"}, {"size": 160, "color-bar": "K", "legend": True, "renderer": "zbuffer", "isovalue": 1, "transfer": "auto"}):
+                        {"clip-box": "500:600,:,:"}, {"size": 160, "axes": "axes"}, {"size": 160, "color-bar": "K", "legend": True, "renderer": "zbuffer", "isovalue": 1, "transfer": "auto"}):
             options = {"dataset": "a", "size": 48, **options}
             header, data, count = page.final(page.view(options))
             self.assertEqual(count, 2)  # one that moves, and the still one

@@ -78,7 +78,7 @@ TEST(VideoEncoder, WhatIsShownIsThePictures) {
     std::size_t first = 0;
     for (int step = 0; step < 4; ++step) {
       const PictureImage image = Ball(size, step);
-      const ComposedPicture picture = ComposedPicture::WithoutAnnotations(image, size, {});
+      const ComposedPicture picture = ComposedPicture::WithMarks(image, size, {}, {}).value();
       const auto chunk = encoder.Encode(picture);
       ASSERT_TRUE(chunk.ok()) << chunk.status().message();
       EXPECT_EQ(chunk->key, step == 0) << size.width;
@@ -101,7 +101,7 @@ TEST(VideoEncoder, AGreyPictureIsGrey) {
     StraightImage image{.bounds = {0, 0, 64, 64}, .codes = PooledVector<std::uint8_t>(std::size_t{4} * 64 * 64, grey)};
     for (std::size_t i = 3; i < image.codes.size(); i += 4) image.codes[i] = 255;
     const PictureImage shown(std::move(image));
-    const ComposedPicture picture = ComposedPicture::WithoutAnnotations(shown, size, {});
+    const ComposedPicture picture = ComposedPicture::WithMarks(shown, size, {}, {}).value();
     const auto chunk = encoder.Encode(picture);
     ASSERT_TRUE(chunk.ok());
     EXPECT_LT(decoder.Difference(*chunk, picture), 1.5) << int(grey);

@@ -151,6 +151,8 @@ TEST(PlanFrame, LengthsAreCountedInAUnitNearToTheVolumes) {
     EXPECT_DOUBLE_EQ(shown.pixel_size, expected.pixel_size);
     EXPECT_DOUBLE_EQ(shown.target_depth, expected.target_depth);
     EXPECT_NEAR(Length(shown.target - expected.target), 0, 1e-9 * radius * setup.unit);
+    EXPECT_NEAR(Length(shown.box_corner - expected.box_corner), 0, 1e-9 * radius * setup.unit);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(Length(shown.box_edges[i] - expected.box_edges[i]), 0, 1e-9 * radius * setup.unit);
     EXPECT_EQ(shown.unit, expected.unit);
   }
 }
