@@ -679,6 +679,20 @@ class PageTest(unittest.TestCase):
         viewer.driver.find_element(By.XPATH, "//div[label[. = 'Legend']]/input").click()
         viewer.until(f"{legend} === '' && location.hash.includes('legend=0')")
 
+    def test_axes_are_drawn_round_the_volume(self):
+        viewer = self.viewer()
+        viewer.settled()
+        choose = lambda name: viewer.driver.find_element(By.XPATH, f"//div[label[. = 'Round the volume']]/select/option[. = '{name}']").click()
+        choose("Grid")
+        drawn = self.assertFinal(viewer, "o.axes === 'grid'")
+        self.assertEqual(drawn["options"]["font-size"], 13, "letters of the page's size")
+        viewer.until("location.hash.includes('axes=grid')")
+        viewer.save(SHOTS, "axes")
+        self.assertEqual(self.at_the_same_address(viewer).final("o.axes === 'grid'")["options"], drawn["options"])
+        viewer.focus()
+        choose("Off")
+        viewer.final("o.axes === undefined && o['font-size'] === undefined")
+
     # ---- the first view
 
     def test_a_patient_is_seen_from_the_front_and_others_from_aside(self):
