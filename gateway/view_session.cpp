@@ -190,6 +190,7 @@ void ViewSession::Render(const ViewAction& action) {
     return;
   }
   const bool shadowed = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return frame.shading.needs_light_volume(); });
+  // Letters keep their size on the page.
   if (auto& letters = job->format.annotations.font_size) letters = *letters * scale;
   for (FrameRequest& frame : job->frames) {
     frame.straight8 = HoldsStraight8(job->format);

@@ -1,5 +1,6 @@
 #include "client/cli/annotate.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <iostream>
@@ -63,12 +64,9 @@ PictureGeometry Geometry(const JsonValue& value) {
                 {"pixel_size", JsonValue::Into(geometry.pixel_size, {0, kMost, true})},
                 {"box_corner", into(geometry.box_corner)},
                 {"box_edges", [&](const JsonValue& v) {
-                   std::size_t edge = 0;
-                   v.Each(
-                       [&](const JsonValue& e) {
-                         if (edge < 3) geometry.box_edges[edge++] = Vector(e);
-                       },
-                       3);
+                   std::vector<Vec3> edges;
+                   v.Each([&](const JsonValue& edge) { edges.push_back(Vector(edge)); }, 3);
+                   if (edges.size() == 3) std::ranges::copy(edges, geometry.box_edges.begin());
                  }}});
   return geometry;
 }
@@ -135,7 +133,7 @@ Result<Order> ParseOrder(const std::string& text) {
   return order;
 }
 
-// The pixels, and on them the annotations.
+// The pixels over the background, and on them the annotations.
 Status WritePixels(const Order& order, const PictureImage& image) {
   const Result<ComposedPicture> picture = ComposedPicture::Make(image, order.size, order.format, order.panes, order.key);
   if (!picture.ok()) return picture.status();

@@ -251,13 +251,14 @@ class Artist {
       const std::vector<double> ticks = LabelAxis(*box, axis, front, labels);
       if (which == VolumeAxes::kGrid) AddGrid(*box, axis, ticks, grid);
     }
-    const auto mixed = [this](float share) {
-      const auto [letters, halo] = std::pair(palette_.letters, palette_.halo);
-      return MarkColor{std::lerp(halo.red, letters.red, share), std::lerp(halo.green, letters.green, share),
-                       std::lerp(halo.blue, letters.blue, share)};
+    const auto put_under = [this](std::vector<Stroke> lines, float contrast) {
+      const MarkColor &on = palette_.letters, &off = palette_.halo;
+      const MarkColor color = {std::lerp(off.red, on.red, contrast), std::lerp(off.green, on.green, contrast),
+                               std::lerp(off.blue, on.blue, contrast)};
+      marks_.push_back({.shapes = {Lines{std::move(lines)}}, .color = color, .halo_color = {}, .under = true});
     };
-    marks_.push_back({.shapes = {Lines{std::move(grid)}}, .color = mixed(0.3F), .halo_color = {}, .under = true});
-    marks_.push_back({.shapes = {Lines{std::move(hidden)}}, .color = mixed(0.5F), .halo_color = {}, .under = true});
+    put_under(std::move(grid), 0.3F);
+    put_under(std::move(hidden), 0.5F);
     Put({Lines{std::move(front)}}, palette_.letters);
     marks_.back().halo *= 0.5;
     std::ranges::move(labels, std::back_inserter(marks_));
@@ -518,9 +519,8 @@ Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, s
     keep(artist.TakeMarks());
     if (annotations.axes == VolumeAxes::kOff) continue;
     artist.DrawVolumeAxes(annotations.axes);  // below all others
-    std::vector<Mark> axes = artist.TakeMarks();
-    axes.insert(axes.end(), std::make_move_iterator(marks.begin()), std::make_move_iterator(marks.end()));
-    marks = std::move(axes);
+    std::vector<Mark> others = std::exchange(marks, artist.TakeMarks());
+    keep(std::move(others));
   }
   return marks;
 }

@@ -17,11 +17,6 @@ Vec3 EndOf(const VolumeBox::Edge& edge) {
   return end;
 }
 
-std::array<Axis, 2> OthersThan(Axis axis) {
-  const auto i = std::size_t(Number(axis));
-  return {kAxes[(i + 1) % 3], kAxes[(i + 2) % 3]};
-}
-
 }  // namespace
 
 std::optional<InkPoint> Project(const PictureGeometry& geometry, ImageSize size, const Vec3& point) {
@@ -74,7 +69,7 @@ std::array<VolumeBox::Edge, 12> VolumeBox::Edges() const {
   std::array<Edge, 12> edges;
   std::size_t count = 0;
   for (const Axis axis : kAxes) {
-    const auto [u, v] = OthersThan(axis);
+    const Axis u = Axis((Number(axis) + 1) % 3), v = Axis((Number(axis) + 2) % 3);
     for (const bool far_u : {false, true}) {
       for (const bool far_v : {false, true}) {
         Edge& edge = edges[count++];

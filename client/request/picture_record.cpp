@@ -164,6 +164,8 @@ std::vector<std::pair<std::string, JsonValue::Read>> FormatFields(PictureFormat&
 }
 
 Json GeometryJson(const PictureGeometry& geometry) {
+  Json edges = Json::array();
+  for (const Vec3& edge : geometry.box_edges) edges.push_back(VectorJson(edge));
   return {{"world", NameOf(geometry.world)},
           {"unit", NameOf(geometry.unit)},
           {"projection", NameOf(geometry.projection)},
@@ -174,8 +176,7 @@ Json GeometryJson(const PictureGeometry& geometry) {
           {"target_depth", geometry.target_depth},
           {"pixel_size", geometry.pixel_size},
           {"box_corner", VectorJson(geometry.box_corner)},
-          {"box_edges",
-           Json::array({VectorJson(geometry.box_edges[0]), VectorJson(geometry.box_edges[1]), VectorJson(geometry.box_edges[2])})}};
+          {"box_edges", std::move(edges)}};
 }
 
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {

@@ -57,7 +57,7 @@ class _Waiting:
             raise DataLoss(f"FrameReply.shares are {len(reply.shares)}, asked for was 1")
         part = read_runs(reply.shares[0].runs, payload, width, height)
         rgba, depth = compose(part, width, height, self.draft.format)
-        bare = compose(part, width, height, PictureFormat())[0] if self.draft.format.annotations.axes != "off" else None
+        bare = compose(part, width, height, PictureFormat())[0] if self.draft.format.annotations.any() else None
         preview = reply.groups_done != reply.group_count
         format = dataclasses.replace(self.draft.format, key=key_of(reply.key))
         image = Image(rgba, depth, format=format, geometry=geometry_of(reply.geometry),

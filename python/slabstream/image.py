@@ -131,9 +131,7 @@ class Image:
         self.statistics = statistics    #: None for previews, and pictures put together of several
         self.preview = preview          #: some groups are still missing
         self._panes = list(panes) or ([geometry] if geometry is not None else [])
-        # What annotations are drawn onto, and over which background: what lies behind the volume needs the pixels without it.
-        clear = dataclasses.replace(format, background=(0.0, 0.0, 0.0, 0.0))
-        self._ground = (bare, format) if bare is not None else (rgba, format if format.background[3] == 1 else clear)
+        self._bare = bare                  # without the background, below which annotations may lie, too
         self._drawn: Floats | None = None  # with annotations
 
     @property
@@ -146,12 +144,19 @@ class Image:
         """That of numpy.asarray(image)."""
         return self.rgba.shape[0], self.rgba.shape[1], 4
 
+    def _ground(self) -> tuple[Floats, PictureFormat]:
+        """What annotations are drawn onto, and over which background."""
+        if self._bare is not None:
+            return self._bare, self.format
+        opaque = self.format.background[3] == 1
+        return self.rgba, self.format if opaque else dataclasses.replace(self.format, background=(0.0, 0.0, 0.0, 0.0))
+
     def _shown(self) -> Floats:
         annotations = self.format.annotations
         if not annotations.any() or not self._panes:
             return self.rgba
         if self._drawn is None:
-            self._drawn = draw(*self._ground, self._panes)
+            self._drawn = draw(*self._ground(), self._panes)
         return self._drawn
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> numpy.typing.NDArray[Any]:
@@ -190,7 +195,7 @@ class Image:
         elif kind == ".png":
             content = self.png(bits)
         else:
-            content = encode(*self._ground, self._panes, kind, bits or self.format.png_bits, self.format.quality)
+            content = encode(*self._ground(), self._panes, kind, bits or self.format.png_bits, self.format.quality)
         temporary = file.with_name(f".{secrets.token_hex(8)}.tmp")
         try:
             try:
@@ -248,5 +253,7 @@ def side_by_side(images: list[Image]) -> Image:
     """Pictures of one height, from left to right."""
     if len(images) == 1:
         return images[0]
+    bare = [image._bare for image in images if image._bare is not None]
     return Image(numpy.concatenate([image.rgba for image in images], axis=1), format=images[0].format,
-                 panes=[image.geometry for image in images if image.geometry is not None])
+                 panes=[image.geometry for image in images if image.geometry is not None],
+                 bare=numpy.concatenate(bare, axis=1) if bare else None)

@@ -682,7 +682,7 @@ class PageTest(unittest.TestCase):
     def test_axes_are_drawn_round_the_volume(self):
         viewer = self.viewer()
         viewer.settled()
-        choose = lambda name: viewer.driver.find_element(By.XPATH, f"//div[label[. = 'Round the volume']]/select/option[. = '{name}']").click()
+        choose = lambda name: viewer.driver.find_element(By.XPATH, f"//div[label[. = 'Axes']]/select/option[. = '{name}']").click()
         choose("Grid")
         drawn = self.assertFinal(viewer, "o.axes === 'grid'")
         self.assertEqual(drawn["options"]["font-size"], 13, "letters of the page's size")

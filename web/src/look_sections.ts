@@ -51,7 +51,7 @@ export function renderingSection(context: Context): HTMLElement {
   const projection = segmented("Projection", [["orthographic", "Parallel"], ["perspective", "Perspective"]], value => store.update({ projection: value as "orthographic" }));
   const background = colorField("Background", value => store.update({ background: value }, "background"));
   const offered = offers.offered("Annotations").find(({ name }) => name === "axes")?.choices ?? [];
-  const axes = choice("Round the volume", offered.map(each => [each, words(each)] as const), value => store.update({ axes: value }));
+  const axes = choice("Axes", offered.map(each => [each, words(each)] as const), value => store.update({ axes: value }));
   const update = (): void => {
     const { state } = store;
     axes.set(state.axes);

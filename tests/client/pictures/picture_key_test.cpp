@@ -12,6 +12,7 @@
 
 #include "client/pictures/annotations.h"
 #include "client/pictures/picture_labels.h"
+#include "tests/support/random.h"
 
 namespace slabstream {
 namespace {
@@ -55,6 +56,25 @@ PictureKey::Bar RedToBlue() { return {.name = "volume", .colors = {{-100, {1, 0,
 
 // A channel: from black to its colour.
 PictureKey::Bar Ramp(const std::string& name, const Rgb& color) { return {.name = name, .colors = {{0, {0, 0, 0}}, {100, color}}}; }
+
+// At least 3, and as many as are allowed: half the step, or two fifths of it, makes more.
+TEST(TicksOf, AreAsManyAsAreAllowed) {
+  Random random(21);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 3000; ++i) {
+    const double low = random.Real(-1000, 1000), high = low + std::exp(random.Real(-5, 8));
+    const int most = random.Integer(3, 8);
+    const std::vector<double> ticks = TicksOf(low, high, most);
+    const auto count = [&](double step) { return int(std::floor(high / step + 1e-9) - std::ceil(low / step - 1e-9)) + 1; };
+    ASSERT_GE(ticks.size(), 3U) << low << " to " << high;
+    const double step = ticks[1] - ticks[0], digit = step / std::pow(10, std::floor(std::log10(step) + 1e-6));
+    EXPECT_TRUE(std::abs(digit - 1) < 1e-6 || std::abs(digit - 2) < 1e-6 || std::abs(digit - 5) < 1e-6) << step;
+    EXPECT_EQ(int(ticks.size()), count(step)) << "all in the range";
+    const bool is_five = std::abs(digit - 5) < 1e-6, is_two = std::abs(digit - 2) < 1e-6;
+    EXPECT_TRUE(int(ticks.size()) <= most || (ticks.size() <= 8 && count(step * (is_two ? 2.5 : 2)) < 3)) << ticks.size() << " of " << most;
+    EXPECT_GT(count(step / (is_five ? 2.5 : 2)), std::min(most, int(ticks.size()))) << "a finer step";
+  }
+}
 
 TEST(TicksOf, AreRoundNumbersInTheRange) {
   EXPECT_THAT(TicksOf(0, 1), ElementsAre(0, 0.2, 0.4, 0.6, 0.8, 1));
