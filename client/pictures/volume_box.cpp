@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "client/pictures/picture_labels.h"
 
@@ -86,16 +87,21 @@ std::array<VolumeBox::Edge, 12> VolumeBox::Edges() const {
 }
 
 std::optional<VolumeBox::Edge> VolumeBox::LabelledEdge(Axis axis) const {
+  Vec3 low = {0.5, 0.5, 0.5}, high = low;
+  low[axis] = 0;
+  high[axis] = 1;
+  const InkPoint from = At(low), to = At(high);
+  const bool sideways = std::abs(to.x - from.x) >= std::abs(to.y - from.y);
   std::optional<Edge> best;
-  double farthest = 0;
+  std::pair<bool, double> most;  // whether it shows, and how far it lies below or to the left
   for (const Edge& edge : Edges()) {
     if (edge.axis != axis || !edge.outline) continue;
-    const auto [begin, end, width] = LineOf(edge, 0);
-    const bool sideways = std::abs(end.x - begin.x) >= std::abs(end.y - begin.y);
-    const double far = sideways ? begin.y + end.y : -(begin.x + end.x);
-    if (best && !(far > farthest)) continue;
+    const Stroke line = LineOf(edge, 0);
+    const std::pair found = {Clipped(line, {0, 0, size_.width, size_.height}).has_value(),
+                             sideways ? line.begin.y + line.end.y : -(line.begin.x + line.end.x)};
+    if (best && found <= most) continue;
     best = edge;
-    farthest = far;
+    most = found;
   }
   return best;
 }

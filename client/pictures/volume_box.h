@@ -31,8 +31,8 @@ class VolumeBox {
     bool outline = false;  // one of them does: beside it lies nothing of the volume
   };
   std::array<Edge, 12> Edges() const;
-  // That of the outline which lies lowest, or farthest to the left if it runs upwards rather than sideways. None: the axis runs along the
-  // line of sight.
+  // That of the outline which lies lowest, or farthest to the left if the axis runs upwards rather than sideways; one that the picture
+  // shows is preferred. None: the axis runs along the line of sight.
   std::optional<Edge> LabelledEdge(Axis axis) const;
 
   // A point of the box, each coordinate in [0, 1].

@@ -114,6 +114,24 @@ TEST(VolumeBoxTest, AViewAlongAnAxisHidesWhatLiesBehindTheFrontFace) {
   EXPECT_EQ(box.LabelledEdge(Axis::kZ)->begin, (Vec3{0, 0, 0}));  // on the left
 }
 
+TEST(VolumeBoxTest, TheLabelledEdgeLiesBelowOrOnTheLeftAndShows) {
+  const VolumeGeometry volume = {{100, 100, 100}};
+  for (const double fov : {1.0, 30.0, 60.0}) {
+    ViewParameters view{.projection = Projection::kPerspective, .azimuth_degrees = 45, .elevation_degrees = 35, .fov_degrees = fov};
+    view.zoom = 0.5;
+    const VolumeBox box = VolumeBox::Of(GeometryOf(MakeCamera(view, kPane, volume), volume), kPane).value();
+    for (const Axis axis : {Axis::kX, Axis::kY}) {
+      const Stroke line = box.LineOf(box.LabelledEdge(axis).value(), 0);
+      EXPECT_GT(line.begin.y + line.end.y, kPane.height) << fov;
+    }
+    const Stroke line = box.LineOf(box.LabelledEdge(Axis::kZ).value(), 0);
+    EXPECT_LT(line.begin.x + line.end.x, kPane.width) << fov;
+  }
+  PictureGeometry geometry = FrontView();
+  geometry.target.z += 80;  // its lower edge lies below the picture
+  EXPECT_EQ(VolumeBox::Of(geometry, kPane)->LabelledEdge(Axis::kX)->begin.z, 1);
+}
+
 TEST(VolumeBoxTest, AxesAlongTheWorldsHaveItsCoordinates) {
   PictureGeometry geometry = FrontView();
   VolumeBox box = VolumeBox::Of(geometry, kPane).value();
