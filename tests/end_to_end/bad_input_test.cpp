@@ -200,6 +200,7 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--title", std::string(121, 'x')}, "--title has 121 characters, at most 120 are possible"},
       {{"--title"}, "--title"},
       {{"--scale-bar=wide"}, "--scale-bar"},
+      {{"--axes", "cube"}, "--axes 'cube' is not one of off, box, axes, grid"},
       {{"--decomposition", "cheese"}, "--decomposition 'cheese' is not one of slab"},
       {{"--balance-by", "hairs"}, "--balance-by 'hairs'"},
       {{"--assignment", "lots"}, "--assignment 'lots'"},
