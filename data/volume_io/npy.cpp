@@ -1,5 +1,7 @@
 // Arrays of NumPy (.npy), by numpy.lib.format. The indices of an array are z, y, x, however it lies in memory: a[z, y, x]. A fourth one, in
 // front, counts volumes: a[time, z, y, x].
+#include "data/volume_io/npy_header.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -79,12 +81,12 @@ std::optional<std::vector<double>> ParseShape(std::string_view text) {
 }
 
 // The dictionary in front of the samples, and where they begin.
-struct NpyHeader {
+struct NpyText {
   std::string text;
   std::int64_t end = 0;
 };
 
-Result<NpyHeader> ReadText(const std::string& path) {
+Result<NpyText> ReadText(const std::string& path) {
   constexpr std::size_t kFirst = 8, kMostBytes = std::size_t{1} << 20;
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": not an array of NumPy: " + why); };
   std::array<std::byte, kFirst + 4> start{};
@@ -99,16 +101,18 @@ Result<NpyHeader> ReadText(const std::string& path) {
   std::size_t length = 0;
   for (std::size_t i = length_bytes; i-- > 0;) length = length << 8 | byte(kFirst + i);
   if (length > kMostBytes) return wrong(fmt::format("the header has {} bytes, limit {}", length, kMostBytes));
-  NpyHeader header{std::string(length, '\0'), std::int64_t(kFirst + length_bytes + length)};
+  NpyText header{std::string(length, '\0'), std::int64_t(kFirst + length_bytes + length)};
   const Payload payload{.file = path, .offset = std::int64_t(kFirst + length_bytes)};
   if (Status status = ReadPayload(payload, std::as_writable_bytes(std::span(header.text)), Extent::kStart); !status.ok()) return status;
   return header;
 }
 
-Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
-  const Result<NpyHeader> text = ReadText(path);
+}  // namespace
+
+Result<NpyHeader> ReadNpyHeader(const std::string& path) {
+  const Result<NpyText> text = ReadText(path);
   if (!text.ok()) return text.status();
-  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": not a volume of NumPy: " + why); };
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": not an array of NumPy: " + why); };
   const auto descr = ValueOf(text->text, "descr", '\'', '\'');
   const std::optional<Dtype> dtype = descr ? ParseDtype(*descr) : std::nullopt;
   if (!dtype)
@@ -119,19 +123,29 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   const auto shape_text = ValueOf(text->text, "shape", '(', ')');
   std::optional<std::vector<double>> shape = shape_text ? ParseShape(*shape_text) : std::nullopt;
   if (!shape) return wrong("its shape is missing");
-  if (shape->size() == 4 && fortran) return wrong("a shape of 4 sizes in Fortran order is not supported");
+  return NpyHeader{dtype->type, dtype->big_endian, fortran, *std::move(shape), text->end};
+}
 
-  RawHeader header{.type = dtype->type};
+namespace {
+
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
+  Result<NpyHeader> npy = ReadNpyHeader(path);
+  if (!npy.ok()) return npy.status();
+  std::vector<double>& shape = npy->shape;
+  if (shape.size() == 4 && npy->fortran)
+    return Status::InvalidArgument(path + ": not a volume of NumPy: a shape of 4 sizes in Fortran order is not supported");
+
+  RawHeader header{.type = npy->type};
   const Vec3 spacing = options.spacing.value_or(Vec3{1, 1, 1});
   header.steps = StepsOf(spacing);
-  if (fortran) {
+  if (npy->fortran) {
     // The first axis of the array, z or of a slice y, runs fastest.
-    std::swap(header.steps[0], header.steps[shape->size() == 2 ? 1 : 2]);
+    std::swap(header.steps[0], header.steps[shape.size() == 2 ? 1 : 2]);
   } else {
-    std::ranges::reverse(*shape);
+    std::ranges::reverse(shape);
   }
-  if (Status status = SetSize(header, path, *std::move(shape), options); !status.ok()) return status;
-  return LocatedSamples{header, {.file = path, .offset = text->end, .big_endian = dtype->big_endian}};
+  if (Status status = SetSize(header, path, std::move(shape), options); !status.ok()) return status;
+  return LocatedSamples{header, {.file = path, .offset = npy->end, .big_endian = npy->big_endian}};
 }
 
 Status Write(const FileSamples& samples, const std::string& path) {

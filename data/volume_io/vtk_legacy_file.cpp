@@ -133,7 +133,7 @@ Status VtkLegacyFile::OnKeyword(const std::string& keyword) {
   if (keyword == "POINT_DATA" || keyword == "CELL_DATA") return ReadSection(keyword);
   if (keyword == "POINTS") return ReadPlaces(keyword, 3);
   if (keyword.ends_with("_COORDINATES") && keyword.size() == std::string_view("X_COORDINATES").size()) return ReadPlaces(keyword, 1);
-  if (keyword == "CELLS") return ReadCells();
+  if (keyword == "CELLS" || std::ranges::find(kPolydataCells, keyword) != kPolydataCells.end()) return ReadCells(keyword);
   if (keyword == "CELL_TYPES") {
     const Result<std::int64_t> count = ReadCount(keyword, kMostTuples);
     return count.ok() ? Add({.name = keyword, .type = SampleType::kInt32, .tuples = *count}) : count.status();
@@ -175,24 +175,24 @@ Status VtkLegacyFile::ReadPlaces(const std::string& keyword, int components) {
 
 // Before version 5, each cell's number of points stands in front of them. Since then, there are the places where the cells begin and end
 // among the points of all.
-Status VtkLegacyFile::ReadCells() {
-  const Result<std::int64_t> count = ReadCount("CELLS", kMostTuples), numbers = ReadCount("CELLS", kMostTuples);
+Status VtkLegacyFile::ReadCells(const std::string& keyword) {
+  const Result<std::int64_t> count = ReadCount(keyword, kMostTuples), numbers = ReadCount(keyword, kMostTuples);
   for (const auto* read : {&count, &numbers}) {
     if (!read->ok()) return read->status();
   }
   constexpr int kVersionOfOffsets = 5;
   cells_ = *count;
-  if (version_ < kVersionOfOffsets) return Add({.name = "CELLS", .type = SampleType::kInt32, .tuples = *numbers});
+  if (version_ < kVersionOfOffsets) return Add({.name = keyword, .type = SampleType::kInt32, .tuples = *numbers});
   cells_ = std::max<std::int64_t>(*count - 1, 0);
-  if (Status status = ReadPartOfCells("OFFSETS", *count); !status.ok()) return status;
-  return ReadPartOfCells("CONNECTIVITY", *numbers);
+  if (Status status = ReadPartOfCells(keyword, "OFFSETS", *count); !status.ok()) return status;
+  return ReadPartOfCells(keyword, "CONNECTIVITY", *numbers);
 }
 
-Status VtkLegacyFile::ReadPartOfCells(const std::string& name, std::int64_t tuples) {
+Status VtkLegacyFile::ReadPartOfCells(const std::string& cells, const std::string& name, std::int64_t tuples) {
   const std::optional<std::string> keyword = Keyword();
   if (!keyword) return Ended();
-  if (*keyword != name) return Wrong(fmt::format("CELLS: has '{}', must have {}", *keyword, name));
-  VtkLegacyArray array{.name = name, .tuples = tuples};
+  if (*keyword != name) return Wrong(fmt::format("{}: has '{}', must have {}", cells, *keyword, name));
+  VtkLegacyArray array{.name = cells == "CELLS" ? name : cells + " " + name, .tuples = tuples};
   if (Status status = ReadType(array, name); !status.ok()) return status;
   return Add(std::move(array));
 }

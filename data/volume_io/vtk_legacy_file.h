@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -27,7 +28,7 @@ namespace slabstream {
 struct VtkLegacyArray {
   std::string section;  // "POINT_DATA" or "CELL_DATA"; "": the dataset's own
   // One of the dataset's own arrays has its keyword here: "POINTS", "CELLS", "OFFSETS", "CONNECTIVITY", "CELL_TYPES" or
-  // "X_COORDINATES".
+  // "X_COORDINATES". Cells of polydata: "LINES", or "LINES OFFSETS" and "LINES CONNECTIVITY".
   std::string name;
   std::string type_name = {};  // as the file calls it
   SampleType type = SampleType::kUint8;
@@ -39,6 +40,8 @@ struct VtkLegacyArray {
 
   std::int64_t samples() const { return tuples * components; }
 };
+
+inline constexpr std::array<std::string_view, 4> kPolydataCells = {"VERTICES", "LINES", "POLYGONS", "TRIANGLE_STRIPS"};
 
 class VtkLegacyFile {
  public:
@@ -82,9 +85,9 @@ class VtkLegacyFile {
   Status ReadSection(const std::string& keyword);
   // "KEYWORD n type" and the numbers of n tuples.
   Status ReadPlaces(const std::string& keyword, int components);
-  Status ReadCells();
-  // "NAME type" and `tuples` numbers.
-  Status ReadPartOfCells(const std::string& name, std::int64_t tuples);
+  Status ReadCells(const std::string& keyword);
+  // "NAME type" and `tuples` numbers; of the cells that follow this keyword.
+  Status ReadPartOfCells(const std::string& cells, const std::string& name, std::int64_t tuples);
   Status ReadScalars();
   Status ReadField();
   // The attribute that a keyword states: "KEYWORD name type", and its numbers.

@@ -250,7 +250,8 @@ bool VtkXmlFile::OnStart(const XmlTag& tag, std::string_view type) {
   if (name == "Piece") pieces_.push_back(tag);
   if (name == "PointData") point_scalars_ = tag.Attribute("Scalars");
   if (name == "CellData") cell_scalars_ = tag.Attribute("Scalars");
-  if (name == "DataArray" && (grandparent == "Piece" || (grandparent == type && parallel()))) {
+  const bool of_dataset = grandparent == type && (parallel() || parent == "FieldData");
+  if ((name == "DataArray" && (grandparent == "Piece" || of_dataset)) || (name == "Array" && of_dataset)) {
     constexpr std::size_t kMostArrays = 65536;
     in_array_ = arrays_.size() < kMostArrays;
     if (in_array_) arrays_.push_back({tag, parent, grandparent == "Piece" ? pieces_.size() - 1 : 0, tag.end, tag.end});

@@ -41,6 +41,9 @@ std::vector<FuzzBytes> DicomFileSeeds();
 bool DecodeMeshFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> MeshFileSeeds();
 
+bool DecodeShapeFile(std::span<const std::byte> input);
+std::vector<FuzzBytes> ShapeFileSeeds();
+
 bool DecodeBrickIndex(std::span<const std::byte> input);
 std::vector<FuzzBytes> BrickIndexSeeds();
 

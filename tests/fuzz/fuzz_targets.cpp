@@ -23,6 +23,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"zarr", "metadata, shards and chunks of Zarr", DecodeZarr, ZarrSeeds},
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"mesh-files", "files of unstructured grids", DecodeMeshFile, MeshFileSeeds},
+      {"shape-files", "files of meshes, lines and points", DecodeShapeFile, ShapeFileSeeds},
       {"hdf5-files", "HDF5 files and their chunks", DecodeHdf5File, Hdf5FileSeeds},
       {"xdmf-files", "XDMF files", DecodeXdmfFile, XdmfFileSeeds},
       {"n5-containers", "attributes and blocks of N5", DecodeN5Container, N5ContainerSeeds},
