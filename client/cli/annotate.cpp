@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/pictures/annotations.h"
 #include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "client/request/picture_record.h"
@@ -160,6 +161,7 @@ Status RunAnnotate() {
   std::getline(std::cin, text);
   const Result<Order> order = ParseOrder(text);
   if (!order.ok()) return order.status();
+  if (Status status = CheckCanDraw(order->format.annotations); !status.ok()) return status;
   LocalImage pixels = MakeLocalImage(PixelFormat::kRgba, {0, 0, order->size.width, order->size.height});
   if (!std::cin.read(reinterpret_cast<char*>(pixels.rgba.data()), std::streamsize(pixels.rgba.size() * sizeof(float)))) {
     return Status::InvalidArgument("there are fewer pixels than the size says");

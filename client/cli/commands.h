@@ -19,6 +19,7 @@ Status RunRender(const RenderOptions& options);
 Status RunTurntable(const TurntableOptions& options);
 Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
+Status RunShapeInfo(const InfoOptions& options);    // `info`, if the path is that of a mesh, lines or points (HoldsShape)
 Status RunMeshInfo(const InfoOptions& options);     // `info`, if the path ends as an unstructured grid's does (LooksLikeMesh)
 Status RunPictureInfo(const InfoOptions& options);  // `info`, if the path ends as a picture's does (IsPicturePath)
 Status RunValue(const ValueOptions& options);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "data/open/open_source.h"
+#include "data/shapes/shape_file.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -13,6 +14,10 @@ Status CheckInputVolume(const std::string& source) {
 }
 
 Status CheckInputVolume(const SourceText& source) {
+  if (HoldsShape(source.path)) {
+    return Status::InvalidArgument(
+        fmt::format("SOURCE {} is a mesh, lines or points, which show beside a volume: --mesh {}", source.path, source.path));
+  }
   const Status status = CheckVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }

@@ -70,7 +70,7 @@ Result<ServiceConnection> Connect(const FrameOptions& options, std::vector<Frame
   for (const FrameJob& job : jobs) {
     if (numbers.emplace(job.source, sources.size()).second) sources.push_back(job.source);
   }
-  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, sources, options.layers);
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, sources, options.layers, jobs.front().request.shapes);
   if (!connection.ok()) return connection;
   for (FrameJob& job : jobs) job.request.dataset = connection->dataset(numbers[job.source]);
   if (options.connection.local_workers > 0 || jobs.front().request.time.empty()) return connection;

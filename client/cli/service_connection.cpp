@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "client/cli/cores.h"
@@ -14,6 +16,7 @@
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
+#include "data/shapes/shape_file.h"
 #include "data/stores/object_cache.h"
 
 namespace slabstream {
@@ -40,6 +43,14 @@ Status LimitLocal(const ConnectionOptions& connection) {
   LimitMemory(connection.local_memory);
   SetReadMemory(connection.local_memory - shares->coordinator);
   return Status::Ok();
+}
+
+Status CheckShapeFile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return Status::NotFound(fmt::format("--shape {}: no such file", Printable(path)));
+  if (HoldsShape(path)) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("--shape {} is not a mesh, lines or points: such files end in {}", Printable(path), ShapeEndings()));
 }
 
 constexpr char kHowToStart[] = "`slabstream up` starts a service, --local needs none";
@@ -69,7 +80,7 @@ ServiceConnection::ServiceConnection(ServiceConnection&&) noexcept = default;
 ServiceConnection::~ServiceConnection() = default;
 
 Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& connection, std::span<const std::string> sources,
-                                                  const LayerFiles& layers) {
+                                                  const LayerFiles& layers, std::span<const ShapeChoice> shapes) {
   if (connection.local_workers == 0) {
     if (connection.local_threads > 0 || connection.local_memory > 0 || connection.local_cache > 0) {
       const std::string_view option = connection.local_threads > 0 ? "threads" : connection.local_memory > 0 ? "memory" : "cache";
@@ -97,15 +108,19 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
   if (!files.empty()) {
     if (Status status = CheckFields(files.front()); !status.ok()) return status;
   }
+  for (const ShapeChoice& shape : shapes) {
+    if (Status status = CheckShapeFile(shape.shape); !status.ok()) return status;
+  }
   if (connection.unasked) {
     PrintNote(fmt::format("{}, so this process works on {} itself, as with --local",
                           FindState("") ? "a path is no dataset of a service" : "no service is named and none runs here",
                           Printable(sources.front())));
   }
-  return OpenLocal(connection, std::move(files));
+  return OpenLocal(connection, std::move(files), shapes);
 }
 
-Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources) {
+Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources,
+                                                       std::span<const ShapeChoice> shapes) {
   ServiceConnection opened;
   opened.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
@@ -115,6 +130,7 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
     opened.datasets_.push_back(number == 0 ? kLocalDataset : fmt::format("{}-{}", kLocalDataset, number));
     options.coordinator.catalogue[opened.datasets_.back()] = std::move(source);
   }
+  for (const ShapeChoice& shape : shapes) options.coordinator.catalogue.emplace(shape.shape, DataSource(shape.shape, ""));
   options.worker.threads = std::uint32_t(LocalThreads(connection));
   if (connection.local_memory > 0) {
     const Result<MemoryShares> shares = SharesOf(connection);

@@ -25,14 +25,16 @@ class ServiceConnection {
   // For volumes `sources`, at least one. At the service they are names of its catalogue. With local workers they are volume files: Open
   // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers. Errors of CheckDataset.
   // `layers`: files that belong to each of them, with local workers only; else InvalidArgument.
+  // `shapes`: of requests: with local workers files, which become datasets of these names.
   static Result<ServiceConnection> Open(const ConnectionOptions& connection, std::span<const std::string> sources,
-                                        const LayerFiles& layers = {});
+                                        const LayerFiles& layers = {}, std::span<const ShapeChoice> shapes = {});
   static Result<ServiceConnection> Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers = {}) {
     return Open(connection, {&source, 1}, layers);
   }
   // In this process, by connection.local_workers > 0. A function in a source supplies its volume when the first frame needs it, on a thread
   // of its own.
-  static Result<ServiceConnection> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources);
+  static Result<ServiceConnection> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources,
+                                             std::span<const ShapeChoice> shapes = {});
   // The service alone, for `status`.
   static Result<ServiceConnection> OpenService(const ServiceChoice& choice);
   static Result<ServiceConnection> OpenService(const ServiceAddress& service);

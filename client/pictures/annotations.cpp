@@ -487,7 +487,7 @@ Status CheckTitle(std::string_view name, std::string_view title) {
   return Status::InvalidArgument(fmt::format("{} has {} characters, at most {} are possible", name, characters, kMaxTitleCharacters));
 }
 
-Status CheckCanDraw(const Annotations& annotations) { return annotations.any() ? AnnotationFont().status() : Status::Ok(); }
+Status CheckCanDraw(const Annotations& annotations) { return annotations.any() ? Font::Open().status() : Status::Ok(); }
 
 Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
                                   const PictureKey& key) {

@@ -33,7 +33,7 @@ inline constexpr int kMaxTitleCharacters = 120;
 
 // One line of UTF-8 without control characters, at most kMaxTitleCharacters. InvalidArgument: what it is instead, after `name`.
 Status CheckTitle(std::string_view name, std::string_view title);
-// For a message before the work begins. NotFound: the font (AnnotationFont).
+// Whether the font of annotations opens: for a message before the work begins. Its errors are those of Font::Open.
 Status CheckCanDraw(const Annotations& annotations);
 
 // What is drawn onto a picture of this format, the last one on top, first those below the picture. Title and caption have passed

@@ -72,8 +72,11 @@ std::string FieldsText(const DatasetFields& dataset) {
 }
 
 Json DatasetJson(const DatasetStatus& dataset) {
-  Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}};
-  if (dataset.state == DatasetState::kReady) {
+  Json entry = {{"name", dataset.name}, {"state", NameOf(dataset.state)}, {"is_shape", dataset.is_shape}};
+  if (dataset.shape) {
+    entry["shape"] = ShapeJson(*dataset.shape);
+    entry["memory_bytes"] = dataset.memory_bytes;
+  } else if (dataset.state == DatasetState::kReady) {
     const VolumeGeometry& geometry = dataset.description.geometry;
     entry["size"] = {geometry.size.x, geometry.size.y, geometry.size.z};
     entry["type"] = NameOf(dataset.description.type);
@@ -98,6 +101,15 @@ Json DatasetJson(const DatasetStatus& dataset) {
 }
 
 }  // namespace
+
+Json ShapeJson(const ShapeInfo& shape) {
+  Json json = {{"kind", NameOf(shape.kind)}, {"vertices", shape.vertices}, {"parts", shape.parts}};
+  json["low"] = {shape.low.x, shape.low.y, shape.low.z};
+  json["high"] = {shape.high.x, shape.high.y, shape.high.z};
+  json["colors"] = shape.has_colors;
+  if (shape.has_values) json["range"] = {{"min", shape.least}, {"max", shape.largest}};
+  return json;
+}
 
 std::string_view NameOf(DatasetState state) {
   switch (state) {
@@ -146,7 +158,11 @@ std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
   std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "LEVELS", "MEMORY", "LAYERS"}};
   for (const DatasetStatus& dataset : datasets) {
     Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-", "-"};
-    if (dataset.state == DatasetState::kReady) {
+    if (dataset.shape) {
+      row[3] = fmt::format("{} {}", dataset.shape->parts, PartsOf(dataset.shape->kind));
+      row[4] = NameOf(dataset.shape->kind);
+      row[7] = MemoryText(dataset.memory_bytes);
+    } else if (dataset.state == DatasetState::kReady) {
       const Index3& size = dataset.description.geometry.size;
       const Vec3& spacing = dataset.description.geometry.spacing;
       row[3] = fmt::format("{} x {} x {}", size.x, size.y, size.z);

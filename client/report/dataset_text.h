@@ -15,6 +15,7 @@ std::string_view NameOf(DatasetState state);  // "ready"
 // "12 s", "5 min", "3.5 h", "2.1 d".
 std::string AgeText(std::uint64_t milliseconds);
 
+Json ShapeJson(const ShapeInfo& shape);
 Json DatasetsJson(const std::vector<DatasetStatus>& datasets);
 
 Json SimulationJson(const SimulationStatus& simulation);

@@ -152,7 +152,9 @@ Option AddRequestOption(const Command& app, const RequestOption& option, FrameRe
     return app.AddSwitch(
         names, [set, name](bool on) { return set(name, {on ? "true" : "false"}); }, option.help);
   }
-  const Option added = app.AddOption(name, set, option.help).TypeName(option.value).Default(option.standard);
+  const Option added = app.AddOption(option.name == "shape" ? name + ",--mesh,--lines,--points" : name, set, option.help)
+                           .TypeName(option.value)
+                           .Default(option.standard);
   if (option.range) added.Range(*option.range);
   if (!option.choices.empty()) added.Choices({option.choices.begin(), option.choices.end()});
   if (option.repeatable) added.Repeatable();

@@ -37,6 +37,11 @@ template <class T>
 concept Part = std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> ||
     std::is_same_v<T, Shading> || std::is_same_v<T, LabelChoice> || std::is_same_v<T, FieldChoice> || std::is_same_v<T, Policy>;
 
+// Of options that are given once for each item.
+template <class T>
+concept Items =
+    std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> || std::is_same_v<T, std::vector<ShapeChoice>>;
+
 // ---- the table
 
 struct Choices {
@@ -104,8 +109,7 @@ RequestOption Describe(const FieldAbout& field, const T&, std::string path, cons
     option.range = NumberRange{field.least, field.most, field.above_least};
     option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
   }
-  option.repeatable =
-      std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> || std::is_same_v<T, std::vector<std::string>>;
+  option.repeatable = Items<T> || std::is_same_v<T, std::vector<std::string>>;
   option.value = named("NAME");
   if (IsOfChannels(option.path)) {  // each channel has its own
     option.range.reset();
@@ -265,10 +269,11 @@ struct OptionReader {
   void Read(const std::string& text, std::vector<LabelRange>& value) { Take(value, ParseLabelRanges(shown, text)); }
   void Read(const std::string& text, Vec3& value) { Take(value, ParseDirection(shown, text)); }
   void Read(const std::string& text, ClipPlane& value) { Take(value, ParseClipPlane(shown, text)); }
+  void Read(const std::string& text, ShapeChoice& value) { Take(value, ParseShape(shown, text)); }
 
   template <class T>
   void ReadAll(std::span<const std::string> texts, T& value) {
-    if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
+    if constexpr (Items<T>) {
       value.clear();
       for (const std::string& text : texts) {
         if (status.ok()) Read(text, value.emplace_back());
@@ -315,7 +320,7 @@ std::vector<std::string> Texts(const FieldAbout& field, const T& value) {
   } else if constexpr (requires { value.index(); }) {
     if (const auto* preset = std::get_if<std::string>(&value)) return {*preset};
     return {kColorMapFile};
-  } else if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
+  } else if constexpr (Items<T>) {
     std::vector<std::string> texts;
     for (const auto& item : value) texts.push_back(TextOf(item));
     return texts;

@@ -52,6 +52,10 @@ Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, s
 // "1,5-9,Precentral_L,Temporal_*": what is neither a number nor a range is a name.
 Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text);
 
+// "NAME[,color=COLOUR][,opacity=O][,width=W|Wpx][,map=MAP][,range=LOW:HIGH]". In NAME a backslash stands before a comma or another
+// backslash.
+Result<ShapeChoice> ParseShape(std::string_view option, std::string_view text);
+
 // Names that are separated by commas. In names a backslash stands before a comma, a '=' or another backslash.
 Result<std::vector<std::string>> ParseNames(std::string_view option, std::string_view text);
 // "NAME=VALUE,NAME=VALUE,...", none named twice. What has no '=' belongs to the value before it, as in "0=1,0.5,0,Actin=red"; a value in
@@ -73,6 +77,7 @@ std::string TextOfName(const std::string& name);
 std::string TextOf(const std::vector<std::string>& names);
 std::string TextOf(const ClipBox& box);
 std::string TextOf(const ClipPlane& plane);
+std::string TextOf(const ShapeChoice& shape);
 std::string TextOf(const std::vector<Isosurface>& surfaces);
 std::string TextOf(const std::vector<GradientOpacityPoint>& points);
 std::string TextOf(const std::vector<LabelOpacity>& opacities);

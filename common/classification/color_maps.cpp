@@ -45,6 +45,16 @@ constexpr std::string_view kMatplotlib = "N. Smith and S. van der Walt for matpl
 
 }  // namespace
 
+Rgb ColorMap::At(double place) const {
+  const auto next = std::ranges::upper_bound(points, place, {}, &Point::at);
+  if (next == points.end()) return points.back().color;
+  if (next == points.begin()) return points.front().color;
+  const auto& [at, from] = next[-1];
+  const auto t = float((place - at) / (next->at - at));
+  const auto mix = [t](float a, float b) { return a + t * (b - a); };
+  return {mix(from.r, next->color.r), mix(from.g, next->color.g), mix(from.b, next->color.b)};
+}
+
 const std::vector<ColorMap>& NamedColorMaps() {
   static const std::vector<ColorMap> maps = {
       {"grey", "colour map: black to white", "two points", {{0, {0, 0, 0}}, {1, {1, 1, 1}}}},

@@ -22,6 +22,8 @@ struct ColorMap {
   std::string_view purpose;  // one line for --help
   std::string_view source;   // and its terms
   std::vector<Point> points;
+
+  Rgb At(double place) const;  // linear between the points; `place` in [0, 1]
 };
 // The only list.
 const std::vector<ColorMap>& NamedColorMaps();

@@ -71,6 +71,19 @@ struct TransferChoice {
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
 
+// A shape (common/shapes/shape.h) that the picture shows beside its volume, and how.
+struct ShapeChoice {
+  std::string shape;                      // name of a dataset that is one, 1 ... kMaxNameBytes
+  std::optional<Rgb> color = {};          // none: colours of vertices, or of values by `map`, or white, as the shape has them
+  double opacity = 1;                     // (0, 1]
+  double width = 0;                       // thickness of lines, diameter of points; 0: the shape's radii, or some pixels
+  bool width_in_pixels = false;           // of the picture; else in the world's unit
+  std::string map = {};                   // name of a colour map (NamedColorMaps) for the values of vertices; empty: "viridis"
+  std::optional<ScalarRange> range = {};  // that the colour map spans; none: all values
+  friend bool operator==(const ShapeChoice&, const ShapeChoice&) = default;
+};
+inline constexpr std::string_view kStandardShapeMap = "viridis";
+
 // The number of a level; none: the text is kAutomatic, or neither (IsLevel).
 inline std::optional<int> LevelNumber(std::string_view text) {
   const std::optional<int> number = ParseNumber<int>(text);
@@ -94,6 +107,7 @@ struct FrameRequest {
   // A time of the dataset: its number, a number with a unit of time such as "3.5s", or kLastTime; empty: the one that the dataset's file
   // says, mostly the first.
   std::string time = {};
+  std::vector<ShapeChoice> shapes = {};  // at most kMaxShownShapes
   Shading shading;
   double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never

@@ -13,6 +13,7 @@
 #include "common/frame/frame_request.h"
 #include "common/frame/label_look.h"
 #include "common/frame/opaque_front.h"
+#include "common/frame/shape_look.h"
 #include "common/frame/smooth_label.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
@@ -52,6 +53,15 @@ struct FieldSetup {
   friend bool operator==(const FieldSetup&, const FieldSetup&) = default;
 };
 
+// A shape that the picture shows. Its bytes (PackShape) are fetched, and kept, as if they were a volume.
+struct ShapeSetup {
+  CoarserLevel bytes;
+  AffineMap to_data = {};  // from the shape's world to data space
+  Vec3 low, high;          // of data space: all of the shape lies between
+  ShapeLook look = {};
+  friend bool operator==(const ShapeSetup&, const ShapeSetup&) = default;
+};
+
 // Lengths are counted in `unit`: those of all geometries, of camera and clip region, and those in slopes of the transfer function.
 struct FrameSetup {
   DatasetId dataset = 0;
@@ -76,8 +86,9 @@ struct FrameSetup {
   bool flat = false;  // the picture is a slice: colours of fields that add are added, not averaged (docs/rendering.md)
   Shading shading;
   double termination = kDefaultTermination;
-  std::int32_t halo = kHalo;  // voxels that a worker keeps round a box
-  OpaqueFront front = {};     // empty: nothing is known
+  std::int32_t halo = kHalo;            // voxels that a worker keeps round a box
+  OpaqueFront front = {};               // empty: nothing is known
+  std::vector<ShapeSetup> shapes = {};  // at most kMaxShownShapes
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 

@@ -4,13 +4,16 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "common/frame/frame_unit.h"
 #include "common/planning/frame_occlusion.h"
+#include "common/planning/framing.h"
 #include "common/planning/placement.h"
 #include "common/planning/standard_combining.h"
 #include "common/renderers/registry.h"
+#include "common/shapes/packed_shape.h"
 #include "common/volume/light_volume.h"
 
 namespace slabstream {
@@ -38,6 +41,39 @@ Result<CoarserLevel> LightVolumeFrom(const std::string& name, const CoarserVolum
 
 std::int64_t PicturePixels(const Camera& camera) {
   return std::int64_t{camera.width / camera.supersample} * (camera.height / camera.supersample);
+}
+
+// Whether any fragment may lie in the box: a shape reaches it.
+bool HoldsShapes(const Box& box, const FrameSetup& setup) {
+  return std::ranges::any_of(setup.shapes, [&](const ShapeSetup& shape) {
+    return std::ranges::all_of(kAxes,
+                               [&](Axis axis) { return shape.low[axis] <= box.end[axis] && shape.high[axis] >= box.begin[axis] - 1; });
+  });
+}
+
+// Boxes that show nothing have no owner. Those with shapes are drawn all the same: they composite the fragments that they hold.
+std::shared_ptr<const Layout> WithShapes(std::shared_ptr<const Layout> layout, const FrameSetup& setup, std::size_t slots) {
+  if (setup.shapes.empty() || setup.format != PixelFormat::kRgba || slots == 0) return layout;
+  std::shared_ptr<Layout> changed;
+  for (std::size_t box = 0; box < layout->owners.size(); ++box) {
+    if (layout->owners[box] != kNoSlot || !HoldsShapes(layout->partition.boxes()[box], setup)) continue;
+    if (changed == nullptr) changed = std::make_shared<Layout>(*layout);
+    changed->owners[box] = std::uint32_t(box % slots);
+  }
+  return changed != nullptr ? std::shared_ptr<const Layout>(std::move(changed)) : layout;
+}
+
+double FarthestDepth(const FrameSetup& setup) {
+  double farthest = setup.camera.target_depth;
+  for (const ShapeSetup& shape : setup.shapes) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 p = {(corner & 1 ? shape.high : shape.low).x, (corner & 2 ? shape.high : shape.low).y,
+                      (corner & 4 ? shape.high : shape.low).z};
+      const auto& row = setup.camera.depth_row;
+      farthest = std::max(farthest, row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]);
+    }
+  }
+  return farthest;
 }
 
 // Towards a light beside the viewer, above on the left.
@@ -81,9 +117,26 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
     field.look.transfer = InUnit(field.look.transfer, setup.unit);
     setup.fields.push_back(std::move(field));
   }
+  for (std::size_t i = 0; i < resolved.shapes.size(); ++i) {
+    const CoarserVolume& shape = resolved.fields.shapes[i];
+    ShapeSetup& shown = setup.shapes.emplace_back(ShapeSetup{.bytes = {shape.dataset, shape.summary->description, {}}});
+    shown.look = resolved.shapes[i];
+    if (!shown.look.width_in_pixels) shown.look.width /= setup.unit;
+    shown.to_data = FromWorld(geometry);
+    std::tie(shown.low, shown.high) = shown.to_data.Bounds(shape.summary->shape->low, shape.summary->shape->high);
+  }
   if (Status status = CheckView(request.view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(InUnit(request.view, setup.unit), request.size, setup); !status.ok()) return status;
   if (Status status = CheckDrawable(setup.camera); !status.ok()) return status;
+  for (ShapeSetup& shape : setup.shapes) {
+    // What is drawn reaches beyond the vertices by its width.
+    const double pixel = setup.camera.PixelSizeAt(setup.camera.projection == Projection::kPerspective ? FarthestDepth(setup) : 1);
+    const double width =
+        shape.look.width > 0 && !shape.look.width_in_pixels ? shape.look.width : pixel * std::max(shape.look.width, kStandardPointWidth);
+    const Vec3 reach = width * (Vec3{1, 1, 1} / setup.camera.spacing);
+    shape.low = shape.low - reach;
+    shape.high = shape.high + reach;
+  }
   setup.shading = setup.transfer.material ? OnMaterial(request.shading, *setup.transfer.material) : request.shading;
   setup.transfer.material.reset();  // workers find it in the shading
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
@@ -130,7 +183,7 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   plan.client = client;
   plan.turn = turn;
   plan.setup = std::move(setup);
-  plan.layout = std::move(layout);
+  plan.layout = WithShapes(std::move(layout), plan.setup, roster.slots.size());
   plan.slots = std::uint32_t(roster.slots.size());
   plan.slab_axis = policy.axis;
   plan.combine = policy.combine.empty() ? StandardCombining(roster.slots.size(), PicturePixels(plan.setup.camera)) : policy.combine;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "common/view/clip_corners.h"
@@ -101,6 +102,24 @@ std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Bo
   for (Box& place : places) place = geometry.InDataSpace(place);
   const std::optional<Ball> cut = BallOfCut(request, places, clip, geometry);
   return cut ? *cut : BallRound(places, geometry);
+}
+
+AffineMap FromWorld(const VolumeGeometry& geometry) {
+  AffineMap map;
+  const auto among = [&](const Vec3& direction) { return geometry.orientation.FromWorld(direction) / geometry.spacing; };
+  map.steps = {among({1, 0, 0}), among({0, 1, 0}), among({0, 0, 1})};
+  map.offset = among(-geometry.orientation.origin);
+  return map;
+}
+
+Box BoxAround(const ShapeInfo& shape, const VolumeGeometry& geometry) {
+  const auto [low, high] = FromWorld(geometry).Bounds(shape.low, shape.high);
+  Box box;
+  for (const Axis axis : kAxes) {
+    box.begin[Number(axis)] = std::int32_t(std::floor(std::clamp(low[axis] + 0.5, -kFarthestShape, kFarthestShape)));
+    box.end[Number(axis)] = std::int32_t(std::floor(std::clamp(high[axis] + 0.5, -kFarthestShape, kFarthestShape))) + 1;
+  }
+  return box;
 }
 
 }  // namespace slabstream

@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
+#include "common/shapes/packed_shape.h"
 #include "common/view/ball.h"
 #include "common/view/clip.h"
+#include "common/volume/affine_map.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
@@ -16,5 +18,11 @@ namespace slabstream {
 // height. None: there are no bricks. `request.view` has its angles (WithDefaults).
 std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
                                const VolumeGeometry& geometry);
+
+// From the volume's world to its data space.
+AffineMap FromWorld(const VolumeGeometry& geometry);
+// What a picture of the volume frames for a shape beside it: its bounds, at most kFarthestShape voxels from the first voxel.
+inline constexpr double kFarthestShape = 1 << 24;
+Box BoxAround(const ShapeInfo& shape, const VolumeGeometry& geometry);
 
 }  // namespace slabstream

@@ -7,11 +7,13 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/classification/color_maps.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/framing.h"
 #include "common/planning/other_bricks.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_choice.h"
+#include "common/shapes/packed_shape.h"
 #include "common/view/default_view.h"
 
 namespace slabstream {
@@ -192,7 +194,43 @@ Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summar
                     request.dataset));
   }
   if (!fields.others.empty()) return refused("several fields are");
+  if (!fields.shapes.empty()) return refused("shapes are");
   return request.shading.needs_light_volume() ? refused("shadows and ambient occlusion are") : Status::Ok();
+}
+
+Result<ShapeLook> LookOfShape(const ShapeChoice& choice, const CoarserVolume& dataset) {
+  const ShapeInfo* const info = dataset.summary->shape.get();
+  if (info == nullptr) {
+    return Status::InvalidArgument(fmt::format("shape '{}' is a volume, but must be a mesh, lines or points", choice.shape));
+  }
+  ShapeLook look{.color = choice.color.value_or(Rgb{1, 1, 1}), .opacity = choice.opacity, .width = choice.width};
+  look.width_in_pixels = choice.width_in_pixels;
+  const bool by_values = info->has_values && (!choice.map.empty() || choice.range || !(choice.color || info->has_colors));
+  if (!by_values) {
+    if (!choice.map.empty() || choice.range) {
+      return Status::InvalidArgument(
+          fmt::format("shape '{}' has {}, but its vertices have no values to colour", choice.shape, choice.range ? "a range" : "a map"));
+    }
+    if (!choice.color && info->has_colors) look.coloring = ShapeColoring::kVertices;
+    return look;
+  }
+  look.coloring = ShapeColoring::kValues;
+  const std::string_view name = choice.map.empty() ? kStandardShapeMap : std::string_view(choice.map);
+  const auto map = std::ranges::find(NamedColorMaps(), name, &ColorMap::name);
+  if (map == NamedColorMaps().end()) {
+    std::vector<std::string_view> names;
+    for (const ColorMap& each : NamedColorMaps()) names.push_back(each.name);
+    return Status::InvalidArgument(
+        fmt::format("shape '{}' has map '{}', but must have one of: {}", choice.shape, choice.map, fmt::join(names, ", ")));
+  }
+  if (choice.range && choice.range->percentiles) {
+    return Status::InvalidArgument(fmt::format("shape '{}' has a range of percentiles, but must have one of values", choice.shape));
+  }
+  look.low = choice.range ? choice.range->min : double(info->least);
+  look.high = choice.range ? choice.range->max : double(info->largest);
+  if (!(look.low < look.high)) look.high = std::nextafter(look.low + std::max(1.0, std::abs(look.low)), 1e300);  // one value alone
+  for (std::size_t i = 0; i < kShapeMapColors; ++i) look.map.push_back(map->At(double(i) / double(kShapeMapColors - 1)));
+  return look;
 }
 
 }  // namespace
@@ -200,6 +238,16 @@ Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summar
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
                                        ShownFields fields) {
   const VolumeGeometry& geometry = summary->description.geometry;
+  if (summary->shape != nullptr) {
+    return Status::InvalidArgument(fmt::format("dataset \"{}\" is a shape ({}), which shows beside a volume: --shape {}", request.dataset,
+                                               NameOf(summary->shape->kind), request.dataset));
+  }
+  std::vector<ShapeLook> shapes;
+  for (std::size_t i = 0; i < fields.shapes.size(); ++i) {
+    Result<ShapeLook> look = LookOfShape(request.shapes[i], fields.shapes[i]);
+    if (!look.ok()) return look.status();
+    shapes.push_back(*std::move(look));
+  }
   if (fields.dataset != nullptr && HasLabelsAlone(*fields.dataset)) {
     const RendererKind* const named = FindRenderer(request.renderer);
     if (LabelsOf(request) == nullptr && named != nullptr && !named->Can(Ability::kLabels)) {
@@ -216,9 +264,12 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
     mode = LabelMode::kSurface;
   }
   const auto weighted = [](const FieldChoice& field) { return field.weight > 0 && field.weight < 1; };
-  const Result<std::vector<const RendererKind*>> able =
+  Result<std::vector<const RendererKind*>> able =
       RenderersFor(request, {fields.values(), std::ranges::any_of(request.fields, weighted), geometry.rectilinear()});
   if (!able.ok()) return able.status();
+  // A frame along slices has pixels as wide as voxels, and blurs shapes.
+  const auto blurs = [](const RendererKind* kind) { return kind->along_slices(); };
+  if (!fields.shapes.empty() && !std::ranges::all_of(*able, blurs)) std::erase_if(*able, blurs);
   if (Status status = CheckRectilinear(request, *summary, fields); !status.ok()) return status;
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
@@ -254,7 +305,11 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   std::optional<Ball> framed;
   if (*request.view.fit) {
     const BrickVisibility visibility(*summary, renderer.DrawnTable(volume.transfer(), *summary), OtherBricks(*summary, volume));
-    framed = FramedBall(request, visibility.VisibleBricks(volume.clip()), volume.clip(), geometry);
+    std::vector<Box> shown = visibility.VisibleBricks(volume.clip());
+    if (!request.clipping.slab) {
+      for (const CoarserVolume& shape : fields.shapes) shown.push_back(BoxAround(*shape.summary->shape, geometry));
+    }
+    framed = FramedBall(request, shown, volume.clip(), geometry);
     if (framed) request.view = FitView(request.view, geometry, *framed);
     request.view.fit = false;
   }
@@ -266,7 +321,8 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
                          .policy = std::move(policy),
                          .framed = framed,
                          .fields = std::move(fields),
-                         .weight = weight};
+                         .weight = weight,
+                         .shapes = std::move(shapes)};
 }
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {

@@ -30,7 +30,8 @@ struct ResolvedRequest {
   std::optional<CoarserVolume> light = {};
   std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
   ShownFields fields = {};
-  double weight = 1;  // of the volume: FieldLook::weight
+  double weight = 1;                   // of the volume: FieldLook::weight
+  std::vector<ShapeLook> shapes = {};  // how it shows fields.shapes. Widths are in the world's unit
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as RenderersFor and

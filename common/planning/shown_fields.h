@@ -41,6 +41,7 @@ struct ShownFields {
   int volume = 0;                                          // the number of the field that is the picture's volume
   bool volume_shows = true;                                // FieldNumbers::volume_shows
   std::vector<FieldVolume> others = {};                    // by ascending numbers, so labels are the last one
+  std::vector<CoarserVolume> shapes = {};                  // of FrameRequest::shapes: the datasets that these name
 
   // How many show that have values, with the volume.
   std::size_t values() const { return 1 + others.size() - (!others.empty() && others.back().labels ? 1 : 0); }

@@ -86,7 +86,20 @@ std::string SizeText(const FrameSetup& setup) {
   const PixelBounds frame = FrameBounds(setup);
   const Camera& camera = setup.camera;
   const std::string size = fmt::format("size {}x{}", camera.width / camera.supersample, camera.height / camera.supersample);
-  return setup.renderer->FrameIsPicture(setup) ? size : fmt::format("{} (rendered as {}x{})", size, frame.width(), frame.height());
+  const bool same = frame.width() == camera.width / camera.supersample && frame.height() == camera.height / camera.supersample;
+  return same ? size : fmt::format("{} (rendered as {}x{})", size, frame.width(), frame.height());
+}
+
+// What shapes show in the pixels of a frame (worker/shapes), of those that a process keeps: of each pixel it counts two fragments.
+std::uint64_t FragmentBytes(const FrameSetup& setup) {
+  constexpr std::uint64_t kFrames = 3, kOfPixel = 2 * 20 + 8;
+  return setup.shapes.empty() ? 0 : kFrames * kOfPixel * std::uint64_t(FrameBounds(setup).pixel_count());
+}
+
+std::uint64_t ShapeBytes(const FrameSetup& setup) {
+  std::uint64_t bytes = 0;
+  for (const ShapeSetup& shape : setup.shapes) bytes += std::uint64_t(shape.bytes.description.voxel_bytes());
+  return bytes;
 }
 
 }  // namespace
@@ -109,12 +122,13 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
-std::uint64_t LightBytes(const FrameSetup& setup) {
-  if (!setup.light) return 0;
+std::uint64_t SharedBytes(const FrameSetup& setup) {
+  std::uint64_t bytes = FragmentBytes(setup);
+  if (!setup.light) return bytes;
   // Of two looks: extinction in two orders, and shares of light for two lights.
   constexpr std::uint64_t kOfVoxel = 24, kOfLight = 8;
   const std::uint64_t lights = std::max<std::size_t>(setup.shading.lights.size(), 1);
-  std::uint64_t bytes = CountIn(setup.light->description.geometry.size) * (kOfVoxel + kOfLight * lights);
+  bytes += CountIn(setup.light->description.geometry.size) * (kOfVoxel + kOfLight * lights);
   // Samples, and of other fields the extinction until it is added to the volume's.
   for (const CoarserLevel* const light : LightVolumesOf(setup)) {
     const std::size_t sample = BytesPerSample(light->description.type) + (light == &*setup.light ? 0 : sizeof(float));
@@ -149,7 +163,8 @@ std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
-  const std::uint64_t taken = IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
+  const std::uint64_t taken =
+      IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + SharedBytes(setup) + ShapeBytes(setup) + images;
   const double boxes = (2 + DerivedShare(setup)) * BytesWithFields(setup);  // of that which is being read nothing is derived yet
   const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
   return std::min(most, std::int64_t(box - box % (std::bit_floor(box) / 8)));
@@ -169,8 +184,8 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   };
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, at_most);
   const auto needs = [&](const WorkerLimit& limit) {
-    return IdleMemoryBytes(limit.bytes) + (ReadsInParts(plan.setup) ? SourceBytes(limit.bytes) : 0) + LightBytes(plan.setup) +
-           voxels.at(limit.worker) + images;
+    return IdleMemoryBytes(limit.bytes) + (ReadsInParts(plan.setup) ? SourceBytes(limit.bytes) : 0) + SharedBytes(plan.setup) +
+           ShapeBytes(plan.setup) + voxels.at(limit.worker) + images;
   };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(

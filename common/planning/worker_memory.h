@@ -28,8 +28,9 @@ namespace slabstream {
 // Bytes, of the formula above. `placements`: of a group.
 std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
 std::uint64_t PictureBytes(const FrameSetup& setup);
-// The light volume, and what shadows and ambient occlusion make of it; 0: the frame has neither.
-std::uint64_t LightBytes(const FrameSetup& setup);
+// What the frames of a process share: the light volume, and what shadows and ambient occlusion make of it; and what shapes show. 0: the
+// frame has none of these.
+std::uint64_t SharedBytes(const FrameSetup& setup);
 // `derived_share`: bytes that are derived from a byte of voxels.
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share);
 // What cells of an unstructured grid add to the voxels of a padded box, as BoxBytesFor counts them. 0: it is none.

@@ -23,12 +23,13 @@ enum class Ability : std::uint8_t {
   kFields = 11,          // shows several fields of a dataset in one picture
   kSmoothLabels = 12,    // draws LabelSurface::kSmooth
   kRectilinear = 13,     // draws voxels at uneven distances (common/volume/stretch.h)
+  kShapes = 14,          // shows meshes, lines and points beside the volume (common/shapes/shape.h)
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 14> kAbilityNames = {
-    "perspective", "isosurfaces", "gradient-opacity", "labels",  "cells",  "lights",        "depth-shading",
-    "transfer",    "levels",      "shadows",          "regions", "fields", "smooth-labels", "rectilinear"};
+inline constexpr std::array<std::string_view, 15> kAbilityNames = {
+    "perspective", "isosurfaces", "gradient-opacity", "labels", "cells",         "lights",      "depth-shading", "transfer",
+    "levels",      "shadows",     "regions",          "fields", "smooth-labels", "rectilinear", "shapes"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

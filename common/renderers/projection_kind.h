@@ -16,7 +16,7 @@ class ProjectionKind : public RendererKind {
   // The first parameter is the sampling rate. The time of a box is that of its samples, along the rays of all pixels that it covers.
   AnalyticCost MakeCost(const CostBasis& basis) const override;
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override;
-  bool FrameIsPicture(const FrameSetup& /*setup*/) const override { return false; }
+  bool FinishCopies(const FrameSetup& /*setup*/) const override { return false; }
 
  protected:
   // The picture of a frame. color(pixel, rgba): premultiplied RGBA of a pixel of the frame; `rgba` is 0 before.

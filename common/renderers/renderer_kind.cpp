@@ -68,7 +68,7 @@ LocalImage RendererKind::Finish(const LocalImage& frame, const FrameSetup& setup
   return frame.bounds.empty() ? frame : ResamplePicture(frame, setup);
 }
 
-bool RendererKind::FrameIsPicture(const FrameSetup& setup) const { return setup.sheets.empty() && setup.camera.supersample == 1; }
+bool RendererKind::FinishCopies(const FrameSetup& setup) const { return setup.sheets.empty() && setup.camera.supersample == 1; }
 
 void SetRenderer(const RendererKind& kind, FrameSetup& setup) {
   setup.renderer = &kind;

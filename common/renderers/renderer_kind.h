@@ -136,10 +136,13 @@ class RendererKind {
   // picture.
   // Runs within the caller's task arena. The default resamples a frame along slices, and averages supersampled pixels.
   virtual LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const;
-  // Whether Finish would only copy the frame.
-  virtual bool FrameIsPicture(const FrameSetup& setup) const;
+  // Whether the picture is the frame as it is: Finish would only copy it, and there are no shapes beside it.
+  bool FrameIsPicture(const FrameSetup& setup) const { return setup.shapes.empty() && FinishCopies(setup); }
   // Whether the pictures that Finish makes of parts of a frame add up to that of the whole one.
   bool FinishesInShares(const FrameSetup& setup) const { return FrameIsPicture(setup) || setup.format == PixelFormat::kRgba; }
+
+ protected:
+  virtual bool FinishCopies(const FrameSetup& setup) const;
 
  private:
   const Facts facts_;

@@ -43,6 +43,8 @@ inline int HistogramBin(const ValueRange& range, double value) {
   return int(std::clamp((value - double(range.min)) * (kHistogramBins / width), 0.0, kHistogramBins - 1.0));
 }
 
+struct ShapeInfo;  // common/shapes/packed_shape.h
+
 struct VolumeSummary {
   VolumeDescription description;
   ValueRange range;                                       // the range of finite data values; {0, 0} if there is none
@@ -63,6 +65,8 @@ struct VolumeSummary {
   std::vector<std::uint64_t> owner_hosts = {};  // by owner that is a process: who can read its memory (SharedMemoryScope); 0: nobody
   std::string missing = {};                     // one line: what the volume lacks, since owners are gone or late; else empty
   std::vector<std::uint32_t> cells;             // for an unstructured grid, by brick: cells with their centres there; empty: it is no grid
+
+  std::shared_ptr<const ShapeInfo> shape = nullptr;  // the dataset is a shape, and these voxels are its bytes; null: it is a volume
 
   SampleTypes types() const { return {description.type, !cells.empty()}; }
 

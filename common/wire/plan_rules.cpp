@@ -99,6 +99,20 @@ void CheckFields(const FrameSetup& setup, Checker& check) {
   }
 }
 
+void CheckShapes(const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("shapes");
+  for (std::size_t i = 0; i < setup.shapes.size(); ++i) {
+    const auto of_shape = check.In("", i);
+    const CoarserLevel& bytes = setup.shapes[i].bytes;
+    const ShapeLook& look = setup.shapes[i].look;
+    check.That(bytes.description.type == ScalarType::kUint8 && !bytes.stored, "bytes", "not bytes that the coordinator holds");
+    check.That(look.opacity > 0, "look.opacity", "not greater than 0");
+    const std::size_t colors = look.coloring == ShapeColoring::kValues ? kShapeMapColors : 0;
+    check.That(look.map.size() == colors, "look.map", "not as many colours as the colouring has");
+    check.That(look.low < look.high, "look.high", "not greater than low");
+  }
+}
+
 // The volume alone may be rectilinear, and then there is nothing else (CheckRectilinear, common/planning/resolved_request.cpp).
 void CheckStretch(const FrameSetup& setup, Checker& check) {
   const auto is_even = [](const CoarserLevel& level) { return !level.description.geometry.rectilinear(); };
@@ -203,6 +217,7 @@ void Rules(const FrameSetup& m, Checker& check) {
   CheckLight(m.light, m.description, m, check);
   CheckCellsAndLabels(m, check);
   CheckFields(m, check);
+  CheckShapes(m, check);
   CheckStretch(m, check);
   if (check.ok()) check.Adopt(Validate(m.transfer));
   if (check.ok()) check.Adopt(Validate(m.shading));

@@ -13,14 +13,16 @@ namespace slabstream {
 
 void DatasetMachine::State::On(const SeekDataset& event) {
   const std::string& name = event.request->dataset;
-  if (IsPart(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
-    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset};
+  std::vector<std::string> named = {name};
+  for (const ShapeChoice& shape : event.request->shapes) named.push_back(shape.shape);
+  for (const std::string& each : named) {
+    if (!IsPart(each) && !(datasets.folders.empty() && datasets.Find(each) == nullptr)) continue;
+    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(each), &RefusedRequests::unknown_dataset};
     return;
   }
-  const auto use =
-      uses.insert_or_assign(event.use,
-                            Use{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}})
-          .first;
+  Use sought{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}};
+  for (std::size_t i = 1; i < named.size(); ++i) sought.shapes.push_back({named[i], Seek(named[i])});
+  const auto use = uses.insert_or_assign(event.use, std::move(sought)).first;
   if (const Status found = Advance(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
     uses.erase(use);
@@ -144,7 +146,10 @@ Status DatasetMachine::State::Advance(Use& use) {
   if (use.stage == Use::Stage::kDataset && ready()) {
     if (Status sought = SeekSources(use); !sought.ok()) return sought;
   }
-  return use.stage == Use::Stage::kSources && ready() ? SeekVoxels(use) : Status::Ok();
+  // What shapes are there decides what the picture frames, and so the levels that it draws.
+  const bool has_shapes =
+      std::ranges::all_of(use.shapes, [&](const Use::Entry& shape) { return datasets.Find(shape.name)->state == DatasetState::kReady; });
+  return use.stage == Use::Stage::kSources && ready() && has_shapes ? SeekVoxels(use) : Status::Ok();
 }
 
 Status DatasetMachine::State::SeekSources(Use& use) {
@@ -176,8 +181,10 @@ Status DatasetMachine::State::SeekSources(Use& use) {
 Status DatasetMachine::State::SeekVoxels(Use& use) {
   use.stage = Use::Stage::kVoxels;
   use.volume = use.entries.front().name;
+  use.fields.shapes.clear();
   // All that is known of a source before its levels are chosen.
   const auto overview = [&](const std::string& name) -> CoarserVolume { return {1, datasets.Find(name)->overview()}; };
+  for (const Use::Entry& shape : use.shapes) use.fields.shapes.push_back(overview(shape.name));
   std::vector<Use::Entry> sources = std::exchange(use.entries, {});
   ShownFields fields = use.fields;
   for (std::size_t i = 0; i < fields.others.size(); ++i) {
@@ -262,21 +269,27 @@ void DatasetMachine::State::AdvanceUses(const std::string& name) {
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
   DatasetReady ready;
-  std::vector<CoarserVolume> voxels;
-  for (const Use::Entry& awaited : use.entries) {
-    const DatasetTable::Entry& entry = *datasets.Find(awaited.name);
-    if (entry.state != DatasetState::kReady || use.stage != Use::Stage::kVoxels) {
-      news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
-      return;
+  std::vector<CoarserVolume> voxels, shapes;
+  // False: it waits for one.
+  const auto add_ready = [&](const std::vector<Use::Entry>& entries, bool may_be, std::vector<CoarserVolume>& added) {
+    for (const Use::Entry& awaited : entries) {
+      const DatasetTable::Entry& entry = *datasets.Find(awaited.name);
+      if (entry.state != DatasetState::kReady || !may_be) {
+        news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
+        return false;
+      }
+      ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
+      added.push_back({entry.id, entry.levels != nullptr ? entry.levels->overview : entry.summary});
     }
-    ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
-    voxels.push_back({entry.id, entry.summary});
-  }
+    return true;
+  };
+  if (!add_ready(use.entries, use.stage == Use::Stage::kVoxels, voxels) || !add_ready(use.shapes, true, shapes)) return;
   ready.dataset = voxels.front().dataset;
   ready.summary = voxels.front().summary;
   auto next = voxels.begin() + std::ptrdiff_t(use.volume_entries);
   ready.coarser.assign(voxels.begin() + 1, next);
   ready.fields = use.fields;
+  ready.fields.shapes = std::move(shapes);
   for (FieldVolume& field : ready.fields.others) {
     const std::ptrdiff_t count = std::ptrdiff_t(std::ranges::max(field.of_volume)) + 1;
     field.levels.assign(next, next + count);
@@ -529,10 +542,12 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
     bool tell = false;
     for (auto& [id, use] : uses) {
       bool over = false;
-      for (Use::Entry& awaited : use.entries) {
-        if (awaited.check == 0 || awaited.name != event.name || !entry->checks.IsOver(awaited.check)) continue;
-        awaited.check = 0;
-        over = true;
+      for (std::vector<Use::Entry>* const entries : {&use.entries, &use.shapes}) {
+        for (Use::Entry& awaited : *entries) {
+          if (awaited.check == 0 || awaited.name != event.name || !entry->checks.IsOver(awaited.check)) continue;
+          awaited.check = 0;
+          over = true;
+        }
       }
       tell |= over && !use.begun();
     }

@@ -27,11 +27,17 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
         open, Status::ResourceExhausted(fmt::format("{} questions are open, which is the limit of {}",
                                                     own ? std::size_t(of_client) : questions.size(), own ? "a client" : "the service")));
   }
-  if (IsPart(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
+  std::vector<std::string> named = {name};
+  if (const FrameRequest* const frame = FrameOf(question)) {
+    for (const ShapeChoice& shape : frame->shapes) named.push_back(shape.shape);
+  }
+  for (const std::string& each : named) {
+    if (!IsPart(each) && !(datasets.folders.empty() && datasets.Find(each) == nullptr)) continue;
     ++refused.unknown_dataset;
-    return RefuseQuestion(open, datasets.NoSuchDataset(name));
+    return RefuseQuestion(open, datasets.NoSuchDataset(each));
   }
   open.check = Seek(name);
+  for (std::size_t i = 1; i < named.size(); ++i) open.shapes.push_back({named[i], Seek(named[i])});
   questions.emplace(++last_question, std::move(open));
 }
 
@@ -146,6 +152,8 @@ void DatasetMachine::State::AskExecutor() {
     };
     const auto note_others = [&] {
       for (std::size_t i = 0; i < open.others.size(); ++i) open.fields.others[i].levels = {known(open.others[i])};
+      open.fields.shapes.clear();
+      for (const Use::Entry& shape : open.shapes) open.fields.shapes.push_back(known(shape));
     };
     note_others();
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;

@@ -39,6 +39,7 @@ struct DatasetMachine::State {
     enum class Stage { kDataset, kSources, kVoxels };
     Stage stage = Stage::kDataset;
     std::vector<Entry> entries;
+    std::vector<Entry> shapes = {};            // of the request's shapes, which it waits for, too
     ShownFields fields = {};                   // from kSources on; `others` without levels
     std::size_t volume_entries = 1;            // kVoxels: how many of the entries are the volume's
     std::shared_ptr<const LevelMap> map = {};  // kVoxels: of a volume with levels
@@ -47,7 +48,12 @@ struct DatasetMachine::State {
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
     bool begun() const { return !kept.empty(); }
-    bool WaitsFor(const std::string& name) const { return std::ranges::find(entries, name, &Entry::name) != entries.end(); }
+    bool WaitsForAny(auto&& is) const {
+      return std::ranges::any_of(entries, is, &Entry::name) || std::ranges::any_of(shapes, is, &Entry::name);
+    }
+    bool WaitsFor(const std::string& name) const {
+      return WaitsForAny([&](const std::string& each) { return each == name; });
+    }
   };
   // An order that waits for a file check. kList: for the one of the folders and those of the datasets.
   struct OpenOrder {
@@ -67,12 +73,14 @@ struct DatasetMachine::State {
     std::shared_ptr<const VolumeSummary> summary = nullptr;  // once it waits for voxels of a level, but is about all of them
     Use::Entry labels = {};                                  // without a name: it needs none
     std::vector<Use::Entry> others = {};                     // of fields.others
+    std::vector<Use::Entry> shapes = {};                     // of the shapes in the picture that it is about
 
     // All of them.
     std::vector<Use::Entry> entries() const {
       std::vector<Use::Entry> all = {{entry, check}};
       if (!labels.name.empty()) all.push_back(labels);
       all.insert(all.end(), others.begin(), others.end());
+      all.insert(all.end(), shapes.begin(), shapes.end());
       return all;
     }
     bool WaitsFor(const std::string& name) const { return std::ranges::count(entries(), name, &Use::Entry::name) > 0; }
@@ -168,7 +176,7 @@ struct DatasetMachine::State {
     const auto any = [&](const std::vector<Use::Entry>& entries) {
       return std::ranges::any_of(entries, [&](const Use::Entry& entry) { return is(entry.name); });
     };
-    return std::ranges::any_of(uses, [&](const auto& use) { return !use.second.begun() && any(use.second.entries); }) ||
+    return std::ranges::any_of(uses, [&](const auto& use) { return !use.second.begun() && use.second.WaitsForAny(is); }) ||
            std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && any(open.second.entries()); });
   }
   bool InUse(DatasetId dataset) const { return IsKept(dataset) || IsAwaited(dataset); }

@@ -298,6 +298,10 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
       for (const auto& [part, of_part] : parts_) status.memory_bytes += DatasetOfPart(part) == name ? of_part.bytes : 0;
     }
     if (entry.state == DatasetState::kReady && entry.fields != nullptr) status.fields = *entry.fields;
+    status.is_shape = entry.source.is_shape;
+    if (entry.state == DatasetState::kReady && entry.summary != nullptr && entry.summary->shape != nullptr) {
+      status.shape = *entry.summary->shape;
+    }
     report.push_back(std::move(status));
   }
   std::ranges::sort(report, {}, [](const DatasetStatus& status) { return InNaturalOrder(status.name); });

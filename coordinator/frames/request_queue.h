@@ -72,6 +72,7 @@ struct OpenRequest {
         for (const CoarserVolume& level : field.levels) all.push_back(level.dataset);
         if (field.light) all.push_back(field.light->dataset);
       }
+      for (const CoarserVolume& shape : fields.shapes) all.push_back(shape.dataset);
       return all;
     }
     bool DrawsFrom(const DatasetReady& ready) const {

@@ -152,6 +152,7 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   found = OverTimes(std::move(found), loaded.other_times);
   if (action.source.statistics != nullptr) found = WithStatistics(std::move(found), *action.source.statistics);
   found.labels = loaded.labels;
+  found.shape = loaded.shape;
   auto summary = std::make_shared<const VolumeSummary>(std::move(found));
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
   if (!held && MostBricksAreEqual(*summary)) {

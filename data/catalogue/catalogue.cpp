@@ -21,11 +21,13 @@
 #include "data/brick_store/brick_store.h"
 #include "data/catalogue/client_file.h"
 #include "data/catalogue/other_times.h"
+#include "data/catalogue/shape_data.h"
 #include "data/layers/label_table.h"
 #include "data/open/open_source.h"
 #include "data/open/read_volume.h"
 #include "data/open/source_name.h"
 #include "data/open/unchanged_source.h"
+#include "data/shapes/shape_file.h"
 #include "data/sources/hollow_source.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
@@ -71,8 +73,12 @@ Status Repeated(const std::string& name) { return Status::InvalidArgument("there
 
 // Adds what is in the folder, by its names (NamesOfSources). What is named already has precedence.
 void AddContents(FoundData& found, const std::string& folder, const std::vector<fs::path>& files) {
-  std::vector<std::string> volumes = {folder};
-  if (!IsOneVolume(folder, files)) volumes.assign(files.begin(), files.end());
+  std::vector<std::string> volumes(files.begin(), files.end());
+  const auto shapes = std::ranges::stable_partition(volumes, [](const std::string& path) { return !HoldsShape(path); });
+  if (IsOneVolume(folder, {volumes.begin(), shapes.begin()})) {
+    volumes.erase(volumes.begin(), shapes.begin());
+    volumes.insert(volumes.begin(), folder);
+  }
   const std::vector<std::string> names = NamesOfSources(volumes);
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const std::string usual = NameOfSource(volumes[i]);
@@ -92,7 +98,7 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path& path = entry->path();
     if (IsHidden(path) || IsPicture(path.string())) continue;  // pictures lie about for other reasons
-    if (LooksLikeVolume(path.string())) files.push_back(path);
+    if (LooksLikeVolume(path.string()) || HoldsShape(path.string())) files.push_back(path);
   }
   if (error) {
     const bool missing = error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
@@ -164,6 +170,7 @@ void LeaveOutMost(FoundData& found) {
 }
 
 Status CheckHeaders(const DataSource& data) {
+  if (data.is_shape) return Status::Ok();
   Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   source->options.describe = true;
@@ -385,7 +392,7 @@ Status CheckFields(const DataSource& source) {
 }
 
 DataSource::DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers)
-    : path(std::move(from_path)), folder(std::move(of_folder)) {
+    : path(std::move(from_path)), folder(std::move(of_folder)), is_shape(HoldsShape(path)) {
   if (!layers.overlay.empty()) overlay = std::make_shared<const DataSource>(layers.overlay, folder);
   if (layers.labels.empty()) return;
   DataSource of_labels = LabelsAt(DataSource(layers.labels, folder));
@@ -511,7 +518,14 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
   if (source.load) {
     Result<LoadedData> loaded = source.load(tell);
     if (!loaded.ok()) return loaded.status();
-    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->labels), nullptr, std::move(loaded->exact)});
+    return ReadableSource(LoadedSource{.volume = std::move(loaded->volume),
+                                       .labels = std::move(loaded->labels),
+                                       .exact = std::move(loaded->exact),
+                                       .shape = std::move(loaded->shape)});
+  }
+  if (source.is_shape) {
+    Result<LoadedSource> shape = LoadShape(source.path, tell);
+    return shape.ok() ? Result<ReadableSource>(*std::move(shape)) : shape.status();
   }
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

@@ -89,6 +89,7 @@ struct LoadedSource {
   std::vector<VolumeSummary> other_times = {};     // SurveyOtherTimes
   std::shared_ptr<VolumeSource> source = {};       // null: it can only be read in one order or as a whole, or a function has loaded it
   std::shared_ptr<const GridCells> cells = {};     // LevelInMemory::cells
+  std::shared_ptr<const ShapeInfo> shape = {};     // it is a shape, and the volume is its bytes; null: it is a volume
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

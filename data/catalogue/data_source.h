@@ -43,13 +43,14 @@ struct LoadedData {
   std::shared_ptr<const Volume> volume;
   std::shared_ptr<const LabelTable> labels = nullptr;   // of labels
   std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that the volume rounds
+  std::shared_ptr<const ShapeInfo> shape = nullptr;     // it is a shape, and the volume is its bytes (DataOfShape)
 };
 using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 
 // Paths, or a function whose volume never changes.
 struct DataSource {
   DataSource() = default;
-  DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers = {});
+  DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers = {});  // looks at the file (HoldsShape)
   template <std::convertible_to<DataLoader> Loader>
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
@@ -65,6 +66,7 @@ struct DataSource {
   // Fields with a grid of their own; null: there is none. Only a named dataset has them. A source that names labels of 32 or 64 bits, and
   // no values, is a dataset of labels alone: its volume is hollow (hollow_source.h), and its labels are those of the same files.
   std::shared_ptr<const DataSource> overlay = {}, labels = {};
+  bool is_shape = false;          // by the look of its file: a mesh, lines or points (HoldsShape)
   bool is_field = false;          // of a dataset: labels are labels, and make no hollow volume
   std::string label_colors = {};  // of labels: the table of their colours (label_table.h)
   // Range and histogram of its field over the times of its dataset. Set: this is another time than the one that the dataset shows itself,

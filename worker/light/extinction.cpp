@@ -100,8 +100,6 @@ namespace {
 
 HWY_EXPORT(ExtinctionOfRow);
 
-constexpr double kMostOpacity = 0.999;  // of a voxel length, or of a surface: more is not seen in a shadow
-
 double ExtinctionOfOpacity(double opacity, double opacity_distance) {
   const double of_length = -std::log1p(-std::min(opacity, 1 - 1e-12)) / opacity_distance;
   return std::min(of_length, -std::log1p(-kMostOpacity));

@@ -24,6 +24,8 @@
 
 namespace slabstream {
 
+inline constexpr double kMostOpacity = 0.999;  // of a voxel length, or of a surface: more is not seen in a shadow
+
 struct Extinction {
   Index3 size;
   Vec3 spacing;                 // distances of centres, in the unit of the world

@@ -11,6 +11,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
 #include "worker/light/occlusion.h"
+#include "worker/light/shape_extinction.h"
 #include "worker/light/transmittance.h"
 
 namespace slabstream {
@@ -25,6 +26,7 @@ struct MatterKey {
   ClipRegion clip;
   std::vector<FieldLook> looks;
   std::vector<DatasetId> lights = {};
+  std::vector<ShapeSetup> shapes = {};
   friend bool operator==(const MatterKey&, const MatterKey&) = default;
 };
 
@@ -34,6 +36,12 @@ MatterKey KeyOf(const FrameSetup& setup) {
     for (ColorPoint& point : look.transfer.colors) point.color = {};  // colours take no light
   }
   for (const CoarserLevel* const light : LightVolumesOf(setup)) key.lights.push_back(light->dataset);
+  key.shapes = setup.shapes;
+  for (ShapeSetup& shape : key.shapes) {
+    shape.look.color = {};
+    shape.look.map.clear();
+    shape.look.low = shape.look.high = 0;
+  }
   return key;
 }
 
@@ -45,12 +53,17 @@ struct Lit {
   friend bool operator==(const Lit&, const Lit&) = default;
 };
 
-// Of the fields under their transfer functions. One thread at a time makes something of it.
+// Of the fields under their transfer functions, and of shapes. One thread at a time makes something of it.
 class Matter {
  public:
-  std::shared_ptr<const FrameLight> Of(const LightValues& values, const FrameSetup& setup) {
+  std::shared_ptr<const FrameLight> Of(const LightValues& values, const FrameSetup& setup,
+                                       std::span<const std::shared_ptr<const VoxelBlock>> shapes) {
     const std::lock_guard lock(mutex_);
-    if (!extinction_) extinction_ = ExtinctionOf(values, setup);
+    if (!extinction_) {
+      Extinction all = ExtinctionOf(values, setup);
+      AddShapes(shapes, setup, all);
+      extinction_ = std::move(all);
+    }
     const Shading& shading = setup.shading;
     const Lit lit = {shading.shadows > 0 ? Phong(shading, setup.camera.view_direction).lights() : std::vector<Vec3>{Vec3{}},
                      shading.shadows, shading.ambient_occlusion, shading.occlusion_radius,
@@ -147,7 +160,7 @@ class Matter {
 class LightCache {
  public:
   std::shared_ptr<Matter> Of(const FrameSetup& setup) {
-    constexpr std::size_t kMostLooks = 2;  // LightBytes counts as many
+    constexpr std::size_t kMostLooks = 2;  // SharedBytes counts as many
     MatterKey key = KeyOf(setup);
     const std::lock_guard lock(mutex_);
     if (const auto* found = looks_.Find(key)) return *found;
@@ -203,9 +216,10 @@ FrameLight::Shares FrameLight::At(const Vec3& p) const {
   return result;
 }
 
-std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup) {
+std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup,
+                                                 std::span<const std::shared_ptr<const VoxelBlock>> shapes) {
   static LightCache cache;
-  return cache.Of(setup)->Of(values, setup);
+  return cache.Of(setup)->Of(values, setup, shapes);
 }
 
 }  // namespace slabstream

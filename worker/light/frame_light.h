@@ -1,10 +1,12 @@
 // FrameLight: what shadows and ambient occlusion leave of the light at each point of a frame's volume. All renderers read it
-// (light_at-inl.h). It depends on the fields, their looks, clipping and lights alone, so it is the same for every box and worker.
+// (light_at-inl.h). It depends on the fields, the shapes, their looks, clipping and lights alone, so it is the same for every box and
+// worker.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "common/memory/pooled_vector.h"
 #include "common/volume/grid_map.h"
@@ -46,9 +48,10 @@ struct FrameLight {
   Shares At(const Vec3& p) const;
 };
 
-// `values` is called for what is not known. What setups have in common is computed once and
-// kept for some time, in the whole process: workers of a process share it. Any thread, within its task arena; setup.light is there. Never
-// null.
-std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup);
+// `values` is called for what is not known. `shapes`: as for AddShapes (shape_extinction.h). What setups have in common is computed once
+// and kept for some time, in the whole process: workers of a process share it. Any thread, within its task arena; setup.light is there.
+// Never null.
+std::shared_ptr<const FrameLight> MakeFrameLight(const LightValues& values, const FrameSetup& setup,
+                                                 std::span<const std::shared_ptr<const VoxelBlock>> shapes = {});
 
 }  // namespace slabstream

@@ -25,7 +25,14 @@ FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId s
       pixels_(Share(WholeFrame(assignment.setup), share_, share_count_)),
       names_(names),
       preview_interval_(preview_interval),
-      attempt_(assignment.key.attempt) {}
+      attempt_(assignment.key.attempt) {
+  if (setup_->shapes.empty()) shapes_.emplace();
+}
+
+void FrameAccumulator::SetShapes(ShapeBoxes boxes, Time now, WorkerActions& actions) {
+  shapes_ = std::move(boxes);
+  Advance(now, actions);
+}
 
 void FrameAccumulator::Add(GroupImage group, Time now, WorkerActions& actions) {
   CHECK(!Has(group.key.group)) << "group " << group.key.group;
@@ -56,7 +63,7 @@ void FrameAccumulator::OnHiddenFound(const HiddenFound& found, Time now, WorkerA
 }
 
 void FrameAccumulator::Advance(Time now, WorkerActions& actions) {
-  while (failure_.ok() && combining_ == 0) {
+  while (shapes_ && failure_.ok() && combining_ == 0) {
     if (group_started_) {
       FinishGroup(now, actions);
       continue;
@@ -133,7 +140,8 @@ void FrameAccumulator::SendPicture(WorkerActions& actions) {
                      .share = std::uint32_t(share_),
                      .share_count = std::uint32_t(share_count_)};
   message.picture.runs.image.format = setup_->format;
-  actions.push_back(SendFrame{client_, std::move(message), image_, pixels_, straight8_, setup_, pictures_});
+  actions.push_back(
+      SendFrame{client_, std::move(message), image_, pixels_, straight8_, setup_, pictures_, shapes_->shapes, shapes_->lights});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

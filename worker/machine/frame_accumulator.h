@@ -28,6 +28,13 @@ class FrameAccumulator {
   std::size_t share_count() const { return share_count_; }
   const Status& failure() const { return failure_; }  // the picture is lost: drop the accumulator
 
+  // What its picture is made with: SendFrame::shapes and lights. Until they are there, groups wait.
+  struct ShapeBoxes {
+    std::vector<BoxKey> shapes, lights;
+  };
+  bool AwaitsShapes() const { return !shapes_; }
+  void SetShapes(ShapeBoxes boxes, Time now, WorkerActions& actions);
+
   // Later reports and pictures carry this attempt.
   void SetAttempt(std::uint32_t attempt) { attempt_ = attempt; }
 
@@ -60,6 +67,7 @@ class FrameAccumulator {
   ImageNames& names_;
   const Duration preview_interval_;
 
+  std::optional<ShapeBoxes> shapes_;  // none: they are not there yet
   std::uint32_t attempt_ = 0;
   std::uint32_t groups_done_ = 0;                    // accumulated, nearest first
   std::optional<std::uint32_t> frame_sent_attempt_;  // the latest attempt for which the finished frame was sent

@@ -32,6 +32,9 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
   for (const CoarserLevel* const light : LightVolumesOf(*setup)) {
     job.render.lights.push_back(acquire_other(*light, light->description.geometry.bounds()));
   }
+  for (const ShapeSetup& shape : setup->shapes) {
+    job.render.shapes.push_back(acquire_other(shape.bytes, shape.bytes.description.geometry.bounds()));
+  }
   for (const FieldSetup& field : setup->fields) {
     const Box box = PaddedBox(placement.at(), *setup, field);
     std::optional<BoxKey>& of_field = job.render.fields.emplace_back();

@@ -38,8 +38,16 @@ struct WorkerMachine::State {
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
     std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
     std::optional<FrameAccumulator> accumulator;  // display worker
+    // Of a picture with shapes: what its accumulator awaits. Acquired.
+    std::vector<BoxFetcher::Generation> shapes = {}, lights = {};
+
+    std::vector<BoxFetcher::Generation> boxes() const {
+      std::vector<BoxFetcher::Generation> all = shapes;
+      all.insert(all.end(), lights.begin(), lights.end());
+      return all;
+    }
     // Memory of images, if this worker's memory is limited: of its largest group, and of its picture.
-    std::uint64_t group_bytes = 0, picture_bytes = 0, light_bytes = 0;
+    std::uint64_t group_bytes = 0, picture_bytes = 0, shared_bytes = 0;
   };
 
   // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
@@ -92,6 +100,8 @@ struct WorkerMachine::State {
   void EndRun(GroupKey key);
   void EndRuns(const Frame& frame);
   void CheckAccumulator(FrameId id, Frame& frame);
+  void AcquireShapes(FrameId id, Frame& frame, const FrameSetup& setup);
+  void GiveShapes();  // to accumulators that await them
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
   void Tend();  // what is due, and what voxels and renderings need
   std::uint64_t RoomForVoxels() const;
@@ -242,7 +252,32 @@ void WorkerMachine::State::DropFrame(FrameId id) {
   if (found == frames.end()) return;
   EndRuns(found->second);
   if (found->second.accumulator) found->second.accumulator->Drop(actions);
+  for (const BoxFetcher::Generation box : found->second.boxes()) boxes.Release(box);
   frames.erase(found);
+}
+
+void WorkerMachine::State::AcquireShapes(FrameId id, Frame& frame, const FrameSetup& setup) {
+  if (!frame.shapes.empty()) return;
+  const auto acquire = [&](const CoarserLevel& volume) {
+    return boxes.Acquire({frame.client, id}, volume.dataset, volume.description.geometry.bounds(), volume.description.type, volume.stored,
+                         {}, actions);
+  };
+  for (const ShapeSetup& shape : setup.shapes) frame.shapes.push_back(acquire(shape.bytes));
+  if (frame.shapes.empty()) return;
+  for (const CoarserLevel* const light : LightVolumesOf(setup)) frame.lights.push_back(acquire(*light));
+}
+
+void WorkerMachine::State::GiveShapes() {
+  for (auto& [id, frame] : frames) {
+    if (!frame.accumulator || !frame.accumulator->AwaitsShapes()) continue;
+    if (!std::ranges::all_of(frame.boxes(), [this](BoxFetcher::Generation box) { return boxes.complete(box); })) continue;
+    const auto keys = [this](const std::vector<BoxFetcher::Generation>& of) {
+      std::vector<BoxKey> result;
+      for (const BoxFetcher::Generation box : of) result.push_back(boxes.key(box));
+      return result;
+    };
+    frame.accumulator->SetShapes({keys(frame.shapes), keys(frame.lights)}, now, actions);
+  }
 }
 
 void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
@@ -261,10 +296,11 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (config.memory_bytes != 0) {
     frame.group_bytes = std::max(frame.group_bytes, GroupImageBytes(assignment.setup, assignment.group.placements));
     frame.picture_bytes = PictureBytes(assignment.setup);
-    frame.light_bytes = LightBytes(assignment.setup);
+    frame.shared_bytes = SharedBytes(assignment.setup);
   }
 
   if (const std::optional<std::size_t> share = ShareOf(assignment.group, assignment.display, worker)) {
+    AcquireShapes(key.frame, frame, assignment.setup);
     if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, *share, names, config.preview_interval);
     if (frame.accumulator->groups_done() < assignment.first_group) {
       return Trouble(key, Status::DataLoss(fmt::format("the display worker holds {} groups of the frame, expected {}",
@@ -443,6 +479,10 @@ void WorkerMachine::State::On(const ChunkRefused& refused, const Bytes&) {
 void WorkerMachine::State::ReportFetchFailures() {
   for (const BoxFetcher::Failure& failure : boxes.TakeFailures()) {
     for (const GroupKey& key : renders.GroupsOn(failure.padded)) FailGroup(key, failure.status);
+    for (const auto& [id, frame] : frames) {
+      if (!frame.accumulator || std::ranges::count(frame.boxes(), failure.padded) == 0) continue;
+      FailGroup({id, frame.attempt, frame.accumulator->groups_done()}, failure.status);
+    }
   }
 }
 
@@ -476,7 +516,13 @@ void WorkerMachine::State::Tend() {
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
-    const auto [by_client, of_next] = renders.BoxesInTurn();
+    GiveShapes();
+    auto [by_client, of_next] = renders.BoxesInTurn();
+    const bool renders_none = by_client.empty();
+    for (const auto& [id, frame] : frames) {
+      if (frame.accumulator && frame.accumulator->AwaitsShapes()) by_client.push_back(frame.boxes());
+    }
+    if (renders_none && !by_client.empty()) of_next = by_client.front().size();
     boxes.RequestChunks(by_client, renders.AnyPaused() ? 0 : of_next, epoch, worker, now, actions);
     renders.StartNext(now, actions);
   }
@@ -489,7 +535,7 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
   std::uint64_t taken = IdleMemoryBytes(config.memory_bytes) + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
   std::uint64_t light = 0;  // frames share it
   for (const auto& [id, frame] : frames) {
-    light = std::max(light, frame.light_bytes);
+    light = std::max(light, frame.shared_bytes);
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
     taken += frame.group_bytes * std::uint64_t(runs);
     if (frame.accumulator) taken += frame.group_bytes * frame.accumulator->groups_waiting() + frame.picture_bytes;

@@ -215,6 +215,7 @@ struct StartRender {
   ImageHandle image = 0;
   std::vector<BoxKey> lights = {};                 // LightVolumesOf the setup, whole
   std::vector<std::optional<BoxKey>> fields = {};  // by FrameSetup::fields; none: it does not reach there
+  std::vector<BoxKey> shapes = {};                 // of FrameSetup::shapes, whole
 };
 // These name a started render by its image. RenderDone has not come for it. PauseRender: it stops soon, between two of
 // its pieces, and keeps what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.
@@ -303,6 +304,7 @@ struct SendFrame {
   bool straight8 = false;  // FrameRequest::straight8
   std::shared_ptr<const FrameSetup> setup;
   std::optional<PicturesAddress> pictures = {};  // where its client takes it; none: through the coordinator
+  std::vector<BoxKey> shapes = {}, lights = {};  // if the setup has shapes: as those of StartRender
 };
 // Runs after everything that was started before it. Every handle that is named in a StartRender, or as a new image in a StartCombine, is
 // released exactly once, even if making the image failed.

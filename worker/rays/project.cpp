@@ -87,9 +87,10 @@ struct RaysThere {
   RayPacket among;
   SampleInterval owned;
 };
-HWY_INLINE RaysThere RaysAmongVoxels(const ProjectWork& work, const RayPacket& packet) {
+HWY_INLINE RaysThere RaysAmongVoxels(const ProjectWork& work, const RayPacket& packet, Floats ray_ends) {
   const RayBox& box = *work.box;
-  const SampleInterval owned = OwnedSamples(packet, box);
+  SampleInterval owned = OwnedSamples(packet, box);
+  owned.end = hn::Min(owned.end, hn::Ceil(ray_ends));
   if (work.field == nullptr) return {AmongVoxels(packet, box), owned};
   const RayPacket among = AmongVoxels(packet, *work.field);
   if (work.field->everywhere) return {among, owned};
@@ -187,9 +188,9 @@ HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, 
 // Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
 // its rays, the more is leapt over. It becomes their mean place, for the next packet.
 template <class T, bool kNearest, bool kStretched>
-HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
+HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Floats ray_ends, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
-  const auto [among, owned] = RaysAmongVoxels(work, packet);
+  const auto [among, owned] = RaysAmongVoxels(work, packet, ray_ends);
   const auto one = Set(1);
   Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   if (work.rays->clip.empty()) {
@@ -211,11 +212,11 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
 }
 
 template <class T, bool kNearest, bool kStretched>
-HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, float* HWY_RESTRICT pixels) {
+HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, Floats ray_ends, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
-  const auto [among, whole] = RaysAmongVoxels(work, packet);
+  const auto [among, whole] = RaysAmongVoxels(work, packet, ray_ends);
   Ints high = hn::Zero(di), middle = high, low = high, count = high;
   const auto byte = SetInt(0xFF), one = SetInt(1);
   const auto sum = [&](const SampleInterval& owned) HWY_ATTR {
@@ -250,10 +251,17 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
 template <class T, bool kNearest, bool kStretched>
 HWY_INLINE void ProjectPackets(const ProjectWork& work, const PixelBounds& tile, float* HWY_RESTRICT pixels, std::size_t floats_a_row) {
   Hint hint = {hn::Zero(FloatTag()), Set(1e9F)};  // none: the first packet searches from both ends
-  ForEachPacket(*work.rays, tile, pixels, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT result) HWY_ATTR {
-    return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest, kStretched>(work, packet, hint, result)
-                                  : SumOfPacket<T, kNearest, kStretched>(work, packet, result);
-  });
+  const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
+  PacketShapes shapes;
+  ForEachPacket(*work.rays, tile, pixels, floats_a_row,
+                [&](const RayPacket& packet, float* HWY_RESTRICT result, std::int32_t x, std::int32_t y) HWY_ATTR {
+                  auto ends = Set(kRayEnd);
+                  if (has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes)) {
+                    ends = hn::Load(FloatTag(), shapes.ends.data());
+                  }
+                  return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest, kStretched>(work, packet, ends, hint, result)
+                                                : SumOfPacket<T, kNearest, kStretched>(work, packet, ends, result);
+                });
 }
 
 template <class T>

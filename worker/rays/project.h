@@ -16,6 +16,8 @@
 
 #include "worker/rays/field_map.h"
 #include "worker/rays/ray_box.h"
+#include "worker/shapes/fragment_order.h"
+#include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
@@ -48,8 +50,10 @@ struct ProjectWork {
   const SampleBounds* bounds = nullptr;  // for the same sign; null for a sum
   float sign = 1;                        // 1: the largest sample; -1: the least
   ValueScale values;
-  bool complement = false;  // store 1 - value, which is largest for the least value
-  bool nearest = false;     // samples are those of the nearest voxel, not interpolated
+  bool complement = false;               // store 1 - value, which is largest for the least value
+  bool nearest = false;                  // samples are those of the nearest voxel, not interpolated
+  const ShapeTile* shapes = nullptr;     // that holds the tile's pixels: rays end where it is opaque; null: nowhere
+  const FragmentOrder* order = nullptr;  // of the frame, if there are shapes
 };
 
 // Four floats a pixel of `tile`; `pixels` points to the first pixel's. Pixels without a sample may stay unwritten: they must be 0 before.

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "worker/rays/field_map.h"
+#include "worker/rays/packet_shapes.h"
 #include "worker/rays/ray_box.h"
 
 #if defined(SLABSTREAM_WORKER_RAYS_RAY_PACKET_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -70,17 +71,23 @@ struct RayPacket {
   Mask valid;  // pixels of the tile
 };
 
+struct PacketPixels {
+  Ints x, y;
+};
+HWY_INLINE PacketPixels PixelsOf(std::int32_t x, std::int32_t y) {
+  const auto lane = hn::Iota(IntTag(), 0);
+  const auto lane_x = hn::And(lane, SetInt(kPacketWidth - 1)), lane_y = hn::ShiftRight < kPacketWidth == 4 ? 2
+                                                                        : kPacketWidth == 2                ? 1
+                                                                                                           : 0 > (lane);
+  return {hn::Add(SetInt(x), lane_x), hn::Add(SetInt(y), lane_y)};
+}
+
 // The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid.
 // Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
 // ray, so that nothing cancels if the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
 HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t y, std::int32_t x_end, std::int32_t y_end) {
   const FloatTag df;
-  const IntTag di;
-  const auto lane = hn::Iota(di, 0);
-  const auto lane_x = hn::And(lane, SetInt(kPacketWidth - 1)), lane_y = hn::ShiftRight < kPacketWidth == 4 ? 2
-                                                                        : kPacketWidth == 2                ? 1
-                                                                                                           : 0 > (lane);
-  const auto pixel_x = hn::Add(SetInt(x), lane_x), pixel_y = hn::Add(SetInt(y), lane_y);
+  const auto [pixel_x, pixel_y] = PixelsOf(x, y);
   const auto px = hn::ConvertTo(df, pixel_x), py = hn::ConvertTo(df, pixel_y);
   const auto from_x = hn::Sub(px, Set(view.centre_x)), from_y = hn::Sub(py, Set(view.centre_y));
   RayPacket packet;
@@ -108,15 +115,22 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
   return packet;
 }
 
-// Calls render(packet, rgba) for the packets of a tile of pixels; rgba is room for four floats a lane. If it returns true, they are copied
-// to the tile's pixels, the first of which is at `to`.
+// Calls render(packet, rgba), or render(packet, rgba, x, y of its first pixel), for the packets of a tile of pixels; rgba is room for four
+// floats a lane. If it returns true, they are copied to the tile's pixels, the first of which is at `to`.
 template <class Render>
 HWY_INLINE void ForEachPacket(const ViewRays& view, const PixelBounds& tile, float* HWY_RESTRICT to, std::size_t floats_a_row,
                               Render&& render) {
   for (std::int32_t y = tile.y_begin; y < tile.y_end; y += kPacketHeight) {
     for (std::int32_t x = tile.x_begin; x < tile.x_end; x += kPacketWidth) {
       alignas(64) float rgba[4 * kLanes];
-      if (!render(PacketAt(view, x, y, tile.x_end, tile.y_end), rgba)) continue;
+      const RayPacket packet = PacketAt(view, x, y, tile.x_end, tile.y_end);
+      bool found = false;
+      if constexpr (requires { render(packet, rgba, x, y); }) {
+        found = render(packet, rgba, x, y);
+      } else {
+        found = render(packet, rgba);
+      }
+      if (!found) continue;
       const std::int32_t width = std::min(kPacketWidth, tile.x_end - x), height = std::min(kPacketHeight, tile.y_end - y);
       for (std::int32_t row = 0; row < height; ++row) {
         std::copy_n(rgba + 4 * row * kPacketWidth, 4 * width,
@@ -242,6 +256,27 @@ HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart
     parts[1] = parts[0];
     parts[1].end = parts[1].leave = minus_far;
   }
+}
+
+// Loads what shapes have on the rays of the packet whose first pixel is (x, y). False: nothing.
+HWY_INLINE bool LoadShapes(const ShapeTile& shapes, const FragmentOrder& order, const ViewRays& view, const RayBox& box,
+                           const PixelBounds& tile, std::int32_t x, std::int32_t y, PacketShapes& of_packet) {
+  static_assert(kLanes <= kMostShapeLanes);
+  alignas(64) float jitter[kLanes] = {};
+  if (view.jitter > 0) {
+    const auto [pixel_x, pixel_y] = PixelsOf(x, y);
+    hn::Store(JitterAt(view, pixel_x, pixel_y), FloatTag(), jitter);
+  }
+  return of_packet.Load(shapes, order, view, box, tile, x, y, kPacketWidth, kLanes, jitter);
+}
+// What lies between two places of the rays, in samples, of a part of them.
+HWY_INLINE PacketPart Between(const PacketPart& part, Floats from, Floats to) {
+  PacketPart between = part;
+  between.begin = hn::Max(part.begin, hn::Ceil(from));
+  between.end = hn::Min(part.end, hn::Ceil(to));
+  between.enter = hn::Max(part.enter, from);
+  between.leave = hn::Min(part.leave, to);
+  return between;
 }
 
 // The samples that the box owns and that may matter. Boxes of different levels agree on whose a sample is: positions are the frame's.

@@ -21,6 +21,7 @@
 #include "worker/light/frame_light.h"
 #include "worker/renderers/brick_ranges.h"
 #include "worker/renderers/padded_voxels.h"
+#include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
@@ -91,6 +92,10 @@ class BoxData {
   void SetLight(std::shared_ptr<const FrameLight> light) { light_ = std::move(light); }
   const FrameLight* light() const { return light_.get(); }
 
+  // The shapes of the frame that is rendered; null: it has none.
+  void SetShapes(std::shared_ptr<const FrameShapes> shapes) { shapes_ = std::move(shapes); }
+  const FrameShapes* shapes() const { return shapes_.get(); }
+
   // The other fields that the frame shows, in the order of FrameSetup::fields: their voxels around the box (PaddedBox). Null: the field
   // does not reach there. They must stay until the render ends.
   void SetFields(std::vector<BoxData*> fields) { fields_ = std::move(fields); }
@@ -123,6 +128,7 @@ class BoxData {
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<BoxCache>> caches_;
   std::shared_ptr<const FrameLight> light_;
+  std::shared_ptr<const FrameShapes> shapes_;
   std::vector<BoxData*> fields_;
 };
 

@@ -10,6 +10,8 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/threads/guarded.h"
 #include "common/wire/payload.h"
+#include "worker/shapes/compose_shapes.h"
+#include "worker/shapes/shared_shapes.h"
 
 namespace slabstream {
 namespace {
@@ -117,18 +119,41 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
   return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
 }
 
-std::shared_ptr<const FrameLight> LightFrom(const std::vector<std::shared_ptr<StoredBox>>& lights, const StartRender& action) {
+using ShapeBytes = std::vector<std::shared_ptr<const VoxelBlock>>;  // of each shape
+ShapeBytes BytesOf(const std::vector<std::shared_ptr<StoredBox>>& shapes) {
+  ShapeBytes bytes;
+  for (const auto& shape : shapes) bytes.push_back(shape->Block());
+  return bytes;
+}
+
+std::shared_ptr<const FrameLight> LightFrom(const std::vector<std::shared_ptr<StoredBox>>& lights, const ShapeBytes& shapes,
+                                            ClientId client, const FrameSetup& setup) {
   if (lights.empty()) return nullptr;
   return MakeFrameLight(
       [&](std::size_t field) {
         lights[field]->Assemble();
-        const StoredBox::Lease lease = lights[field]->Lend(action.client);
+        const StoredBox::Lease lease = lights[field]->Lend(client);
         const VoxelBricks bricks = lease.data().bricks();
         VoxelBlock values = MakeVoxelBlock(bricks.box(), bricks.type());
         bricks.Read(values.box, 0, values.bytes);
         return values;
       },
-      *action.setup);
+      setup, shapes);
+}
+
+// Null: the frame has none.
+Result<std::shared_ptr<const FrameShapes>> ShapesFrom(const ShapeBytes& shapes, const std::shared_ptr<const FrameLight>& light,
+                                                      const FrameSetup& setup) {
+  if (shapes.empty()) return std::shared_ptr<const FrameShapes>();
+  return SharedFrameShapes(setup, shapes, light);
+}
+
+// The picture of an accumulated frame, or of a share of it.
+LocalImage FinishWithShapes(const LocalImage& frame, const SendFrame& send, const FrameShapes& shapes) {
+  const FrameSetup& setup = *send.setup;
+  const bool before = frame.format == PixelFormat::kRgba || frame.format == PixelFormat::kDepth;  // it has colours
+  if (before) return setup.renderer->Finish(ComposeShapes(frame, send.pixels, setup, shapes), setup);
+  return PictureOverShapes(setup.renderer->Finish(frame, setup), setup, shapes);
 }
 
 }  // namespace
@@ -190,8 +215,7 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  RenderedBoxes boxes = {BoxOf(action.padded), {}, {}};
-  for (const BoxKey& light : action.lights) boxes.lights.push_back(BoxOf(light));
+  RenderedBoxes boxes = {BoxOf(action.padded), ShapeBoxesOf(action.shapes, action.lights), {}};
   for (const std::optional<BoxKey>& field : action.fields) boxes.fields.push_back(field ? BoxOf(*field) : nullptr);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
@@ -214,7 +238,12 @@ RenderDone Executor::Render(const StartRender& action, const RenderedBoxes& boxe
     for (const auto& field : boxes.fields) copied = (field != nullptr && field->Assemble()) || copied;
     if (copied) AddStage(report, Stage::kFetch, begin, NowNs());
     const StoredBox::Lease lease = boxes.padded->Lend(action.client);
-    lease.data().SetLight(LightFrom(boxes.lights, action));
+    const ShapeBytes shape_bytes = BytesOf(boxes.shapes.shapes);
+    const std::shared_ptr<const FrameLight> light = LightFrom(boxes.shapes.lights, shape_bytes, action.client, *action.setup);
+    lease.data().SetLight(light);
+    const auto shapes = ShapesFrom(shape_bytes, light, *action.setup);
+    if (!shapes.ok()) return shapes.status();
+    lease.data().SetShapes(*shapes);
     // Fields that share a box have a lease each: renderers derive other data for each.
     std::vector<std::unique_ptr<const StoredBox::Lease>> field_leases;
     std::vector<BoxData*> fields;
@@ -254,6 +283,13 @@ void Executor::Perform(const ResumeRender& action) {
 
 void Executor::Perform(const CancelRender& action) {
   if (const auto control = ControlOf(action.image)) control->Cancel();
+}
+
+Executor::ShapeBoxes Executor::ShapeBoxesOf(const std::vector<BoxKey>& shapes, const std::vector<BoxKey>& lights) const {
+  ShapeBoxes boxes;
+  for (const BoxKey& shape : shapes) boxes.shapes.push_back(BoxOf(shape));
+  for (const BoxKey& light : lights) boxes.lights.push_back(BoxOf(light));
+  return boxes;
 }
 
 std::shared_ptr<StoredBox> Executor::BoxOf(const BoxKey& key) const {
@@ -384,19 +420,20 @@ void Executor::Perform(SendFrame&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const bool finished = action.message.groups_done == action.message.group_count;
   ClientLane& lane = (finished ? finish_ : combine_).Of(action.client);
-  lane.thread.Post([this, &lane, image = std::move(image), send = std::move(action)]() mutable {
-    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, lane.arena); });
+  ShapeBoxes shapes = ShapeBoxesOf(action.shapes, action.lights);
+  lane.thread.Post([this, &lane, image = std::move(image), shapes = std::move(shapes), send = std::move(action)]() mutable {
+    TrySend("picture", KeyOf(send.message), [&] { return MakePicture(*image, send, shapes, lane.arena); });
   });
 }
 
-void Executor::MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena) {
+Status Executor::MakePicture(LocalImage& frame, SendFrame& send, const ShapeBoxes& shape_boxes, TaskArena& arena) {
   const GroupKey key = KeyOf(send.message);
   RankReport& report = send.message.reports.emplace_back();
   report.worker = send.message.worker;
   report.group = key.group;
   const std::int64_t begin = NowNs();
   std::int64_t resolved_ns = begin;
-  RunImage runs = WithAllThreads(arena, [&] {
+  Result<RunImage> made = WithAllThreads(arena, [&]() -> Result<RunImage> {
     const RendererKind& renderer = *send.setup->renderer;
     LocalImage share;
     const bool whole = send.pixels == WholeFrame(*send.setup);
@@ -407,16 +444,22 @@ void Executor::MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena)
     const ColorCoding color = straight8 ? ColorCoding::kStraight8 : ColorCoding::kFloat32;
     if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color);
     FillRows(image);
-    const LocalImage picture = renderer.Finish(image, *send.setup);
+    const ShapeBytes bytes = BytesOf(shape_boxes.shapes);
+    const auto shapes = ShapesFrom(bytes, LightFrom(shape_boxes.lights, bytes, send.client, *send.setup), *send.setup);
+    if (!shapes.ok()) return shapes.status();
+    const LocalImage picture = *shapes == nullptr ? renderer.Finish(image, *send.setup) : FinishWithShapes(image, send, **shapes);
     resolved_ns = NowNs();
     return EncodePicture(picture, color);
   });
+  if (!made.ok()) return made.status();
+  RunImage& runs = *made;
   AddStage(report, Stage::kResolve, begin, resolved_ns);
   EncodedRuns& encoded = send.message.picture.runs;
   encoded.image = runs.header;
   const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, encoded);
   AddStage(report, Stage::kEncode, resolved_ns, NowNs());
   outbox_.Post(OutgoingFrame{key, std::move(send.message), payload, std::move(send.pictures)});
+  return Status::Ok();
 }
 
 void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }

@@ -96,7 +96,12 @@ class Executor {
   void Break();
   // The entry of the table, which exists.
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
-  void MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena);
+  // What shapes are drawn with.
+  struct ShapeBoxes {
+    std::vector<std::shared_ptr<StoredBox>> shapes, lights;  // as of StartRender and SendFrame
+  };
+  ShapeBoxes ShapeBoxesOf(const std::vector<BoxKey>& shapes, const std::vector<BoxKey>& lights) const;
+  Status MakePicture(LocalImage& frame, SendFrame& send, const ShapeBoxes& shape_boxes, TaskArena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
@@ -104,7 +109,7 @@ class Executor {
   // The boxes that a render reads.
   struct RenderedBoxes {
     std::shared_ptr<StoredBox> padded;
-    std::vector<std::shared_ptr<StoredBox>> lights;  // as StartRender::lights
+    ShapeBoxes shapes;
     std::vector<std::shared_ptr<StoredBox>> fields;  // as StartRender::fields
   };
   RenderDone Render(const StartRender& action, const RenderedBoxes& boxes, const RenderControl& control, ClientLane& lane,

@@ -59,6 +59,9 @@ class StoredBox {
   // Call after Assemble.
   Lease Lend(ClientId client) { return {*this, DataFor(client)}; }
 
+  // All voxels as one block. Call after Assemble.
+  std::shared_ptr<const VoxelBlock> Block() { return Assembled()->Block().block; }
+
   // Memory, with what renders derived. Derived data counts as it was at the end of its last render.
   std::size_t bytes() const;
 

@@ -74,7 +74,7 @@ class RaycastKind : public RendererKind {
                       .opacity_by_value = true,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
                                     Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions,
-                                    Ability::kFields, Ability::kSmoothLabels, Ability::kRectilinear},
+                                    Ability::kFields, Ability::kSmoothLabels, Ability::kRectilinear, Ability::kShapes},
                       .parameters = {SamplingRate(kSamplesAVoxel),
                                      {.name = "jitter",
                                       .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "

@@ -26,7 +26,7 @@ class SplatKind : public RendererKind {
              .derived_from_stored = 2,  // bricks of the voxels, and their cells
              .opacity_by_value = true,
              .along_slices = true,
-             .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer, Ability::kShadows},
+             .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer, Ability::kShadows, Ability::kShapes},
              .footprint = 4,
              .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite},
              .parameters = {{.name = "footprint",

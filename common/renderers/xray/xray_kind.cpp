@@ -35,7 +35,7 @@ class XrayKind : public ProjectionKind {
                         .format = PixelFormat::kSum,
                         .reach = kRayReach,
                         .derived_from_stored = kRayDerived,
-                        .abilities = {Ability::kPerspective, Ability::kLevels},
+                        .abilities = {Ability::kPerspective, Ability::kLevels, Ability::kShapes},
                         .parameters = {SamplingRate(),
                                        {.name = "energy",
                                         .purpose = "Energy of the X-rays in keV, which decides how much water attenuates",

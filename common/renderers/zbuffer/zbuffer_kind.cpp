@@ -42,7 +42,7 @@ class ZBufferKind : public RendererKind {
                       .purpose = "the surfaces of opaque voxels; for solid objects",
                       .format = PixelFormat::kDepth,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kLabels, Ability::kLights,
-                                    Ability::kDepthShading, Ability::kTransfer, Ability::kShadows},
+                                    Ability::kDepthShading, Ability::kTransfer, Ability::kShadows, Ability::kShapes},
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}
 
   // A voxel is opaque if it has half of the largest opacity in the volume's range of values, or at least an isovalue: then it has the
@@ -72,8 +72,10 @@ class ZBufferKind : public RendererKind {
     }
     return picture;
   }
-  bool FrameIsPicture(const FrameSetup& setup) const override {
-    return setup.shading.model != ShadingModel::kDepthGradient && setup.unit == 1 && RendererKind::FrameIsPicture(setup);
+
+ protected:
+  bool FinishCopies(const FrameSetup& setup) const override {
+    return setup.shading.model != ShadingModel::kDepthGradient && setup.unit == 1 && RendererKind::FinishCopies(setup);
   }
 };
 

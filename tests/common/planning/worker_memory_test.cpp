@@ -49,15 +49,15 @@ TEST(WorkerMemory, BricksOfOneValueTakeNothing) {
 
 TEST(WorkerMemory, LightOfOtherFieldsTakesSamplesAndTheirExtinction) {
   FrameSetup setup = PlanOf(64, 1, FullSummary({64, 64, 64})).setup;
-  EXPECT_EQ(LightBytes(setup), 0U);
+  EXPECT_EQ(SharedBytes(setup), 0U);
   const auto light_of = [](const Index3& size, ScalarType type) { return CoarserLevel{7, {.geometry = {size}, .type = type}}; };
   setup.light = light_of({64, 64, 64}, ScalarType::kUint8);
-  const std::uint64_t alone = LightBytes(setup);
+  const std::uint64_t alone = SharedBytes(setup);
   EXPECT_GT(alone, 64U * 64 * 64);
   setup.fields.resize(2);
   setup.fields[0].light = light_of({128, 10, 1}, ScalarType::kUint16);
   setup.fields[1].light = light_of({5, 5, 5}, ScalarType::kFloat32);
-  EXPECT_EQ(LightBytes(setup), alone + 128U * 10 * (2 + 4) + 5U * 5 * 5 * (4 + 4));
+  EXPECT_EQ(SharedBytes(setup), alone + 128U * 10 * (2 + 4) + 5U * 5 * 5 * (4 + 4));
 }
 
 TEST(WorkerMemory, TheSmallestWorkerWithAPartDecides) {

@@ -222,6 +222,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"corners", kMaxRegionCorners},
       {"counts", std::size_t{kJointValues} * kJointSlopes},
       {"sides", kMaxClipSides},
+      {"shapes", kMaxShownShapes},
+      {"map", kShapeMapColors},
       {"shown", kMaxLabelRanges},
       {"entries", 2 * kMaxLabels},
       {"parameters", kMaxParameters},
@@ -273,8 +275,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 26)
-      << "fields are in five messages, reports and levels in four, parameters and labels in three; datasets, keys, isosurfaces, "
+  EXPECT_EQ(seen.size(), limits.size() + 27)
+      << "fields are in five messages, reports and levels in four, parameters and labels in three; datasets, keys, isosurfaces, shapes, "
          "gradients, opacities, traffic, colors, entries, paths, channels, labels that show, and values that are steered in two";
 }
 

@@ -161,6 +161,16 @@ GroupAssignment OfFields() {
   message.setup.fields[0].light = message.setup.light;
   message.setup.fields[1].light = CoarserLevel{kMax64 - 3, other};
   message.setup.fields[1].light->description.geometry.size = {7, 1, 128};
+  VolumeDescription bytes;
+  bytes.geometry.size = {4096, 65535, 3};
+  message.setup.shapes = {{.bytes = {kMax64, bytes}, .low = {-1e9, 0, 1}, .high = {1, 2, 1e9}}, {.bytes = {7, bytes}}};
+  message.setup.shapes[0].look = {.coloring = ShapeColoring::kValues,
+                                  .map = std::vector<Rgb>(kShapeMapColors, {1, 0.5F, 0}),
+                                  .low = -1e300,
+                                  .high = 1e300,
+                                  .opacity = 1e-9,
+                                  .width = 1e300,
+                                  .width_in_pixels = true};
   return message;
 }
 
@@ -466,6 +476,9 @@ std::vector<SubmitFrame> SamplesOf() {
       {.field = "7", .shown = false, .choice = Curve()}};
   channels.blend = Blend::kMax;
   channels.time = "3.5s";
+  FrameRequest shapes = Request();
+  shapes.shapes = {{.shape = kLongName, .color = Rgb{1, 0.5F, 0}, .opacity = 1e-3, .width = 1e300, .width_in_pixels = true},
+                   {.shape = kUmlaut, .map = "plasma", .range = ScalarRange{-1e300, 1e300}}};
   FrameRequest unstated = Request();
   unstated.view = kUnstatedView;
   FrameRequest highlights = layers;
@@ -473,7 +486,8 @@ std::vector<SubmitFrame> SamplesOf() {
   return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}},
           {1, 2, sliced},    {1, 2, surfaces},
           {1, 2, layers},    {1, 2, highlights},
-          {1, 2, unstated},  {1, 2, channels}};
+          {1, 2, unstated},  {1, 2, channels},
+          {1, 2, shapes}};
 }
 
 template <>
@@ -555,6 +569,9 @@ std::vector<StatusReply> SamplesOf() {
                                           .times = {.count = 50, .step = 0.25, .unit = "min"},
                                           .field = 2,
                                           .time = 49};
+  full.datasets.push_back({"c", DatasetState::kReady, Description()});
+  full.datasets.back().is_shape = true;
+  full.datasets.back().shape = ShapeInfo{ShapeKind::kLines, kMax64, 7, {-1e300, 0, 1}, {1, 2, 1e300}, true, true, true, -1e30F, 1e30F};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
   full.web = SampleTraffic();
   full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};

@@ -73,7 +73,8 @@ class MipRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
     std::optional<StretchTables> stretch;
     if (setup.description.geometry.rectilinear()) stretch.emplace(setup.description.geometry.stretch);
-    const auto work_of = [&](const Projected& field, const RayBox& box, std::size_t piece) {
+    const FragmentOrder order(setup);
+    const auto work_of = [&](const Projected& field, const RayBox& box, std::size_t piece, const PixelBounds& tile) {
       return ProjectWork{.rays = &rays,
                          .box = &box,
                          .field = field.map ? &*field.map : nullptr,
@@ -81,14 +82,16 @@ class MipRenderer : public Renderer {
                          .sign = field.sign,
                          .values = field.values,
                          .complement = mode == ProjectionMode::kMinimum,
-                         .nearest = TakesNearestVoxel(setup)};
+                         .nearest = TakesNearestVoxel(setup),
+                         .shapes = TileOf(data.shapes(), tile),
+                         .order = &order};
     };
     LocalImage image = RenderPieces(
         *volume.pieces, {at, setup, rays, hidden, control, report, stretch ? &*stretch : nullptr},
         [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
             std::size_t floats_a_row) {
-          ProjectTile(work_of(volume, ray_box, piece), tile, pixels, floats_a_row);
+          ProjectTile(work_of(volume, ray_box, piece, tile), tile, pixels, floats_a_row);
           if (setup.fields.empty()) return;
           const auto width = std::size_t(tile.width()), height = std::size_t(tile.height());
           const auto for_each_pixel = [&](auto&& visit) {
@@ -106,7 +109,7 @@ class MipRenderer : public Renderer {
             box.high = ray_box.high;
             box.reach = ray_box.reach;
             own.assign(4 * width * height, 0);
-            ProjectTile(work_of(field, box, 0), tile, own.data(), 4 * width);
+            ProjectTile(work_of(field, box, 0, tile), tile, own.data(), 4 * width);
             for_each_pixel([&](float* pixel, std::size_t at_own) { TurnIntoChannel(&own[at_own], 1 + i, pixel); });
           }
         });

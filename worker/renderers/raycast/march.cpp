@@ -410,12 +410,21 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   return shaded;
 }
 
+// Adds the fragments of one layer. Their opacity is that of a surface, whatever the length of a step.
+HWY_INLINE void AddFragments(const PacketShapes::Layer& layer, Floats opaque, Sums& sums) {
+  const FloatTag df;
+  const auto alpha = hn::Load(df, layer.alpha.data());
+  const auto shown = hn::And(hn::Gt(alpha, hn::Zero(df)), hn::Lt(sums.alpha, opaque));
+  sums.AddChannels(shown, alpha, [&](std::size_t channel) HWY_ATTR { return hn::Load(df, layer.color[channel].data()); });
+}
+
 // Apart from plain frames, so that these have the registers for themselves.
 template <class T, Samples kSamples, class Voxels>
-HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket packet, const SampleInterval& owned, Sums& sums) {
+HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket packet, const SampleInterval& owned, const PacketShapes* shapes,
+                                      Sums& sums) {
   if constexpr (kSamples == Samples::kMixed) {  // chosen here: another branch in MarchPacket would make plain frames slower
     if (work.fields != nullptr && work.labels == nullptr && work.to_surfaces == nullptr && !work.look->by_gradient()) {
-      return MarchParts<std::uint8_t, Samples::kFields, FieldSamples>(work, packet, owned, sums);
+      return MarchParts<std::uint8_t, Samples::kFields, FieldSamples>(work, packet, owned, shapes, sums);
     }
   }
   constexpr bool kMayMix = kSamples == Samples::kMixed || kSamples == Samples::kFields;
@@ -434,14 +443,27 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
   std::uint64_t shaded = 0;
   for (PacketPart& part : parts) {
     for (std::size_t i = 0; i < 3; ++i) part.face[i] = hn::Div(part.face[i], Set(work.box->scale[i]));  // like a gradient there
-    shaded += MarchSamples<T, kSamples, Voxels>(work, packet, part.Of(owned), &part, sums);
+  }
+  const FloatTag df;
+  const std::size_t layers = shapes == nullptr ? 0 : shapes->count;
+  const auto ends = shapes == nullptr ? Set(kRayEnd) : hn::Load(df, shapes->ends.data());
+  auto from = Set(-kRayEnd);
+  for (std::size_t layer = 0; layer <= layers; ++layer) {
+    const auto to = layer == layers ? ends : hn::Min(hn::Load(df, shapes->layers[layer].k.data()), ends);
+    for (const PacketPart& part : parts) {
+      const PacketPart between = Between(part, from, to);
+      shaded += MarchSamples<T, kSamples, Voxels>(work, packet, between.Of(owned), &between, sums);
+    }
+    if (layer < layers) AddFragments(shapes->layers[layer], Set(1 - work.termination), sums);
+    from = to;
   }
   return shaded;
 }
 
 // The rays of one packet.
 template <class T, class Voxels>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, GradientBricks* bricks, float* HWY_RESTRICT rgba) {
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, const PacketShapes* shapes, GradientBricks* bricks,
+                                     float* HWY_RESTRICT rgba) {
   const auto zero = hn::Zero(FloatTag());
   const SampleInterval owned = OwnedSamples(of_frame, *work.box);
   const RayPacket among = AmongVoxels(of_frame, *work.box);
@@ -451,15 +473,16 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
   const bool mixed = work.labels != nullptr || work.fields != nullptr;
-  const bool has_parts = !work.rays->clip.empty() || work.to_surfaces != nullptr || work.look->by_gradient();
+  const bool has_parts = !work.rays->clip.empty() || work.to_surfaces != nullptr || work.look->by_gradient() || shapes != nullptr;
   if (HWY_LIKELY(!mixed && !has_parts)) {
     shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
   } else if (!mixed) {
-    shaded = MarchParts<T, Samples::kAll, Voxels>(work, packet, owned, sums);
+    shaded = MarchParts<T, Samples::kAll, Voxels>(work, packet, owned, shapes, sums);
   } else {
-    shaded = MarchParts<T, Samples::kMixed, Voxels>(work, packet, owned, sums);
+    shaded = MarchParts<T, Samples::kMixed, Voxels>(work, packet, owned, shapes, sums);
   }
-  if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
+  if (shaded != 0 || (shapes != nullptr && shapes->any_owned))
+    hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
 }
 
@@ -467,11 +490,15 @@ template <class T, class Voxels>
 HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds& tile, GradientBricks* bricks, float* HWY_RESTRICT rgba,
                                         std::size_t floats_a_row) {
   std::uint64_t shaded = 0;
-  ForEachPacket(*work.rays, tile, rgba, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT pixels) HWY_ATTR {
-    const std::uint64_t found = MarchPacket<T, Voxels>(work, packet, bricks, pixels);
-    shaded += found;
-    return found != 0;
-  });
+  const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
+  PacketShapes shapes;
+  ForEachPacket(*work.rays, tile, rgba, floats_a_row,
+                [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
+                  const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
+                  const std::uint64_t found = MarchPacket<T, Voxels>(work, packet, cut ? &shapes : nullptr, bricks, pixels);
+                  shaded += found;
+                  return found != 0 || (cut && shapes.any_owned);
+                });
   return shaded;
 }
 

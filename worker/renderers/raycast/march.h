@@ -11,6 +11,9 @@
 //               docs/rendering.md says (RayLabels)
 //   fields      sampled like the volume, and blended with it (RayFields)
 //
+// Fragments of shapes are composited among the samples, each by the box that holds it. They cut the ray: samples beside a cut stand for the
+// length up to it, as at a clipping plane. An opaque one ends the ray, and is left to whoever finishes the picture (ComposeShapes).
+//
 // Isosurfaces of the interpolated volume are composited among the samples, each crossing of a ray with its surface's opacity
 // (surface_walk-inl.h). A crossing between two samples comes after the first of them.
 #pragma once
@@ -26,6 +29,8 @@
 #include "worker/renderers/raycast/gradient_bricks.h"
 #include "worker/renderers/raycast/ray_fields.h"
 #include "worker/renderers/raycast/ray_labels.h"
+#include "worker/shapes/fragment_order.h"
+#include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
@@ -41,6 +46,8 @@ struct MarchWork {
   float termination = 0;                        // a ray ends where it transmits less; 0: never
   const RayLabels* labels = nullptr;            // null: none are shown
   const RayFields* fields = nullptr;            // null: no other field is shown
+  const ShapeTile* shapes = nullptr;            // that holds the tile's pixels; null: there are none
+  const FragmentOrder* order = nullptr;         // of the frame, if there are shapes
   const FrameLight::View* light = nullptr;      // shadows and ambient occlusion, by positions in the box; null: there are none
 };
 

@@ -170,6 +170,20 @@ class RegionCache : public BoxCache {
   RegionTable table_;
 };
 
+// The region, in voxels of the level, and where shapes may lie.
+SampledRegion WithShapes(SampledRegion region, const FrameSetup& setup, std::uint8_t level) {
+  const GridMap map = MapTo(setup, level);
+  for (const ShapeSetup& shape : setup.shapes) {
+    const bool empty = region.low.x > region.high.x;
+    for (const Axis axis : kAxes) {
+      const double low = map.To(shape.low[axis], axis), high = map.To(shape.high[axis], axis);
+      region.low[axis] = empty ? low : std::min(region.low[axis], low);
+      region.high[axis] = empty ? high : std::max(region.high[axis], high);
+    }
+  }
+  return region;
+}
+
 class RaycastRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
@@ -199,6 +213,7 @@ class RaycastRenderer : public Renderer {
 
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
+    const FragmentOrder order(setup);
     const RayEnds ends(setup.termination);
     std::atomic<std::uint64_t> shaded = 0;
     std::vector<std::vector<RayField>> fields_of_pieces;
@@ -206,7 +221,7 @@ class RaycastRenderer : public Renderer {
     PerThread<std::vector<GradientBricks>> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report, stretched ? &stretched->tables : nullptr},
-        [&](std::size_t piece) { return visible[piece].region; },
+        [&](std::size_t piece) { return WithShapes(visible[piece].region, setup, at.level); },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
           const RayFields ray_fields = {fields_of_pieces[piece], visible[piece].shown.data(), setup.flat};
           const MarchWork work = {.rays = &rays,
@@ -218,6 +233,8 @@ class RaycastRenderer : public Renderer {
                                   .termination = ends[steps],
                                   .labels = shown_labels,
                                   .fields = fields->empty() ? nullptr : &ray_fields,
+                                  .shapes = TileOf(data.shapes(), tile),
+                                  .order = &order,
                                   .light = light ? &*light : nullptr};
           if (stretched) {
             shaded += MarchStretchedTile(work, *stretched, tile, rgba, floats_a_row);

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <span>
 
 #include "common/image/local_image.h"
 #include "worker/kernels/normal_code.h"
+#include "worker/shapes/fragment_order.h"
 
 namespace slabstream {
 namespace {
@@ -57,6 +59,59 @@ SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y
       if (pass.hidden.Hides(segment_x(segment), row)) Remove(Open(row), segment, segment + 1);
     }
   }
+  if (pass.shapes != nullptr) FindFragments();
+}
+
+void SplatBand::FindFragments() {
+  const Axis c = pass_.cells.axes.c;
+  const bool ascending = pass_.setup.camera.ascending;
+  const Box& box = pass_.box;
+  const FragmentOrder order(pass_.setup);
+  fragments_.resize(pass_.own.size());
+  for (std::int32_t y = y_begin_; y < y_end_; ++y) {
+    for (std::int32_t x = pass_.bounds.x_begin; x < pass_.bounds.x_end; ++x) {
+      const ShapeTile& tile = pass_.shapes->TileAt(x, y);
+      if (tile.empty()) {
+        x = tile.pixels.x_end - 1;
+        continue;
+      }
+      for (const ShapeFragment& fragment : tile.At(x, y)) {
+        const bool opaque = fragment.rgba[3] == 1;
+        const FragmentOrder::Side side = order.Of(x, y, fragment.depth).side;
+        if (side == FragmentOrder::Side::kBehind || (side == FragmentOrder::Side::kFront && !opaque)) continue;
+        const double behind = std::ceil(double(fragment.depth));
+        std::int32_t number = std::int32_t(ascending ? behind : -behind) - box.begin[c];
+        // One in front of the box ends its rays before the first slice.
+        if (opaque && ascending) number = std::max(number, 0);
+        if (opaque && !ascending) number = std::min(number, box.size()[c] - 1);
+        if (number < 0 || number >= std::int32_t(fragments_.size())) continue;
+        if (!opaque && !pass_.own[std::size_t(number)].Contains({x, y, x + 1, y + 1})) continue;
+        const std::size_t pixel =
+            std::size_t(y - image_.bounds.y_begin) * std::size_t(image_.bounds.width()) + std::size_t(x - image_.bounds.x_begin);
+        fragments_[std::size_t(number)].push_back({pixel, fragment.rgba});
+      }
+    }
+  }
+}
+
+void SplatBand::AddFragments(std::int32_t k) {
+  if (fragments_.empty()) return;
+  for (const PixelFragment& fragment : fragments_[std::size_t(k - pass_.box.begin[pass_.cells.axes.c])]) {
+    float* const at = &image_.rgba[4 * fragment.pixel];
+    if (fragment.rgba[3] == 1) {
+      PixelFragment& ended = ended_.emplace_back(PixelFragment{fragment.pixel});
+      std::copy_n(at, 4, ended.rgba.begin());
+      std::fill_n(at, 3, 0.0F);
+      at[3] = 1;
+      continue;
+    }
+    const float through = 1 - at[3];
+    for (std::size_t i = 0; i < 4; ++i) at[i] += through * fragment.rgba[i];
+  }
+}
+
+void SplatBand::Finish() {
+  for (const PixelFragment& ended : ended_) std::ranges::copy(ended.rgba, &image_.rgba[4 * ended.pixel]);
 }
 
 bool SplatBand::finished() const {

@@ -22,9 +22,11 @@ class SplatBand {
   // Rows [y_begin, y_end) of `image`, which has the bounds of the pass. Both must outlive the band. Stage times and counts go to `report`.
   SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y_end, LocalImage& image, RankReport& report);
 
-  // Slices come nearest first.
+  // Slices come nearest first, each with the fragments in front of it. AddSlice: one with occupied voxels.
+  void AddFragments(std::int32_t k);
   void AddSlice(std::int32_t k);
   bool finished() const;  // all is opaque: nothing behind shows
+  void Finish();          // after the last slice
 
  private:
   // Beams that are shaded before they are filtered: few, so that they are still in the first-level cache when they are filtered.
@@ -34,6 +36,12 @@ class SplatBand {
     std::int32_t begin = 0, end = 0;
   };
 
+  // A fragment of a pixel of the image. An opaque one ends its ray.
+  struct PixelFragment {
+    std::size_t pixel = 0;
+    std::array<float, 4> rgba{};
+  };
+  void FindFragments();
   SliceSamples ClipSlice(const SliceSamples& slice);
   void LightCuts();
   void CompositeClipped(RowWork work, std::int32_t row);
@@ -64,8 +72,10 @@ class SplatBand {
   const std::int32_t segments_, words_;  // segments and words of a row
   const std::int32_t first_tile_row_;    // the first row of tiles, counted in the frame
   const bool clipped_;
-  std::vector<float> opaque_alpha_;  // [row of tiles][segment]: alpha of the box at which nothing behind shows
-  std::vector<SegmentWord> open_;    // [row][word]: not opaque yet
+  std::vector<float> opaque_alpha_;                    // [row of tiles][segment]: alpha of the box at which nothing behind shows
+  std::vector<SegmentWord> open_;                      // [row][word]: not opaque yet
+  std::vector<std::vector<PixelFragment>> fragments_;  // in front of each slice of the box; empty: there are none
+  std::vector<PixelFragment> ended_;                   // what pixels have gathered whose rays have ended; they are opaque until Finish
 
   // What follows belongs to the current slice.
   std::int32_t slice_ = 0;

@@ -2,10 +2,12 @@
 
 namespace slabstream {
 
-SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
-                     const OcclusionMask& hidden_tiles, const FrameLight* frame_light)
+SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup,
+                     const Box& own_box, const OcclusionMask& hidden_tiles, const FrameLight* frame_light, const FrameShapes* frame_shapes)
     : cells(occupied_voxels),
       setup(frame_setup),
+      box(own_box),
+      shapes(frame_shapes),
       hidden(hidden_tiles),
       clip(frame_setup),
       opacity(frame_setup),
@@ -16,6 +18,13 @@ SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const Classification
   for (std::int32_t k = occupied.begin[c]; k < occupied.end[c]; ++k) {
     slices.push_back(SampleSlice(setup, box, occupied, k, footprints));
     if (!slices.back().owned.empty()) bounds = Union(bounds, slices.back().owned);
+  }
+  if (shapes != nullptr) {
+    const Box everywhere = {Uniform(-kMaxVolumeSide), Uniform(2 * kMaxVolumeSide)};
+    for (std::int32_t k = box.begin[c]; k < box.end[c]; ++k) {
+      own.push_back(SampleSlice(setup, box, everywhere, k, footprints).owned);
+      bounds = Union(bounds, Intersection(own.back(), shapes->bounds()));
+    }
   }
   if (bounds.empty()) return;
   bounds.x_begin = bounds.x_begin / kSegment * kSegment;

@@ -13,13 +13,14 @@
 #include "worker/renderers/splat/sheet_opacity.h"
 #include "worker/renderers/splat/slice_clip.h"
 #include "worker/renderers/splat/slice_samples.h"
+#include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
 struct SplatPass {
-  // `frame_light`: null: there is none.
-  SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
-            const OcclusionMask& hidden_tiles, const FrameLight* frame_light = nullptr);
+  // `frame_light`, `frame_shapes`: null: there are none.
+  SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& own_box,
+            const OcclusionMask& hidden_tiles, const FrameLight* frame_light = nullptr, const FrameShapes* frame_shapes = nullptr);
 
   const SliceSamples& Slice(std::int32_t k) const { return slices[std::size_t(k - cells.occupied.begin[cells.axes.c])]; }
   // By octet of a beam, from first_octet on: the segments that its voxels reach and the box owns, counted from the image's left border.
@@ -29,6 +30,9 @@ struct SplatPass {
 
   const OccupiedVoxels& cells;
   const FrameSetup& setup;
+  const Box box;
+  const FrameShapes* shapes;
+  std::vector<PixelBounds> own;  // if there are shapes: of each slice of the box, the samples that it owns
   const OcclusionMask& hidden;
   SliceClip clip;
   SheetOpacity opacity;

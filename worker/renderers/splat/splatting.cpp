@@ -18,10 +18,14 @@ constexpr std::int32_t kBandRows = 64;
 void RenderBand(const SplatPass& pass, std::int32_t y_begin, const RenderControl& control, LocalImage& image, RankReport& report) {
   SplatBand band(pass, y_begin, std::min(y_begin + kBandRows, pass.bounds.y_end), image, report);
   const Axis c = pass.cells.axes.c;
-  const std::int32_t begin = pass.cells.occupied.begin[c], end = pass.cells.occupied.end[c];
+  const std::int32_t first = pass.cells.occupied.begin[c], last = pass.cells.occupied.end[c];
+  const std::int32_t begin = pass.shapes == nullptr ? first : pass.box.begin[c], end = pass.shapes == nullptr ? last : pass.box.end[c];
   for (std::int32_t i = 0; i < end - begin && !band.finished() && !control.cancelled(); ++i) {
-    band.AddSlice(pass.setup.camera.ascending ? begin + i : end - 1 - i);
+    const std::int32_t k = pass.setup.camera.ascending ? begin + i : end - 1 - i;
+    band.AddFragments(k);
+    if (k >= first && k < last) band.AddSlice(k);
   }
+  band.Finish();
 }
 
 void AddTo(RankReport& sum, const RankReport& part) {
@@ -40,8 +44,8 @@ class SplattingRenderer : public Renderer {
     report.occupied_voxels += cells.occupied_in_box;
     clock.Charge(Stage::kPrepare);
     LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
-    if (!cells.occupied.empty()) {
-      const SplatPass pass(cells, table, setup, box, hidden, data.light());
+    if (!cells.occupied.empty() || data.shapes() != nullptr) {
+      const SplatPass pass(cells, table, setup, box, hidden, data.light(), data.shapes());
       if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
       clock.Charge(Stage::kTransform);
       const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;

@@ -20,10 +20,14 @@ class XrayRenderer : public Renderer {
     const VolumeDescription& volume = setup.description;
     const ViewRays rays = MakeViewRays(setup.camera, volume.geometry, setup.parameters.at(0), setup.clip);
     const auto values = MakeValueScale(AttenuationOf(setup).clear, MostAttenuating(setup), volume.mapping);
+    const FragmentOrder order(setup);
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
-            std::size_t floats_a_row) { ProjectTile({.rays = &rays, .box = &ray_box, .values = values}, tile, pixels, floats_a_row); });
+            std::size_t floats_a_row) {
+          const ShapeTile* const shapes = TileOf(data.shapes(), tile);
+          ProjectTile({.rays = &rays, .box = &ray_box, .values = values, .shapes = shapes, .order = &order}, tile, pixels, floats_a_row);
+        });
     return clock.Finish(std::move(image), control);
   }
 };

@@ -1,0 +1,89 @@
+// FrameShapes: what the shapes of a frame show in each of its pixels. All renderers and whoever finishes the picture read it. It depends on
+// the request and the shapes alone, so it is the same for every box, worker and thread.
+//
+// A pixel has fragments, nearest first. An opaque fragment ends its ray. Each pixel has four samples on a rotated grid, or one in its
+// centre where the camera supersamples. A fragment takes from each sample's light what its surfaces take there; its alpha is the part that
+// it takes of the light that those before it left. So fragments composited front to back give the mean of the samples, and the last one of
+// a pixel that is covered entirely has exactly 1.
+//
+// Parts of one shape in neighbouring samples that are less than MergedDepth apart are one surface. A surface is shaded once, where the
+// pixel's centre sees it. Opaque surfaces of one pixel that are less than MergedDepth apart are one fragment.
+//
+// A fragment's depth is that of its surface in the pixel's centre, or, where it is not seen there, the mean of its samples.
+//
+// Lines are tubes with round ends and joints, and points are balls; a width in pixels becomes a radius by the picture's camera, at the
+// depth of each vertex. One that holds the eye is not seen.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/frame/frame_setup.h"
+#include "common/image/pixel_bounds.h"
+#include "worker/light/frame_light.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kShapeTile = 64;  // pixels a side
+// Fragments of a pixel. The last one holds all surfaces from there on, at the mean of their depths: what lies among them in the volume is
+// seen before or behind all of them. Their colours and opacities stay exact.
+inline constexpr std::size_t kMostShapeFragments = 64;
+// Parts of translucent shapes that one pixel sees, the nearest ones. A surface of triangles smaller than pixels has up to four in each.
+inline constexpr std::size_t kMostShapeHits = 256;
+inline constexpr float kRayGoesOn = std::numeric_limits<float>::infinity();
+
+struct ShapeFragment {
+  float depth = 0;              // see FrameShapes
+  std::array<float, 4> rgba{};  // premultiplied; alpha in (0, 1]: the share of the light from behind that it takes
+  friend bool operator==(const ShapeFragment&, const ShapeFragment&) = default;
+};
+
+struct ShapeTile {
+  PixelBounds pixels;
+  std::vector<std::uint32_t> begin = {};      // of each pixel, row by row, and one more: numbers of its fragments; empty: there are none
+  std::vector<ShapeFragment> fragments = {};  // nearest first; only the last one of a pixel may be opaque
+  std::vector<float> ends = {};               // by pixel: the depth of its opaque fragment, or kRayGoesOn; empty as `begin`
+
+  bool empty() const { return begin.empty(); }
+  std::size_t Number(std::int32_t x, std::int32_t y) const {
+    return std::size_t(y - pixels.y_begin) * std::size_t(pixels.width()) + std::size_t(x - pixels.x_begin);
+  }
+  std::span<const ShapeFragment> At(std::int32_t x, std::int32_t y) const {
+    if (empty()) return {};
+    const std::size_t n = Number(x, y);
+    return std::span(fragments).subspan(begin[n], begin[n + 1] - begin[n]);
+  }
+};
+
+// Half of what a voxel extends in depth, or twice the width of a pixel there, whichever is more: surfaces that turn away from the eye by up
+// to about 70 degrees are one.
+double MergedDepth(const FrameSetup& setup, double depth);
+
+class FrameShapes {
+ public:
+  virtual ~FrameShapes() = default;
+  // Pixels are those of FrameBounds(setup). Depths are those of the setup's camera; in a frame along slices they are slices, counted so
+  // that they grow away from the eye: k if the traversal ascends, else -k.
+  // The tile that holds a pixel of the frame. The first call draws it. Any thread, within its task arena.
+  virtual const ShapeTile& TileAt(std::int32_t x, std::int32_t y) const = 0;
+  virtual PixelBounds bounds() const = 0;  // all fragments lie there; empty: there are none
+  virtual bool translucent() const = 0;    // false: fragments that are not opaque are parts of edges alone
+  virtual std::size_t bytes() const = 0;   // memory, of tiles too
+};
+
+// The tile that holds all of `pixels`, which lie in one; null: there are no shapes.
+inline const ShapeTile* TileOf(const FrameShapes* shapes, const PixelBounds& pixels) {
+  return shapes == nullptr ? nullptr : &shapes->TileAt(pixels.x_begin, pixels.y_begin);
+}
+
+// `bytes`: of each of setup.shapes, as PackShape made them; they stay as long as the result. DataLoss: they are not. `light`: shadows and
+// ambient occlusion on the shapes; null: there are none.
+Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& setup,
+                                                           std::span<const std::shared_ptr<const VoxelBlock>> bytes,
+                                                           std::shared_ptr<const FrameLight> light);
+
+}  // namespace slabstream
