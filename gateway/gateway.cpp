@@ -173,10 +173,9 @@ class Gateway::Impl : public HttpApplication {
     if (const auto why = WhyNot(*right, *access)) return counted(NoRight(*why));
     Result<PictureFields> fields = FieldsOf(*target, post && !route->second.takes_bytes ? std::string_view(request.body) : "");
     if (!fields.ok()) return counted(Failure(fields.status()));
-    for (const PictureField& field : *fields) {
-      if (field.name != "dataset" || *right == Right::kNone) continue;
-      if (const auto why = WhyNotShown(field.text, *access)) return counted(NoRight(*why));
-      uploads_->Touch(field.text, MonotonicNow());
+    for (const std::string& name : *right == Right::kNone ? std::vector<std::string>() : NamedDatasets(*fields)) {
+      if (const auto why = WhyNotShown(name, *access)) return counted(NoRight(*why));
+      uploads_->Touch(name, MonotonicNow());
     }
     const auto shown = [counted, access = *access](HttpReply answer) {
       // The service names other datasets where one is missing.
@@ -432,7 +431,7 @@ class Gateway::Impl : public HttpApplication {
     const Time now = MonotonicNow();
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) {
       session->SendStatus();
-      uploads_->Touch(session->dataset(), now);
+      for (const std::string& name : session->datasets()) uploads_->Touch(name, now);
     }
     uploads_->RemoveUnseen(now);
   }

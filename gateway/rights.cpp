@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "client/request/values.h"
 #include "common/base/printable.h"
 
 namespace slabstream {
@@ -25,6 +26,17 @@ Json AccessJson(const Access& access, bool takes_files) {
   return {{"rights", std::move(rights)},
           {"datasets", access.datasets ? Json(*access.datasets) : Json()},
           {"exp", access.until != Access::kForEver ? Json(access.until) : Json()}};
+}
+
+std::vector<std::string> NamedDatasets(const PictureFields& fields) {
+  std::vector<std::string> named;
+  for (const auto& [name, text] : fields) {
+    if (name == "dataset") named.push_back(text);
+    if (name != "shape" && name != "mesh" && name != "lines" && name != "points") continue;
+    const Result<ShapeChoice> shape = ParseShape(name, text);
+    if (shape.ok()) named.push_back(shape->shape);  // what is wrong is refused by whoever makes the picture
+  }
+  return named;
 }
 
 std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access) {

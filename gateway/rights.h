@@ -5,7 +5,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "client/request/picture_fields.h"
 #include "common/http/access_token.h"
 #include "common/json/json.h"
 #include "common/wire/client_messages.h"
@@ -24,6 +26,9 @@ enum class Right : std::uint8_t {
 std::optional<std::string> WhyNot(Right right, const Access& access);
 // The same of a dataset, whether there is one of this name or not.
 std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access);
+
+// The datasets that the fields of a request for a picture name: the volume and the shapes.
+std::vector<std::string> NamedDatasets(const PictureFields& fields);
 
 // What the token gives, for its holder: {"rights": ["view", "steer"], "datasets": ["head"], "exp": 1764450000}; the last two are null if it
 // is for all datasets, or does not expire. `takes_files`: whether the gateway does.

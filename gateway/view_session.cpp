@@ -74,10 +74,10 @@ void ViewSession::End() {
   if (peer_ != nullptr) peer_->Close(1001, "the gateway ends");
 }
 
-std::string_view ViewSession::dataset() const {
-  if (!view_) return {};
-  const auto named = std::ranges::find(view_->options, "dataset", &PictureField::name);
-  return named == view_->options.end() || !access_.Shows(named->text) ? std::string_view() : std::string_view(named->text);
+std::vector<std::string> ViewSession::datasets() const {
+  std::vector<std::string> named = view_ ? NamedDatasets(view_->options) : std::vector<std::string>();
+  std::erase_if(named, [this](const std::string& name) { return !access_.Shows(name); });
+  return named;
 }
 
 bool ViewSession::HasExpired() {
@@ -129,7 +129,7 @@ void ViewSession::SendStatus() {
   for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
   peer_->SendText(TextOf(json));
   pinged_at_ = MonotonicNow();
-  peer_->SendText(TextOf({{"type", "ping"}, {"ping", ++pings_}}));
+  peer_->SendText(TextOf(Json{{"type", "ping"}, {"ping", ++pings_}}));
 }
 
 void ViewSession::SendError(std::uint64_t seq, const Status& why) {
@@ -175,8 +175,9 @@ void ViewSession::Render(const ViewAction& action) {
   const std::uint64_t order = ++orders_;
   Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
   if (job.ok()) {
-    // The frames of a job are of one dataset.
-    if (const auto why = WhyNotShown(job->frames.front().dataset, access_)) job = Status::InvalidArgument(*why);
+    for (const std::string& name : NamedDatasets(view_->options)) {
+      if (const auto why = WhyNotShown(name, access_); why && job.ok()) job = Status::InvalidArgument(*why);
+    }
   }
   if (!job.ok()) {
     SendError(seq, job.status());
@@ -300,7 +301,7 @@ void ViewSession::OnEncoded(std::uint64_t number, Result<EncodedView> encoded) {
 
 void ViewSession::Send(std::uint64_t frame) {
   EncodedView encoded = *std::exchange(encoded_, std::nullopt);
-  if (encoded.bytes->size() >= kLargePicture) peer_->SendText(TextOf({{"type", "picture"}, {"bytes", encoded.bytes->size()}}));
+  if (encoded.bytes->size() >= kLargePicture) peer_->SendText(TextOf(Json{{"type", "picture"}, {"bytes", encoded.bytes->size()}}));
   peer_->SendBinary(HeadOf(std::move(encoded.header), frame, machine_.link().round_trip()), std::move(encoded.bytes));
 }
 

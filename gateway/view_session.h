@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/http/http.h"
 #include "gateway/frame_message.h"
@@ -41,8 +42,8 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
 
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
-  void End();                        // the gateway stops
-  std::string_view dataset() const;  // the dataset of the latest view; empty: no view has come, or the token does not show it
+  void End();                                 // the gateway stops
+  std::vector<std::string> datasets() const;  // the volume and the shapes of the latest view, as far as the token shows them
 
  private:
   void Handle(ViewMessage view);

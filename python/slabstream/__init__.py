@@ -24,6 +24,7 @@ from .page_state import Camera
 from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import AsyncService, Service, connect, connect_async
+from .shapes import Lines, Mesh, Points, shape_of
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Field, Parameter, Simulation, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
@@ -34,10 +35,10 @@ __version__ = "0.2.0"
 
 __all__ = [
     "AsyncService", "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry",
-    "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "NotFound", "Owner",
-    "Parameter", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
+    "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "Lines", "Mesh", "NotFound", "Owner",
+    "Parameter", "Points", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
     "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic",
-    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "shutdown", "to_pyvista", "view",
+    "Worker", "connect", "connect_async", "load", "open", "presets", "render", "shape_of", "shutdown", "to_pyvista", "view",
 ]
 
 

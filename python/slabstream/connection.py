@@ -7,6 +7,7 @@ import functools
 import math
 import os
 import queue
+import secrets
 import struct
 import threading
 import time
@@ -18,7 +19,8 @@ import zmq
 from . import schema
 from .address import Address
 from .errors import InvalidArgument, Unavailable
-from .requests import Observer, Requests
+from .requests import MOST_PART_BYTES, Observer, Requests
+from .shapes import Shape
 from .waiting import Changes, Front
 
 CONNECT_SECONDS = 4.0
@@ -91,6 +93,10 @@ class _Loop:
                 raise Unavailable(f"the connection to the service at {self.endpoint} is closed")
             self.calls.put(function)
             self._wake()
+
+    def call_later(self, function: Callable[[], None]) -> None:
+        """Has the thread run `function` when it is awake, if it ever is. Destructors may call this at any time."""
+        self.calls.put(function)
 
     def check_process(self) -> None:
         """Unavailable: in a forked child, which has no thread that would answer."""
@@ -173,6 +179,15 @@ class _Loop:
             self.requests.fail_all(f"the service at {self.endpoint} refuses the key: it was revoked or is another's", for_good=True)
 
 
+class SentShape:
+    """A shape that is a dataset of the service, as long as this object lives."""
+
+    def __init__(self, loop: _Loop, name: str, nonce: int):
+        self.name = name
+        self.is_there = functools.partial(loop.requests.has_file, nonce)
+        weakref.finalize(self, loop.call_later, functools.partial(loop.requests.drop_file, nonce)).atexit = False
+
+
 class Connection:
     """Any thread. Whoever waits does so as `front` has it."""
 
@@ -183,6 +198,7 @@ class Connection:
         except zmq.ZMQError as error:
             raise Unavailable(f'endpoint "{address.endpoint}": {error.strerror}') from None
         self.close = weakref.finalize(self, self._loop.stop)
+        self._shapes: weakref.WeakKeyDictionary[Shape, SentShape] = weakref.WeakKeyDictionary()
 
     async def greet(self, timeout: float) -> None:
         """Unavailable: nobody answers within `timeout` seconds, or the service refuses the key. The connection is closed then."""
@@ -228,6 +244,16 @@ class Connection:
                 sent = end
             await self.front.wait(answer)
             return answer.result()
+
+    async def send_shape(self, shape: Shape) -> SentShape:
+        """Sends it, unless it has been sent and is still there."""
+        sent = self._shapes.get(shape)
+        if sent is None or not sent.is_there():
+            name, content = f"{shape.kind}-{secrets.token_hex(4)}", memoryview(shape._file)
+            order = schema.AddVolume(name=name, file=schema.SentFile(name=f"{shape.kind}.vtk", bytes=content.nbytes))
+            parts = (content[begin : begin + MOST_PART_BYTES] for begin in range(0, content.nbytes, MOST_PART_BYTES))
+            sent = self._shapes[shape] = SentShape(self._loop, name, (await self.upload(order, parts)).nonce)
+        return sent
 
     async def ask(self, kind: str, message: Any, timeout: float = ANSWER_SECONDS) -> Any:
         """The answer to a question or an order, or the service's refusal as an exception."""

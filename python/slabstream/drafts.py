@@ -9,7 +9,7 @@ from typing import Any, Callable, Iterable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
 
-from . import schema, transfer, values
+from . import schema, shapes, transfer, values
 from .errors import InvalidArgument, UnknownOption
 from .image import PictureFormat
 from .options import COMMANDS, Option
@@ -21,6 +21,8 @@ class Draft:
 
     frame: Any = dataclasses.field(default_factory=schema.FrameRequest)
     format: PictureFormat = PictureFormat()
+    shapes: list[tuple[Any, shapes.Shape]] = dataclasses.field(default_factory=list)  # with the ShapeChoices in `frame` that lack their names
+    sent: list[Any] = dataclasses.field(default_factory=list)  # what keeps these shapes at the service
     colors: transfer.Colors | None = None  # that take the place of those of the preset, once the dataset's values are known
     # Of slices.
     plane: str = ""
@@ -122,13 +124,6 @@ def _parameter(draft: Draft, option: Option, value: Any) -> None:
     draft.frame.parameters.add(name=option.text_name, text=text)
 
 
-def _channel_color(name: str, value: Any) -> Any:
-    red, green, blue, alpha = values.color(name, value)
-    if alpha != 1:
-        raise InvalidArgument(f"{name} {value!r} has an opacity of {alpha:g}, but must be opaque")
-    return schema.Color(r=red, g=green, b=blue)
-
-
 _LOOK = ("color", "range", "gamma", "opacity", "transfer", "shown")
 
 
@@ -140,7 +135,7 @@ def _channel_look(name: str, key: str, look: Mapping[str, Any]) -> Any:
             raise InvalidArgument(f"{name} has the field {field!r}, must be one of: {', '.join(_LOOK)}")
     given = {field: value for field, value in look.items() if value is not None}
     if "color" in given:
-        choice.color.CopyFrom(_channel_color(f"{name} color", given["color"]))
+        choice.color.CopyFrom(values.opaque_color(f"{name} color", given["color"]))
     if "range" in given:
         choice.scalar_range.CopyFrom(values.scalar_range(f"{name} range", given["range"]))
     if "gamma" in given:
@@ -184,6 +179,14 @@ def _channels(draft: Draft, option: Option, value: Any) -> None:
 
 
 # ---- options that are no field, or several
+
+
+def _shapes(draft: Draft, option: Option, value: Any) -> None:
+    for choice, shape in shapes.choices(option.name, value):
+        shown = draft.frame.shapes.add()
+        shown.CopyFrom(choice)
+        if shape is not None:
+            draft.shapes.append((shown, shape))
 
 
 # Azimuth and elevation in degrees, and whether only patients have such a side (common/view/named_view.h).
@@ -280,6 +283,7 @@ def _in(place: str, parse: Callable[[Option, Any], Any], field: str = "") -> Put
 
 #: Every option of options.json is here, or has a path.
 _PUT: dict[str, Put] = {
+    "shape": _shapes,
     "view": _view,
     "camera": _camera,
     "channels": _channels,

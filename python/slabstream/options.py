@@ -62,6 +62,11 @@ _CHANNELS = {"name": "channels", "type": "CHANNELS", "help": (
     "one that is not shown (default: those that the file shows)")}
 
 
+_SHAPE = {"path": "", "type": "SHAPE", "help": (
+    "Shows a mesh, lines or points beside the volume: the name of a dataset, a Mesh, Lines or Points, or a mesh of PyVista or trimesh; with a look, "
+    "{\"shape\": \"lung\", \"color\": \"pink\", \"opacity\": 0.4, \"width\": \"3px\", \"map\": \"viridis\", \"range\": (0, 1)}, or \"lung,color=pink\"; or a list of these")}
+
+
 #: Paths of short forms: the field, and what is said of it (drafts.py).
 _OF_OVERLAY = {"overlay-transfer": "overlay.preset", "overlay-range": "overlay.scalar_range", "overlay-weight": "overlay.weight"}
 _OF_LABELS = "fields.labels."
@@ -72,6 +77,8 @@ def _in_python(entry: dict[str, Any]) -> dict[str, Any] | None:
     entry = {"path": _OF_OVERLAY.get(entry["name"], ""), **entry}
     if entry["path"].startswith(_OF_LABELS):
         entry["path"] = entry["path"].removeprefix("fields.")
+    if entry["name"] == "shape":
+        entry |= _SHAPE
     path = entry["path"]
     return None if path.startswith("fields.") else {"group": entry["group"], **_CHANNELS} if path == "channels" else entry
 

@@ -21,7 +21,7 @@ _CAMERA = ("azimuth", "elevation", "roll", "zoom", "look_at", "projection")
 _TRANSFER = ("transfer", "scalar_range", "opacity_distance", "gradient_opacity", "isovalue")
 _FLAGS = ("scale_bar", "orientation_marker", "color_bar", "legend")
 _LABELS = ("label_mode", "label_tint", "label_surface", "labels_shown", "label_opacity")
-_LISTS = ("light", "clip_plane")  # with semicolons between
+_LISTS = ("light", "clip_plane", "shape")  # with semicolons between
 #: Options that the page has a place for, by the same name, beside parameters of renderers. transfer, channels and layers have more than one.
 _SHOWN = {*_CAMERA, *_TRANSFER, *_FLAGS, *_LABELS, *_LISTS, "renderer", "shading", "shadows", "ambient_occlusion", "clip_box", "clip_mode", "blend",
           "time", "background", "axes"}
@@ -83,6 +83,21 @@ def _box_text(name: str, box: Any) -> str:
 
 def _label_range(found: Any) -> str:
     return found.name or (f"{found.first}" if found.first == found.last else f"{found.first}-{found.last}")
+
+
+def _shape_text(choice: Any) -> str:
+    """As the command line takes it, but with the name quoted."""
+    looks = {"color": _hex(choice.color.r, choice.color.g, choice.color.b) if choice.HasField("color") else None,
+             "opacity": values.text_of(choice.opacity) if choice.HasField("opacity") else None,
+             "width": values.text_of(choice.width) + ("px" if choice.width_in_pixels else "") if choice.width else None,
+             "map": choice.map or None, "range": _range_text("range of a shape", choice.range) if choice.HasField("range") else None}
+    return ",".join([urllib.parse.quote(choice.shape, safe=""), *(f"{name}={text}" for name, text in looks.items() if text is not None)])
+
+
+def _shape_of(text: str) -> dict[str, str]:
+    """As the option `shape` takes it."""
+    name, *looks = text.split(",")
+    return {"shape": urllib.parse.unquote(name), **_map_of(",".join(looks))}
 
 
 #: By the type of the field's messages, and what stands between several.
@@ -187,6 +202,8 @@ def texts_of(draft: Draft, options: Mapping[str, Any]) -> Texts:
         found["overlay"] = "1"
     if "background" in given and draft.format.background[3] == 1:
         found["background"] = _hex(*draft.format.background[:3])
+    if frame.shapes:
+        found["shape"] = ";".join(map(_shape_text, frame.shapes))
     if "axes" in given:
         found["axes"] = annotations.axes
     for name in given & set(_FLAGS):
@@ -298,6 +315,8 @@ def options_of(state: Mapping[str, str], dataset: Dataset | None = None) -> dict
         wanted = option.path.partition(".")[2] if parameter else option.ability
         if chosen is None or not wanted or wanted in chosen["abilities"] or wanted in chosen["parameters"]:
             found[option.name] = text.split(";") if option.name in _LISTS else text
+    if "shape" in found:
+        found["shape"] = [_shape_of(each) for each in found["shape"] if ",shown=0" not in each]
     if chosen is not None and "perspective" not in chosen["abilities"]:
         found.pop("projection", None)
     if state.get("function"):

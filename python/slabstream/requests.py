@@ -51,6 +51,7 @@ class _Open:
 class _Question:
     answer: concurrent.futures.Future[Any]          # the reply's message
     credited: Callable[[int], None] | None = None   # of a volume that is sent: told how many bytes may be sent in all
+    keeps: bool = False                             # an AddVolume of a file, which stays as long as this client pings
     epoch: int | None = None                        # of the coordinator that takes the volume, once a pong has told it
     pinged: bool = True                             # fails if the service does not answer pings; False: a ping of its own
 
@@ -63,6 +64,7 @@ class Requests:
         self._open: dict[int, _Open] = {}
         self.numbers = itertools.count(1)  # of requests and nonces; any thread may take the next one
         self._questions: dict[int, _Question] = {}  # and orders, by nonce
+        self._files: dict[int, int | None] = {}  # that the service has of this client: the coordinator's epoch, once a pong has told it, by nonce
         self._pinged: dict[int, list[int]] = {}  # requests of each unanswered ping, by nonce
         self._received_bytes = self._told_bytes = 0
         self._next_ping = 0.0
@@ -97,13 +99,22 @@ class Requests:
         pinged = kind != "client_ping"
         if pinged:
             self._begin_pings(now)
-        self._questions[nonce] = _Question(answer, credited, pinged=pinged)
+        self._questions[nonce] = _Question(answer, credited, kind == "add_volume" and message.HasField("file"), pinged=pinged)
         self._send_message(**{kind: message})
 
     def forget(self, nonce: int) -> None:
         """Nobody waits for that answer now. What was sent of a volume is dropped."""
         forgotten = self._questions.pop(nonce, None)
         if forgotten is not None and forgotten.credited is not None:
+            self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
+
+    def has_file(self, nonce: int) -> bool:
+        """Whether the file of an AddVolume is still at the service, as far as is known. Any thread."""
+        return nonce in self._files
+
+    def drop_file(self, nonce: int) -> None:
+        if nonce in self._files:
+            del self._files[nonce]
             self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
 
     def send_part(self, nonce: int, begin: int, part: memoryview) -> None:
@@ -170,6 +181,8 @@ class Requests:
         for request in list(self._open):
             self._end(request, Unavailable(why))
         self._fail_questions(why, lambda question: for_good or question.pinged)
+        for nonce in list(self._files):
+            self.drop_file(nonce)
         self._pinged.clear()
         self._unanswered_since = None
 
@@ -178,8 +191,8 @@ class Requests:
             self._questions.pop(nonce).answer.set_exception(Unavailable(why))
 
     def _pings(self) -> bool:
-        """Whether anybody waits."""
-        return bool(self._open) or any(question.pinged for question in self._questions.values())
+        """Whether anybody waits, or the service keeps anything as long as this client pings."""
+        return bool(self._open or self._files) or any(question.pinged for question in self._questions.values())
 
     def _begin_pings(self, now: float) -> None:
         if not self._pings():
@@ -220,6 +233,8 @@ class Requests:
         elif kind == "order_refused":
             question.answer.set_exception(error_of(message.status.code, message.status.message))
         else:
+            if question.keeps:
+                self._files[message.nonce] = question.epoch
             question.answer.set_result(message)
 
     def _ping(self, now: float) -> None:
@@ -239,6 +254,7 @@ class Requests:
         self._fail_questions(lost, lambda question: question.credited is not None and question.epoch not in (None, pong.epoch))
         for question in self._questions.values():
             question.epoch = pong.epoch
+        self._files = {nonce: pong.epoch for nonce, epoch in self._files.items() if epoch in (None, pong.epoch)}
         self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
         known = set(pong.known)
         for request in asked:

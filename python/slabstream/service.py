@@ -118,6 +118,7 @@ class AsyncService:
         in_flight = values.integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, {**options, "time": None} if several else options)
         times = [several[i * len(several) // count] if several else draft.frame.time for i in range(count)]
+        stops: list[Draft] = []
         if path is None:
             if draft.frame.view.HasField("eye") and turns > 0:
                 raise InvalidArgument(
@@ -137,8 +138,8 @@ class AsyncService:
                 return await self._views_along(seconds, [await self._whole_view(each, times) for each in stops], draft, count)
 
         async def drafts() -> Iterator[Draft]:
+            await self._settle([draft, *stops])
             moved = await views()
-            await self._settle([draft])
             return _with_views(draft, moved, times)
 
         return self._pipelined(drafts, in_flight, deadline)
@@ -295,7 +296,11 @@ class AsyncService:
         return await self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer, **of), timeout)
 
     async def _settle(self, drafts: list[Draft]) -> None:
-        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans."""
+        """What pictures of one dataset need beside their options: shapes at the service, and the values that a colour map of matplotlib spans."""
+        for each in drafts:
+            for choice, shape in each.shapes:
+                each.sent.append(await self._connection.send_shape(shape))
+                choice.shape = each.sent[-1].name
         draft = drafts[0]
         if draft.colors is not None:
             preset = (await self._transfer_of(draft)).transfer

@@ -66,6 +66,7 @@ class Dataset:
     field: int = 0                                  # these are shown if nothing is said
     time: int = 0
     simulation: Simulation | None = None            # None: no processes hold its voxels
+    is_shape: bool = False                          # it is a mesh, lines or points, for the option `shape`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,8 +119,8 @@ def simulation_of(message: Any) -> Simulation:
 def dataset_of(message: Any) -> Dataset:
     state = schema.word(message, "state", "failed")
     simulation = simulation_of(message.simulation) if message.HasField("simulation") else None
-    if state != "ready":
-        return Dataset(message.name, state, message.error, simulation=simulation)
+    if state != "ready" or message.is_shape:
+        return Dataset(message.name, state, message.error, memory_bytes=message.memory_bytes, simulation=simulation, is_shape=message.is_shape)
     about = message.description
     known = message.fields
     fields = tuple(

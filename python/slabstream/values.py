@@ -220,6 +220,14 @@ def color(name: str, value: object) -> Color:
     return red, green, blue, alpha
 
 
+def opaque_color(name: str, value: object) -> Any:
+    """Color: as color(), without an opacity."""
+    red, green, blue, alpha = color(name, value)
+    if alpha != 1:
+        raise InvalidArgument(f"{name} {value!r} has an opacity of {alpha:g}, but must be opaque")
+    return schema.Color(r=red, g=green, b=blue)
+
+
 def _surface_texts(text: str) -> list[tuple[Any, ...]]:
     """120:red:0.3,300:0.1,0.2,0.3 as its surfaces: a colour that begins with a digit goes on behind two more commas."""
     parts, found = text.split(","), []

@@ -30,12 +30,14 @@ class Viewer:
         if behind_proxy is not None:
             check_proxy(behind_proxy)
         self._options = for_pictures(options)
+        self._sent: list[Any] = []  # what keeps its shapes at the service
         self.first = self.texts(name, options)
 
     def texts(self, name: str, options: Mapping[str, Any]) -> Texts:
         """The page's state of these options."""
         draft = draft_of(name, options)
         self.service._settle([draft])
+        self._sent += draft.sent
         return texts_of(draft, options)
 
     def gateway(self, gone: Any = None) -> Any:
@@ -65,8 +67,8 @@ class Viewer:
         return self.service.render(**self.asked(self.first, options))  # type: ignore[no-any-return]
 
     def close(self) -> None:
-        """Lets go of the volume that was loaded for it."""
-        self._keep = None
+        """Lets go of the volume and the shapes that were loaded for it."""
+        self._keep, self._sent = None, []
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
         png, url = self.picture().png(), self.url

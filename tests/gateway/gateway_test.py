@@ -206,6 +206,28 @@ class UploadTest(WithService):
         status, answer = self.post(b"x", upload=upload, begin=0)
         self.assertEqual((status, "no such upload" in answer["error"]), (404, True))
 
+    def test_a_mesh_is_a_shape_beside_the_volume(self):
+        header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        meshes = [self.send(name, (header + f"{x} 0 0\n{x + 9} 0 0\n{x} 9 9\n3 0 1 2\n").encode()) for name, x in (("left.ply", 0), ("right.ply", 4))]
+        wait_until(lambda: {each["name"] for each in self.gateway.json("/api/v1/datasets")[1]["datasets"] if each["is_shape"]} == {"left", "right"}, "they are listed as shapes")
+        looks = ["left,color=red", "right,color=#0000ff,opacity=0.5"]
+        status, _, by_query = self.get("/api/v1/render.png", dataset="a", size=32, fit="true", shape=looks)
+        self.assertEqual(status, 200, by_query[:300])
+        body = json.dumps({"dataset": "a", "size": 32, "fit": True, "shape": looks}).encode()
+        status, _, by_body = self.gateway.request("/api/v1/render.png", method="POST", body=body)
+        self.assertEqual(status, 200, by_body[:300])
+        self.assertEqual(png_pixels(by_query), png_pixels(by_body))
+        self.assertNotEqual(png_pixels(by_query), png_pixels(self.get("/api/v1/render.png", dataset="a", size=32, fit="true")[2]))
+        self.assertIn("--shape", self.gateway.json("/api/v1/command?" + urllib.parse.urlencode({"dataset": "a", "shape": looks}, doseq=True))[1]["command"])
+        described = self.gateway.json("/api/v1/openapi.json")[1]
+        self.assertIn("shape", [each.get("name") for each in described["paths"]["/api/v1/render.png"]["get"]["parameters"]])
+        for look, sentence in (("left,colour=red", "must have one of: color, opacity"), ("nobody", "nobody"), ("a", "a")):
+            status, _, answer = self.get("/api/v1/render.png", dataset="a", size=16, shape=look)
+            self.assertIn(status, (400, 404), look)
+            self.assertIn(sentence, json.loads(answer)["error"])
+        for upload, _ in meshes:
+            self.post(upload=upload, drop="true")
+
     def test_what_is_no_volume_is_refused_without_paths(self):
         upload, name = self.send("notes.nrrd", b"NRRD0004\nnonsense\n")
         status, body = self.gateway.json(f"/api/v1/histogram?dataset={name}")

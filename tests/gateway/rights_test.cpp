@@ -33,6 +33,12 @@ TEST(AccessTokenTest, SaysWhatItsHolderMayUntilItExpires) {
   EXPECT_EQ(CheckAccess(kByOthers, kSecret, kNow).value(), (Access{.until = kNow + 60, .datasets = {{"head"}}, .view_only = true}));
 }
 
+TEST(RightsTest, ShapesAreDatasetsThatRequestsName) {
+  const PictureFields fields = {{"dataset", "head"},       {"size", "32"}, {"shape", "lung,color=red"}, {"mesh", "a\\,b"},
+                                {"lines", "x,colour=red"}, {"points", "p"}};
+  EXPECT_EQ(NamedDatasets(fields), (std::vector<std::string>{"head", "lung", "a,b", "p"}));
+}
+
 TEST(AccessTokenTest, AnyOtherByteMakesItWrong) {
   const std::string token = Signed({.until = kNow + 9, .datasets = {{"head"}}, .view_only = true});
   const std::string why = CheckAccess("", kSecret, kNow).status().message();

@@ -62,7 +62,7 @@ class Documents(InAFolder):
         self.assertEqual(len(list(self.folder.glob("turn_*.png"))), 12)
         self.assertEqual(names["there"].value, volume_arrays()[0][names["there"].index])
         self.assertIsNotNone(names["seen"])
-        for name in ("image", "front", "above", "planes", "surface", "preview", "left", "right"):
+        for name in ("image", "front", "above", "planes", "surface", "preview", "left", "right", "shaped"):
             self.assertGreater(np.asarray(names[name])[..., :3].max(), 50, name)
             if KEEP:
                 names[name].save(f"{KEEP}/{name}.png")

@@ -60,6 +60,13 @@ def write_grid(path):
     path.write_text("\n".join(lines) + "\n")
 
 
+def ply_box(low, high):
+    corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return "\n".join(["ply", "format ascii 1.0", "element vertex 8", *(f"property float {axis}" for axis in "xyz"), "element face 6", "property list uchar int vertex_indices", "end_header",
+                      *(" ".join(map(str, c)) for c in corners), *("4 " + " ".join(map(str, q)) for q in quads), ""])
+
+
 # Runs before the page: it believes that "patient" has more than this file, and what it asks of that is kept from the gateway.
 MORE = """
 const more = ARGUMENT, send = WebSocket.prototype.send, parse = JSON.parse, json = Response.prototype.json;
@@ -102,7 +109,9 @@ class PageTest(unittest.TestCase):
         dyes = "NRRD0004\ntype: uint8\ndimension: 5\nsizes: 22 26 18 3 2\nkinds: domain domain domain time vector\nencoding: raw\n\n"
         dyes = dyes.encode() + bytes(ball(i + 2 * t, j, k) if c == 0 else 9 * k for c in range(2) for t in range(3) for k in range(18) for j in range(26) for i in range(22))
         (cls.programs.folder / "dyes.nrrd").write_bytes(dyes)
-        cls.data = ("--data", "dyes=dyes.nrrd", "--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
+        (cls.programs.folder / "plate.ply").write_text(ply_box((-30, 5, -30), (30, 12, 25)))
+        (cls.programs.folder / "dots.csv").write_text("x,y,z\n" + "".join(f"{20 * math.cos(i / 20)},{20 * math.sin(i / 20)},{i / 8 - 20}\n" for i in range(250)))
+        cls.data = ("--data", "plate=plate.ply", "--data", "dots=dots.csv", "--data", "dyes=dyes.nrrd", "--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -1020,6 +1029,39 @@ class PageTest(unittest.TestCase):
         viewer.js(drop, "", "empty.nii")
         viewer.until("document.querySelector('.message.error')?.textContent.includes('empty.nii: the file is empty')")
 
+    def test_shapes_show_beside_the_volume(self):
+        viewer = self.viewer(azimuth=150, elevation=20)
+        viewer.settled()
+        without = viewer.pixels()
+        offered = viewer.js("[...document.querySelectorAll('.dataset option')].map(o => o.value)")
+        self.assertEqual({"plate", "dots", "patient"} & set(offered), {"patient"})
+        viewer.open_section("Shapes")
+        for name in ("plate", "dots"):
+            viewer.find(f"[data-shape={name}] .icon-button").click()
+        drawn = viewer.final("o.shape?.join() === 'plate,dots'")
+        self.assertNotEqual(viewer.pixels(), without)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("!document.querySelector('[aria-label=\"Width of dots\"]').closest('.row').hidden")
+        self.assertTrue(viewer.js("document.querySelector('[aria-label=\"Width of plate\"]').closest('.row').hidden"))
+        put = "((name, value) => { const i = document.querySelector(`input[aria-label='${name}']`); i.value = value; i.dispatchEvent(new Event('input', {bubbles: true})); return true; })(arguments[0], arguments[1])"
+        for name, value in (("Width of dots", "7"), ("Colour of dots", "#ff4040"), ("Opacity of plate", "0.4")):
+            viewer.js(put, name, value)
+        drawn = viewer.final("o.shape?.[0] === 'plate,opacity=0.4' && o.shape[1] === 'dots,color=#ff4040,width=7px'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "shapes")
+        viewer.find("[data-shape=plate] .icon-button").click()
+        viewer.final("o.shape?.length === 1")
+        link = viewer.js("location.hash")
+        self.assertIn("shape=plate,shown=0,opacity=0.4;dots,color=#ff4040,width=7px", urllib.parse.unquote(link))
+        other = self.viewer(azimuth=150, elevation=20, shape="plate,shown=0,opacity=0.4;dots,color=#ff4040,width=7px")
+        self.assertEqual(other.final("o['look-at'] !== undefined")["options"]["shape"], ["dots,color=#ff4040,width=7px"])
+        viewer.focus()
+        drop = """(() => { const d = new DataTransfer(); d.items.add(new File([arguments[0]], arguments[1]));
+            document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"""
+        viewer.js(drop, ply_box((0, -30, 0), (12, -20, 12)), "my cube.ply")
+        self.assertEqual(viewer.final("o.shape?.length === 2")["options"]["shape"][1], "my_cube")
+        self.assertEqual(viewer.js("document.querySelector('.dataset select').value"), "patient")
+
     def test_a_large_file_is_sent_with_a_bar_and_can_be_given_up(self):
         viewer = self.viewer(self.proxy(delay=0.2).port)
         viewer.settled()
@@ -1056,7 +1098,7 @@ class PageTest(unittest.TestCase):
             viewer.find("dialog [aria-label^=Close]").click()
             viewer.js(drop, "a.nrrd", "nothing")
             viewer.until("offered")
-            self.assertEqual(viewer.js("offered"), "Drop a volume or a colour map" if sends else "Drop a colour map")
+            self.assertEqual(viewer.js("offered"), "Drop a volume, a shape or a colour map" if sends else "Drop a colour map")
             if not sends:
                 viewer.until("document.querySelector('.message.error')?.textContent === 'a.nrrd is not sent: you may not send files here.'")
                 self.assertEqual(viewer.js("asked.filter(address => address.includes('upload'))"), [])

@@ -6,7 +6,7 @@ export type SlabViewSetting =
   | "renderer" | "shading" | "light" | "shadows" | "ambient-occlusion" | "background"
   | "transfer" | "function" | "scalar-range" | "opacity-distance" | "gradient-opacity" | "isovalue" | "surfaces-alone"
   | "clip-box" | "clip-plane" | "clip-mode" | "label-mode" | "label-tint" | "label-surface" | "labels-shown" | "label-opacity"
-  | "overlay" | "channel" | "channel-transfer" | "channel-color" | "channel-range" | "channel-gamma" | "channel-opacity" | "blend"
+  | "shape" | "overlay" | "channel" | "channel-transfer" | "channel-color" | "channel-range" | "channel-gamma" | "channel-opacity" | "blend"
   | "layout" | "at" | "window" | "level" | "measure" | "path" | "legend" | "orientation-marker" | "scale-bar" | "axes" | "color-bar" | "machine";
 
 type Known<T> = { readonly [name in SlabViewSetting]?: T };

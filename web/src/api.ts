@@ -25,6 +25,7 @@ export interface Dataset {
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
   layers?: { labels: number | boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
   fields?: Field[]; times?: Times; field?: number; time?: number; // absent: one field, one time
+  is_shape?: boolean; shape?: { kind: "mesh" | "lines" | "points" }; // `shape`: of one that is ready
   simulation?: Simulation; // whose processes hold the voxels
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }

@@ -29,6 +29,7 @@ export function carried(state: State, from: Volume, to: Volume): Partial<State> 
   // Places.
   const cutsThrough = ([low, high]: Bounds, i: number): boolean => overlap([low ?? -Infinity, high ?? Infinity], [to.low[i] as number, to.high[i] as number]);
   if (state.clipBox && !(sameWorld && state.clipBox.every(cutsThrough))) patch.clipBox = null;
+  if (!sameWorld && state.shapes.length > 0) patch.shapes = [];
   if (!sameWorld && state.clipPlanes.length > 0) patch.clipPlanes = [];
   if (state.crosshair && !(sameWorld && inside(state.crosshair, to))) patch.crosshair = null;
   const measures = sameWorld ? state.measures.filter(({ points }) => points.every(p => inside(p, to))) : [];

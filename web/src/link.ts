@@ -5,6 +5,7 @@ import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import type { Offers } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST_KEY_FRAMES, type SlopePoint, type State, type Surface } from "./state";
 import { cornersOf, isArea, MOST_REGIONS, type Region } from "./regions";
+import { shapesIn, shapesText } from "./shapes";
 import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
 import type { SlabViewSetting } from "../package/slab-view";
@@ -153,6 +154,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
   labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelSurface: oneOf("label-surface", "blocky", "smooth"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: each("label-opacity", /^\d+$/, share),
+  shapes: { name: "shape", write: shapesText, read: shapesIn },
   overlay: flag("overlay"), channels: nullable(channels), channelTransfers: each(NAMES.channelTransfers, CHANNEL, transfer), channelColors: each(NAMES.channelColors, CHANNEL, text("", COLOR)), channelRanges: each(NAMES.channelRanges, CHANNEL, range("")),
   channelGammas: each(NAMES.channelGammas, CHANNEL, within("", () => GAMMAS)), channelOpacities: each(NAMES.channelOpacities, CHANNEL, share), blend: oneOf(NAMES.blend, "auto", "add", "over", "max"),
   time: text(NAMES.time, /^(last|\d{1,9}|[\d.]+[a-zµ]{1,3})$/),

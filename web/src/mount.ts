@@ -32,6 +32,7 @@ import { Player } from "./player";
 import { Pointed } from "./pointed";
 import { type Actions, Shell } from "./shell";
 import { Sending } from "./sending";
+import { shapesSection, showShape } from "./shapes_section";
 import { simulationSection } from "./simulation_section";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
@@ -81,7 +82,9 @@ class Assembly {
   private starts: boolean; // the view has not been chosen yet
   private asking = ""; // the dataset that is being asked about
   private refused = false; // a view of the dataset
+  private sent = ""; // a file of the user's that has become a dataset, until the gateway lists it
   private listed: readonly Dataset[] = []; // as the gateway told last
+  private readonly shapes: ReturnType<typeof shapesSection>;
   private readonly simulation: ReturnType<typeof simulationSection>;
   private simulated: number | undefined; // the time that the simulation was at, as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
@@ -101,7 +104,7 @@ class Assembly {
     this.measuring = new Measuring(context);
     this.measures = measureSection(context, this.measuring);
     this.pointed = new Pointed(context, label => labels.note(label));
-    this.sending = new Sending(api, context.say, name => this.showDataset(name));
+    this.sending = new Sending(api, context.say, name => { this.sent = name; this.showSent(); });
     this.shell = new Shell(element, isPage, this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.player.element, this.machine.element, this.sending.element);
     const editor = new TransferEditor(context, source, histograms);
     this.clipping = clipSection(context);
@@ -110,7 +113,8 @@ class Assembly {
     bar.set(store.state.colorBar);
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
     this.simulation = simulationSection(context);
-    this.shell.panel.append(this.simulation.element, channelsSection(context, ranges, histograms), functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
+    this.shapes = shapesSection(context);
+    this.shell.panel.append(this.simulation.element, channelsSection(context, ranges, histograms), functions, this.shapes.element, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), labelsSection(context, labels), lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, ranges, {
       drawn: ({ frame: { header, view } }) => { notices.onFrame(header.statistics.missing); this.machine.onFrame(header.statistics); this.know(); this.player.drawn(view.options); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; this.player.pause(); notices.onError(message); host.error?.(message); },
@@ -178,7 +182,7 @@ class Assembly {
   private onStatus(status: ServiceStatus): void {
     this.notices.onStatus(status);
     this.machine.onStatus(status);
-    const { dataset } = this.store.state, first = status.datasets[0];
+    const { dataset } = this.store.state, volumes = status.datasets.filter(each => !each.is_shape), first = volumes[0];
     if (!dataset && first) this.store.update({ dataset: first.name });
     this.listed = status.datasets;
     const shown = this.volume && this.listed.find(each => each.name === dataset), count = timesOf(shown ?? null).count;
@@ -188,7 +192,9 @@ class Assembly {
       this.player.refresh();
     }
     this.follow(this.listed.find(each => each.name === dataset));
-    this.shell.showDatasets(status.datasets, this.store.state.dataset);
+    this.shapes.set(status.datasets);
+    this.shell.showDatasets(volumes, this.store.state.dataset);
+    this.showSent();
     this.know();
   }
 
@@ -208,6 +214,16 @@ class Assembly {
     this.starts = !this.left;
     this.offers.noteDataset(this.listed.find(each => each.name === name), true);
     this.store.update({ dataset: name });
+  }
+
+  // A file that has become a dataset: a shape shows beside the volume.
+  private showSent(): void {
+    const sent = this.listed.find(each => each.name === this.sent);
+    if (!sent) return;
+    this.sent = "";
+    if (!sent.is_shape) return this.showDataset(sent.name);
+    showShape(this.context, sent.name);
+    this.say(this.store.state.dataset ? `${sent.name} shows beside the volume.` : `${sent.name} shows as soon as a volume is open.`);
   }
 
   private forgetVolume(): void {
@@ -355,7 +371,7 @@ class Assembly {
     ];
   }
 
-  // A file that is dropped or chosen: a colour map, or else a volume, if the token lets one be sent.
+  // A file that is dropped or chosen: a colour map, or else a volume or a shape, if the token lets one be sent.
   private takesFiles(editor: TransferEditor): void {
     const sends = this.offers.may("send");
     const take = (file: File | undefined): void => {
@@ -365,7 +381,7 @@ class Assembly {
     };
     this.file.addEventListener("change", () => { take(this.file.files?.[0]); this.file.value = ""; });
     const { element } = this;
-    element.addEventListener("dragover", event => { event.preventDefault(); element.dataset["drop"] = sends ? "Drop a volume or a colour map" : "Drop a colour map"; });
+    element.addEventListener("dragover", event => { event.preventDefault(); element.dataset["drop"] = sends ? "Drop a volume, a shape or a colour map" : "Drop a colour map"; });
     element.addEventListener("dragleave", event => { if (!(event.relatedTarget instanceof Node && element.contains(event.relatedTarget))) delete element.dataset["drop"]; });
     element.addEventListener("drop", event => {
       event.preventDefault();

@@ -3,6 +3,7 @@ import type { Options } from "./api";
 import { channelOptions } from "./channels";
 import { boxText, slopeText } from "./link";
 import type { Offers } from "./offers";
+import { shapeOptions } from "./shapes";
 import type { State } from "./state";
 import { timeOptions } from "./times";
 import { toParaView } from "./transfer";
@@ -62,6 +63,8 @@ export function renderOptions(offers: Offers, state: State): Options {
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
+  const shapes = offers.can("shapes", renderer) ? shapeOptions(state.shapes) : [];
+  if (shapes.length > 0) options["shape"] = shapes;
   if (offers.can("labels", renderer)) Object.assign(options, labelOptions(offers, state, true));
   return options;
 }

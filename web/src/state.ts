@@ -1,6 +1,7 @@
 // What a viewer shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
 import { PATIENT_START, type Viewpoint } from "./camera";
 import type { Measure } from "./measure";
+import type { ShownShape } from "./shapes";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
 
@@ -40,6 +41,7 @@ export interface State extends Viewpoint {
   labelSurface: "blocky" | "smooth"; // of labels that are "surface"
   labelsShown: string; // as 1,5-9,Precentral_L,Temporal_*; empty: all
   labelOpacities: Readonly<Record<string, number>>;
+  shapes: readonly ShownShape[]; // that show, or have a look
   overlay: boolean; // it shows
   // Channels, by number or name, and the overlay. Those that a record does not name look as the dataset says.
   channels: readonly string[] | null; // which show; null: as the dataset says
@@ -73,7 +75,7 @@ export const INITIAL: State = {
   renderer: "", parameters: {}, shading: "phong", lights: [], shadows: 0, ambientOcclusion: 0, background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
-  labels: "off", labelTint: 0.5, labelSurface: "blocky", labelsShown: "", labelOpacities: {},
+  labels: "off", labelTint: 0.5, labelSurface: "blocky", labelsShown: "", labelOpacities: {}, shapes: [],
   overlay: false, channels: null, channelTransfers: {}, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
   layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
   marker: true, scaleBar: true, axes: "off", colorBar: false, machine: false,
@@ -81,7 +83,7 @@ export const INITIAL: State = {
 
 // What undo brings back: the look, not the place from which one looks.
 export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
-  "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelSurface", "labelsShown", "labelOpacities", "overlay",
+  "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelSurface", "labelsShown", "labelOpacities", "shapes", "overlay",
   "channels", "channelTransfers", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "measures", "path"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
