@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/frame/frame_unit.h"
+#include "common/math/row4.h"
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/framing.h"
 #include "common/planning/placement.h"
@@ -69,8 +70,7 @@ double FarthestDepth(const FrameSetup& setup) {
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3 p = {(corner & 1 ? shape.high : shape.low).x, (corner & 2 ? shape.high : shape.low).y,
                       (corner & 4 ? shape.high : shape.low).z};
-      const auto& row = setup.camera.depth_row;
-      farthest = std::max(farthest, row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]);
+      farthest = std::max(farthest, Apply(setup.camera.depth_row, p));
     }
   }
   return farthest;

@@ -216,12 +216,10 @@ Result<ShapeLook> LookOfShape(const ShapeChoice& choice, const CoarserVolume& da
   }
   look.coloring = ShapeColoring::kValues;
   const std::string_view name = choice.map.empty() ? kStandardShapeMap : std::string_view(choice.map);
-  const auto map = std::ranges::find(NamedColorMaps(), name, &ColorMap::name);
-  if (map == NamedColorMaps().end()) {
-    std::vector<std::string_view> names;
-    for (const ColorMap& each : NamedColorMaps()) names.push_back(each.name);
+  const ColorMap* const map = FindNamed(NamedColorMaps(), name);
+  if (map == nullptr) {
     return Status::InvalidArgument(
-        fmt::format("shape '{}' has map '{}', but must have one of: {}", choice.shape, choice.map, fmt::join(names, ", ")));
+        fmt::format("shape '{}' has map '{}', but must have one of: {}", choice.shape, choice.map, NamesOf(NamedColorMaps())));
   }
   if (choice.range && choice.range->percentiles) {
     return Status::InvalidArgument(fmt::format("shape '{}' has a range of percentiles, but must have one of values", choice.shape));

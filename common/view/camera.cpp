@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/math/row4.h"
 #include "common/view/supersampled_voxel.h"
 
 namespace slabstream {
@@ -109,8 +110,6 @@ std::array<double, 4> Row(const Vec3& direction, double scale, double offset, co
   const Vec3 row = scale * (direction * spacing);
   return {row.x, row.y, row.z, offset - Dot(row, centre)};
 }
-
-double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
 
 Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]}; }
 

@@ -13,15 +13,12 @@ namespace slabstream {
 
 void DatasetMachine::State::On(const SeekDataset& event) {
   const std::string& name = event.request->dataset;
-  std::vector<std::string> named = {name};
-  for (const ShapeChoice& shape : event.request->shapes) named.push_back(shape.shape);
-  for (const std::string& each : named) {
-    if (!IsPart(each) && !(datasets.folders.empty() && datasets.Find(each) == nullptr)) continue;
-    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(each), &RefusedRequests::unknown_dataset};
+  if (const Status known = CheckKnown(name, event.request.get()); !known.ok()) {
+    news.uses[event.use] = DatasetLost{known, &RefusedRequests::unknown_dataset};
     return;
   }
   Use sought{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}};
-  for (std::size_t i = 1; i < named.size(); ++i) sought.shapes.push_back({named[i], Seek(named[i])});
+  for (const ShapeChoice& shape : event.request->shapes) sought.shapes.push_back({shape.shape, Seek(shape.shape)});
   const auto use = uses.insert_or_assign(event.use, std::move(sought)).first;
   if (const Status found = Advance(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
@@ -71,6 +68,16 @@ void DatasetMachine::State::On(const FinishStatus& event) {
 void DatasetMachine::State::On(const EndDatasets& event) {
   for (const auto& [id, open] : questions) RefuseQuestion(open, Status::Unavailable(event.reason));
   stopped = true;
+}
+
+Status DatasetMachine::State::CheckKnown(const std::string& name, const FrameRequest* frame) const {
+  const auto unknown = [&](const std::string& each) {
+    return IsPart(each) || (datasets.folders.empty() && datasets.Find(each) == nullptr);
+  };
+  if (unknown(name)) return datasets.NoSuchDataset(name);
+  if (frame == nullptr) return Status::Ok();
+  const auto shape = std::ranges::find_if(frame->shapes, unknown, &ShapeChoice::shape);
+  return shape == frame->shapes.end() ? Status::Ok() : datasets.NoSuchDataset(shape->shape);
 }
 
 // Sees to it that the dataset is loaded as its files are now. The check of them that must be over before; 0: none.

@@ -27,17 +27,15 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
         open, Status::ResourceExhausted(fmt::format("{} questions are open, which is the limit of {}",
                                                     own ? std::size_t(of_client) : questions.size(), own ? "a client" : "the service")));
   }
-  std::vector<std::string> named = {name};
-  if (const FrameRequest* const frame = FrameOf(question)) {
-    for (const ShapeChoice& shape : frame->shapes) named.push_back(shape.shape);
-  }
-  for (const std::string& each : named) {
-    if (!IsPart(each) && !(datasets.folders.empty() && datasets.Find(each) == nullptr)) continue;
+  const FrameRequest* const frame = FrameOf(question);
+  if (const Status known = CheckKnown(name, frame); !known.ok()) {
     ++refused.unknown_dataset;
-    return RefuseQuestion(open, datasets.NoSuchDataset(each));
+    return RefuseQuestion(open, known);
   }
   open.check = Seek(name);
-  for (std::size_t i = 1; i < named.size(); ++i) open.shapes.push_back({named[i], Seek(named[i])});
+  for (std::size_t i = 0; frame != nullptr && i < frame->shapes.size(); ++i) {
+    open.shapes.push_back({frame->shapes[i].shape, Seek(frame->shapes[i].shape)});
+  }
   questions.emplace(++last_question, std::move(open));
 }
 

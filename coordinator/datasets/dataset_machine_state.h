@@ -153,6 +153,8 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);
 
   // ---- requests
+  // NotFound: this dataset is neither known nor may be found in a folder, or a shape of the picture is not. `frame`: null: it shows none.
+  Status CheckKnown(const std::string& name, const FrameRequest* frame) const;
   CheckId Seek(const std::string& name);
   Status Advance(Use& use);
   Status SeekSources(Use& use);

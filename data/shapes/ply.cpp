@@ -2,10 +2,10 @@
 // elements hold is left out.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <utility>
 
+#include "common/base/second_of.h"
 #include "data/shapes/parsing.h"
 #include "data/shapes/shape_formats.h"
 
@@ -33,8 +33,8 @@ std::optional<SampleType> TypeNamed(std::string_view name) {
                                                                                  {"uint", SampleType::kUint32},
                                                                                  {"float", SampleType::kFloat32},
                                                                                  {"double", SampleType::kFloat64}}};
-  const auto* const found = std::ranges::find(kOldNames, name, [](const auto& each) { return each.first; });
-  return found == kOldNames.end() ? SampleTypeNamed(name) : std::optional(found->second);
+  const std::optional<SampleType> found = SecondOf(kOldNames, name);
+  return found ? found : SampleTypeNamed(name);
 }
 
 class PlyReader {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/base/second_of.h"
 #include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/structured_grid.h"
@@ -45,9 +46,9 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions&) {
     if (!numbers->ok()) return numbers->status();
   }
   const std::string type = Word(text, "data_format", "byte"), components = Word(text, "data_components", "1");
-  const auto* const named = std::ranges::find(kTypes, type, [](const auto& entry) { return entry.first; });
-  if (named == kTypes.end()) return text.NotAVolume(fmt::format("DATA_FORMAT is '{}', must be BYTE, SHORT, INT, FLOAT or DOUBLE", type));
-  header.type = named->second;
+  const std::optional<SampleType> named = SecondOf(kTypes, type);
+  if (!named) return text.NotAVolume(fmt::format("DATA_FORMAT is '{}', must be BYTE, SHORT, INT, FLOAT or DOUBLE", type));
+  header.type = *named;
   header.components = components == "complex" ? 2 : ParseNumber<int>(components).value_or(0);
   if (header.components < 1 || header.components > kMaxComponents) {
     return text.NotAVolume(fmt::format("DATA_COMPONENTS is '{}', must be in [1, {}]", components, kMaxComponents));

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/second_of.h"
 #include "data/volume_io/binary_header.h"
 #include "data/volume_io/formats.h"
 
@@ -49,12 +50,12 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   const BinaryHeader fields(bytes, true);
   const auto integer = [&](std::size_t offset) { return fields.At<std::int32_t>(offset); };
   if (integer(0) != 1) return wrong(fmt::format("not an MGH volume: the version is {}, must be 1", integer(0)));
-  const auto* const type = std::ranges::find(kTypes, integer(20), [](const auto& entry) { return entry.first; });
-  if (type == kTypes.end()) {
+  const std::optional<SampleType> type = SecondOf(kTypes, integer(20));
+  if (!type) {
     return wrong(
         fmt::format("MGH type {} is not supported; supported: 0, 1, 3, 4 and 10 (uint8, int32, float32, int16, uint16)", integer(20)));
   }
-  RawHeader header{.type = type->second};
+  RawHeader header{.type = *type};
   const std::vector<double> sizes = {double(integer(4)), double(integer(8)), double(integer(12)), double(integer(16))};
   if (Status status = SetSize(header, path, sizes, options); !status.ok()) return status;
   Place(fields, header);

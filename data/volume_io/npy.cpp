@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/second_of.h"
 #include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/output.h"
@@ -46,9 +47,8 @@ std::optional<Dtype> ParseDtype(std::string_view text) {
   if (text.size() != 3 || std::string_view("<>|=").find(text.front()) == std::string_view::npos) return std::nullopt;
   const bool big_endian = text.front() == '>';
   text.remove_prefix(1);
-  const auto* const found = std::ranges::find(kTypes, text, [](const auto& entry) { return entry.first; });
-  if (found == kTypes.end()) return std::nullopt;
-  return Dtype{found->second, big_endian};
+  const std::optional<SampleType> type = SecondOf(kTypes, text);
+  return type ? std::optional(Dtype{*type, big_endian}) : std::nullopt;
 }
 
 // What stands behind 'key': in the header's dictionary, up to the end of `closing`, or up to the next comma if that is empty.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/second_of.h"
 #include "common/text/parse_number.h"
 #include "data/volume_io/payload.h"
 #include "data/volume_io/raw_volume.h"
@@ -39,8 +40,7 @@ std::optional<SampleType> ToSampleType(std::string_view name) {
                                                                                           {"vtktypeuint64", SampleType::kUint64},
                                                                                           {"float", SampleType::kFloat32},
                                                                                           {"double", SampleType::kFloat64}}};
-  const auto* const found = std::ranges::find(kTypeNames, name, [](const auto& entry) { return entry.first; });
-  return found == kTypeNames.end() ? std::nullopt : std::optional(found->second);
+  return SecondOf(kTypeNames, name);
 }
 
 constexpr std::string_view kBits = "bit", kTexts = "string";

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/base/second_of.h"
 #include "common/files/files.h"
 #include "common/text/base64.h"
 #include "common/text/parse_number.h"
@@ -309,10 +310,9 @@ GridArray VtkXmlFile::Described(const VtkArray& array) const {
   const bool of_points = array.section == "PointData";
   const std::string& active = ActiveScalars(array.section);
   const std::string type_name = array.tag.Attribute("type"), components = array.tag.Attribute("NumberOfComponents");
-  const auto* const type = std::ranges::find(kTypes, type_name, [](const auto& entry) { return entry.first; });
   return {.name = array.name(),
           .at = of_points ? ValuesAt::kPoints : ValuesAt::kCells,
-          .type = type == kTypes.end() ? std::nullopt : std::optional(type->second),
+          .type = SecondOf(kTypes, type_name),
           .type_name = type_name,
           .components = components.empty() ? 1 : ParseNumber<int>(components).value_or(0),
           .active = !active.empty() && active == array.name()};

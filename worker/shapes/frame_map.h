@@ -8,11 +8,9 @@
 #include <array>
 
 #include "common/frame/frame_setup.h"
+#include "common/math/row4.h"
 
 namespace slabstream {
-
-using Row4 = std::array<double, 4>;
-inline double Apply(const Row4& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
 
 struct FrameMap {
   Row4 x{}, y{}, w{}, depth{};

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/row4.h"
+
 namespace slabstream {
 namespace {
 
 constexpr double kReach = 0.501;  // voxels from a face's centre to the edge of what it covers, a little more than kFaceReach
-
-double Apply(const std::array<double, 4>& row, const Vec3& p) { return row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]; }
 
 std::int32_t ToPixel(double x, std::int32_t limit) { return std::int32_t(std::clamp(std::ceil(x), 0.0, double(limit))); }
 
