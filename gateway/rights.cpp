@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "client/request/request_options.h"
 #include "client/request/values.h"
 #include "common/base/printable.h"
 
@@ -32,7 +33,8 @@ std::vector<std::string> NamedDatasets(const PictureFields& fields) {
   std::vector<std::string> named;
   for (const auto& [name, text] : fields) {
     if (name == "dataset") named.push_back(text);
-    if (name != "shape" && name != "mesh" && name != "lines" && name != "points") continue;
+    const RequestOption* const option = FindRequestOption(name);
+    if (option == nullptr || option->path != "shapes") continue;
     const Result<ShapeChoice> shape = ParseShape(name, text);
     if (shape.ok()) named.push_back(shape->shape);  // what is wrong is refused by whoever makes the picture
   }

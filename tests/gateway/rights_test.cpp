@@ -34,9 +34,9 @@ TEST(AccessTokenTest, SaysWhatItsHolderMayUntilItExpires) {
 }
 
 TEST(RightsTest, ShapesAreDatasetsThatRequestsName) {
-  const PictureFields fields = {{"dataset", "head"},       {"size", "32"}, {"shape", "lung,color=red"}, {"mesh", "a\\,b"},
-                                {"lines", "x,colour=red"}, {"points", "p"}};
-  EXPECT_EQ(NamedDatasets(fields), (std::vector<std::string>{"head", "lung", "a,b", "p"}));
+  const PictureFields fields = {{"dataset", "head"}, {"size", "32"},     {"shape", "lung,color=red"},
+                                {"shape", "a\\,b"},  {"plane", "axial"}, {"shape", "x,colour=red"}};
+  EXPECT_EQ(NamedDatasets(fields), (std::vector<std::string>{"head", "lung", "a,b"}));
 }
 
 TEST(AccessTokenTest, AnyOtherByteMakesItWrong) {
