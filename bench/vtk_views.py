@@ -127,10 +127,29 @@ def make_grid_mapper(vtk, kind, threads):
     return mapper
 
 
+def make_mesh(vtk, scene, path, color):
+    """An opaque mesh, lit as ours is: by the picture's shading."""
+    reader = vtk.vtkPLYReader()
+    reader.SetFileName(path)
+    mapper = vtk.vtkPolyDataMapper()
+    mapper.SetInputConnection(reader.GetOutputPort())
+    mapper.ScalarVisibilityOff()
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    prop, shading = actor.GetProperty(), scene["shading"]
+    prop.SetColor(*(int(color[i:i + 2], 16) / 255 for i in (0, 2, 4)))
+    prop.SetInterpolationToPhong()
+    prop.SetAmbient(shading["ambient"])
+    prop.SetDiffuse(shading["diffuse"])
+    prop.SetSpecular(shading["specular"])
+    prop.SetSpecularPower(shading["shininess"])
+    return actor
+
+
 class Stage:
     """The window with the volume in it, and the turntable's camera: Slabstream's views (common/view/camera.h), in VTK's terms."""
 
-    def __init__(self, vtk, scene, image, preset, mapper_kind, threads, jpeg=0):
+    def __init__(self, vtk, scene, image, preset, mapper_kind, threads, jpeg=0, mesh=None):
         dims, spacing = image.GetDimensions(), image.GetSpacing()
         self.views, self.size = scene["views"], scene["size"]
         self.rays_at_corners = "grid" in scene  # of pixels: where VTK's mappers of grids have them; ours, and its others, at their centres
@@ -150,6 +169,8 @@ class Stage:
         self.renderer = vtk.vtkRenderer()
         self.renderer.SetBackground(0, 0, 0)
         self.renderer.AddVolume(volume)
+        if mesh:
+            self.renderer.AddActor(mesh)
         headlight = vtk.vtkLight()  # as VTK adds one by itself, but with ambient light, of which that has none
         headlight.SetLightTypeToHeadlight()
         headlight.SetAmbientColor(1, 1, 1)
@@ -218,6 +239,8 @@ def main():
     p.add_argument("--views", type=int, metavar="N", help="a single turn of its first N views; 0: only pictures")
     p.add_argument("--jpeg", type=int, default=0, metavar="QUALITY", help="encode each frame")
     p.add_argument("--projection", choices=["orthographic", "perspective"], help="only this one")
+    p.add_argument("--mesh", metavar="FILE.ply", help="an opaque mesh beside the volume")
+    p.add_argument("--mesh-color", default="ffffff", metavar="RRGGBB")
     p.add_argument("--pictures", metavar="PREFIX", help="write the first view of each projection to PREFIX.PROJECTION.png")
     a = p.parse_args()
     os.environ["LP_NUM_THREADS"] = str(a.threads)  # of Mesa's software rasteriser, which draws for the gpu mapper; read when VTK is loaded
@@ -233,7 +256,7 @@ def main():
     with open(os.path.join(directory, scene["transfer"]), encoding="utf-8") as stream:
         preset = json.load(stream)[0]
     image = read_volume(vtk, os.path.join(directory, scene["volume"]))
-    stage = Stage(vtk, scene, image, preset, a.mapper or next(iter(kinds)), a.threads, a.jpeg)
+    stage = Stage(vtk, scene, image, preset, a.mapper or next(iter(kinds)), a.threads, a.jpeg, a.mesh and make_mesh(vtk, scene, a.mesh, a.mesh_color))
     projections = [a.projection] if a.projection else scene["views"]["projections"]
     warm_up = [stage.frame_ms(projection, 0) for projection in projections if a.views != 0]
     times = {projection: [] for projection in projections}

@@ -10,6 +10,7 @@
 #include "client/cli/laboratory.h"
 #include "client/cli/option_groups.h"
 #include "client/movie/turntable.h"
+#include "client/request/values.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
 #include "common/cli/program.h"
@@ -63,6 +64,15 @@ void DeclareBench(const CommandLine& line) {
       .Range({rate.least, rate.most})
       .TypeName("NUMBER")
       .Default("1 for spheres, otherwise the renderer's own");
+  sub.AddOption(
+         "--shape",
+         [options](const std::string& option, const std::vector<std::string>& texts) {
+           Result<ShapeChoice> shape = ParseShape(option, texts.back());
+           if (shape.ok()) options->shapes = {*std::move(shape)};
+           return shape.status();
+         },
+         "Show a mesh, lines or points beside the volume, as `slabstream render` does")
+      .TypeName("SHAPE");
   sub.AddText("--json", options->json_path, "Write all figures and the machine as JSON").TypeName("FILE");
   sub.AddText("--pictures", options->pictures_directory, "Write the first view of each projection to DIR, after measuring").TypeName("DIR");
   sub.AddText("--export", options->export_directory, "Measure nothing; write volumes, transfer functions and views for other renderers")

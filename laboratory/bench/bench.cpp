@@ -74,21 +74,23 @@ Status PrepareOutputs(const BenchOptions& options) {
   return MakeDirectory("--export", options.export_directory);
 }
 
-Result<ServiceConnection> Connect(const BenchCase& c, const ConnectionOptions& connection) {
+Result<ServiceConnection> Connect(const BenchCase& c, const ConnectionOptions& connection, std::span<const ShapeChoice> shapes) {
   if (connection.local_workers == 0) return ServiceConnection::Open(connection, c.dataset);
-  if (const auto* path = std::get_if<std::string>(&c.volume)) return ServiceConnection::Open(connection, *path);
+  if (const auto* path = std::get_if<std::string>(&c.volume)) return ServiceConnection::Open(connection, {path, 1}, {}, shapes);
   // A sphere is made beforehand, so that the first frame's time is the service's own. Only the service keeps it.
   Result<std::shared_ptr<const Volume>> sphere = LoadBenchVolume(c);
   if (!sphere.ok()) return sphere.status();
   return ServiceConnection::OpenLocal(connection, {[c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
                                         if (made == nullptr) return LoadBenchVolume(c);
                                         return std::exchange(made, nullptr);
-                                      }});
+                                      }},
+                                      shapes);
 }
 
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
   FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), {}, {}};
   job.request.dataset = dataset;
+  job.request.shapes = options.shapes;
   return job;
 }
 
@@ -123,7 +125,7 @@ Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& opt
 // Pictures are decoded into memory while it measures and written only afterwards. Cancelled after Ctrl-C.
 Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions& options) {
   ResetPeakMemory();
-  Result<ServiceConnection> connection = Connect(bench_case, options.connection);
+  Result<ServiceConnection> connection = Connect(bench_case, options.connection, options.shapes);
   if (!connection.ok()) return connection.status();
   const std::vector<FrameJob> jobs = MeasuredJobs(bench_case, options, connection->dataset());
 

@@ -7,6 +7,7 @@
 
 #include "client/cli/options.h"
 #include "common/base/status.h"
+#include "common/frame/frame_request.h"
 
 namespace slabstream {
 
@@ -22,6 +23,7 @@ struct BenchOptions {
   int turns = 2;                                                // [1, kMaxTurns]
   std::optional<const RendererKind*> renderer;                  // replaces that of each case
   ParameterTexts parameters;                                    // parameters for the renderers of all cases
+  std::vector<ShapeChoice> shapes;                              // that all pictures show
   std::string json_path, pictures_directory, export_directory;  // empty: not wanted
   bool list = false;
   std::string command;  // as it was typed
