@@ -187,7 +187,7 @@ Json OpenApi() {
             {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1", kWholeBox),
              {{"name", "labels"}, {"group", "Options"}, {"help", "The values of each label there, and its volume"}, {"default", "false"}},
              field("format", "Of labels: json, or csv for a table", "json|csv", "json")})},
-      {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
+      {"/api/v1/pick", "The point that a pixel of a picture shows, of the volume or of a shape", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
        With(of_field, {Named(render, {"transfer"})[0], Named(render, {"scalar-range"})[0]})},

@@ -133,7 +133,9 @@ void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gon
   const RenderRequest render = read.Value(ParseRenderFields(read.rest()));
   const double x = read.Value(ParseNumber("x", x_text, {0, double(render.frame.size.width)}));
   const double y = read.Value(ParseNumber("y", y_text, {0, double(render.frame.size.height)}));
-  const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(PickJson(std::get<PickReply>(answer))); };
+  const auto make = [frame = render.frame](const ServiceLink::Answer& answer) {
+    return JsonReply(PickJson(std::get<PickReply>(answer), frame));
+  };
   Ask("pick", read, PickQuery{.frame = render.frame, .x = x, .y = y}, make, std::move(reply), gone);
 }
 

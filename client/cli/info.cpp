@@ -32,9 +32,9 @@
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
 #include "data/catalogue/catalogue.h"
+#include "data/catalogue/shape_data.h"
 #include "data/layers/layer_files.h"
 #include "data/open/read_volume.h"
-#include "data/shapes/shape_file.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/index_file.h"
@@ -441,7 +441,7 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
 Status RunInfo(const InfoOptions& options) {
   if (Status kept = KeepObjects(options.cache); !kept.ok()) return kept;
   if (IsPicturePath(options.path)) return RunPictureInfo(options);
-  if (HoldsShape(options.path)) return RunShapeInfo(options);
+  if (NamesShape(options.path)) return RunShapeInfo(options);
   if (const auto source = ParseSourceText(options.path); source.ok() && LooksLikeMesh(source->path)) return RunMeshInfo(options);
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<std::vector<DicomSeries>> series = SeriesAt(options.path);

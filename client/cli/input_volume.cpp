@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "data/catalogue/shape_data.h"
 #include "data/open/open_source.h"
-#include "data/shapes/shape_file.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -14,7 +14,7 @@ Status CheckInputVolume(const std::string& source) {
 }
 
 Status CheckInputVolume(const SourceText& source) {
-  if (HoldsShape(source.path)) {
+  if (NamesShape(source.path)) {
     return Status::InvalidArgument(
         fmt::format("SOURCE {} is a mesh, lines or points, which show beside a volume: --mesh {}", source.path, source.path));
   }

@@ -32,7 +32,7 @@ void AddLines(const std::string& name, const Json& value, std::string& text) {
   std::string shown = value.is_string() ? value.get<std::string>() : value.dump();
   if (value.is_array()) {
     shown.clear();
-    if (name == "fields" || name == "shapes") {
+    if (name == "fields" || name == "shapes" || name == "planes") {
       for (std::size_t i = 0; i < value.size(); ++i) AddLines(fmt::format("{}[{}]", name, i), value[i], text);
       return;
     }

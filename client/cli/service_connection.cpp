@@ -15,6 +15,7 @@
 #include "common/base/printable.h"
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
+#include "data/catalogue/shape_data.h"
 #include "data/open/open_source.h"
 #include "data/shapes/shape_file.h"
 #include "data/stores/object_cache.h"
@@ -46,9 +47,11 @@ Status LimitLocal(const ConnectionOptions& connection) {
 }
 
 Status CheckShapeFile(const std::string& path) {
+  const Result<ShapeFile> file = FindShapeFile(path);
+  if (!file.ok()) return Status(file.status().code(), "--shape " + file.status().message());
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return Status::NotFound(fmt::format("--shape {}: no such file", Printable(path)));
-  if (HoldsShape(path)) return Status::Ok();
+  if (!std::filesystem::exists(file->path, error)) return Status::NotFound(fmt::format("--shape {}: no such file", Printable(path)));
+  if (NamesShape(path)) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("--shape {} is not a mesh, lines or points: such files end in {}", Printable(path), ShapeEndings()));
 }

@@ -162,11 +162,15 @@ std::string LabelStatisticsText(const StatisticsReply& reply) {
   return text;
 }
 
-Json PickJson(const PickReply& picked) {
+Json PickJson(const PickReply& picked, const FrameRequest& frame) {
   Json json = {{"hit", picked.sample.has_value()}};
   if (!picked.sample) return json;
   json["depth"] = picked.depth;
   json.update(SampleJson(*picked.sample));
+  if (!picked.shape) return json;
+  json["shape"] = *picked.shape < frame.shapes.size() ? frame.shapes[*picked.shape].shape : "plane";
+  json["shape_number"] = *picked.shape;
+  json["shape_value"] = OrNull(picked.value);
   return json;
 }
 

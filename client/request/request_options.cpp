@@ -39,8 +39,8 @@ concept Part = std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> 
 
 // Of options that are given once for each item.
 template <class T>
-concept Items =
-    std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> || std::is_same_v<T, std::vector<ShapeChoice>>;
+concept Items = std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>> ||
+    std::is_same_v<T, std::vector<ShapeChoice>> || std::is_same_v<T, std::vector<PlaneChoice>>;
 
 // ---- the table
 
@@ -270,6 +270,7 @@ struct OptionReader {
   void Read(const std::string& text, Vec3& value) { Take(value, ParseDirection(shown, text)); }
   void Read(const std::string& text, ClipPlane& value) { Take(value, ParseClipPlane(shown, text)); }
   void Read(const std::string& text, ShapeChoice& value) { Take(value, ParseShape(shown, text)); }
+  void Read(const std::string& text, PlaneChoice& value) { Take(value, ParsePlane(shown, text)); }
 
   template <class T>
   void ReadAll(std::span<const std::string> texts, T& value) {

@@ -264,9 +264,6 @@ Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::s
   return ranges;
 }
 
-namespace {
-
-// Up to the first of `ends` that no backslash stands before, which is left in `text`.
 std::string TakeName(std::string_view& text, std::string_view ends) {
   std::string name;
   std::size_t i = 0;
@@ -283,6 +280,8 @@ Status CheckName(std::string_view option, std::string_view text, const std::stri
   if (name.size() <= kMaxNameBytes) return Status::Ok();
   return Status::InvalidArgument(fmt::format("{} has a name of {} bytes, at most {} are possible", option, name.size(), kMaxNameBytes));
 }
+
+namespace {
 
 // The length of the JSON that `text` begins with; of what is none, that up to a comma.
 std::size_t ValueLength(std::string_view text) {
@@ -343,43 +342,6 @@ Result<std::vector<NamedText>> ParseNamedTexts(std::string_view option, std::str
   }
 }
 
-Result<ShapeChoice> ParseShape(std::string_view option, std::string_view text) {
-  constexpr std::string_view kPixels = "px";
-  std::string_view rest = text;
-  ShapeChoice shape{.shape = TakeName(rest, ",")};
-  if (Status status = CheckName(option, text, shape.shape); !status.ok()) return status;
-  if (rest.empty()) return shape;
-  const Result<std::vector<NamedText>> named = ParseNamedTexts(option, rest.substr(1));
-  if (!named.ok()) return named.status();
-  for (const auto& [name, value] : *named) {
-    const std::string of = fmt::format("{} {}", option, name);
-    Status status;
-    const auto take = [&](auto& target, auto parsed) {
-      if (parsed.ok()) target = *std::move(parsed);
-      status = parsed.status();
-    };
-    if (name == "color") {
-      take(shape.color, ParseOpaqueColor(of, value));
-    } else if (name == "opacity") {
-      take(shape.opacity, ParseNumber(of, value, {0, 1}));
-      if (status.ok() && shape.opacity == 0) status = Status::InvalidArgument(of + " is 0, but must lie in (0, 1]");
-    } else if (name == "width") {
-      shape.width_in_pixels = value.ends_with(kPixels);
-      const std::size_t digits = value.size() - (shape.width_in_pixels ? kPixels.size() : 0);
-      take(shape.width, ParseNumber(of, value.substr(0, digits), {0, kMaxCoordinate}));
-    } else if (name == "map") {
-      shape.map = value;
-    } else if (name == "range") {
-      take(shape.range, ParseScalarRange(of, value));
-    } else {
-      status = Status::InvalidArgument(
-          fmt::format("{} '{}' has '{}', but must have one of: color, opacity, width, map, range", option, text, name));
-    }
-    if (!status.ok()) return status;
-  }
-  return shape;
-}
-
 Result<std::vector<SteeredValue>> ParseSteeredValues(std::string_view option, std::string_view text) {
   constexpr double kMost = std::numeric_limits<double>::max();
   const Result<std::vector<NamedText>> named = ParseNamedTexts(option, text);
@@ -422,15 +384,6 @@ std::string TextOf(const ClipBox& box) {
   const auto bound = [](double value, double none) { return value == none ? "" : fmt::format("{}", value); };
   const auto bounds = [&](Axis axis) { return bound(box.low[axis], -kMaxCoordinate) + ":" + bound(box.high[axis], kMaxCoordinate); };
   return Joined(kAxes, bounds) + (box.unit == ClipUnit::kVoxels ? "v" : box.unit == ClipUnit::kPercent ? "%" : "");
-}
-std::string TextOf(const ShapeChoice& shape) {
-  std::string text = TextOfName(shape.shape);
-  if (shape.color) text += ",color=" + TextOf(*shape.color);
-  if (shape.opacity != 1) text += fmt::format(",opacity={}", shape.opacity);
-  if (shape.width != 0) text += fmt::format(",width={}{}", shape.width, shape.width_in_pixels ? "px" : "");
-  if (!shape.map.empty()) text += ",map=" + shape.map;
-  if (shape.range) text += ",range=" + TextOf(*shape.range);
-  return text;
 }
 std::string TextOf(const ClipPlane& plane) { return fmt::format("{},{}", TextOf(plane.normal), plane.offset); }
 std::string TextOf(const std::vector<Isosurface>& surfaces) {

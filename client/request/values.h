@@ -52,10 +52,18 @@ Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, s
 // "1,5-9,Precentral_L,Temporal_*": what is neither a number nor a range is a name.
 Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text);
 
-// "NAME[,color=COLOUR][,opacity=O][,width=W|Wpx][,map=MAP][,range=LOW:HIGH]". In NAME a backslash stands before a comma or another
-// backslash.
+// "NAME[,color=COLOUR][,opacity=O][,width=W|Wpx][,map=MAP][,range=LOW:HIGH][,time=N]". In NAME a backslash stands before a comma or
+// another backslash.
 Result<ShapeChoice> ParseShape(std::string_view option, std::string_view text);
 
+// "PLANE[:WHERE][,opacity=O][,map=MAP][,range=LOW:HIGH]". PLANE is a name of kSlicePlanes, or a normal "X/Y/Z" of the world. WHERE is
+// "x=N", "y=N" or "z=N" where the normal lies along that axis, "index=N" (ClipSlab::index), or a point "at=X/Y/Z".
+Result<PlaneChoice> ParsePlane(std::string_view option, std::string_view text);
+
+// Takes the name at the beginning of a text, up to one of `ends`. In it a backslash stands before one of them, or another backslash.
+std::string TakeName(std::string_view& text, std::string_view ends);
+// InvalidArgument: the name is empty or too long. `text`: that it is from.
+Status CheckName(std::string_view option, std::string_view text, const std::string& name);
 // Names that are separated by commas. In names a backslash stands before a comma, a '=' or another backslash.
 Result<std::vector<std::string>> ParseNames(std::string_view option, std::string_view text);
 // "NAME=VALUE,NAME=VALUE,...", none named twice. What has no '=' belongs to the value before it, as in "0=1,0.5,0,Actin=red"; a value in
@@ -78,6 +86,7 @@ std::string TextOf(const std::vector<std::string>& names);
 std::string TextOf(const ClipBox& box);
 std::string TextOf(const ClipPlane& plane);
 std::string TextOf(const ShapeChoice& shape);
+std::string TextOf(const PlaneChoice& plane);
 std::string TextOf(const std::vector<Isosurface>& surfaces);
 std::string TextOf(const std::vector<GradientOpacityPoint>& points);
 std::string TextOf(const std::vector<LabelOpacity>& opacities);

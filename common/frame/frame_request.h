@@ -79,10 +79,23 @@ struct ShapeChoice {
   double width = 0;                       // thickness of lines, diameter of points; 0: the shape's radii, or some pixels
   bool width_in_pixels = false;           // of the picture; else in the world's unit
   std::string map = {};                   // name of a colour map (NamedColorMaps) for the values of vertices; empty: "viridis"
-  std::optional<ScalarRange> range = {};  // that the colour map spans; none: all values
+  std::optional<ScalarRange> range = {};  // that the colour map spans; none: all values of its first time
+  std::optional<int> time = {};           // the number of one of its times; none: that of the picture
   friend bool operator==(const ShapeChoice&, const ShapeChoice&) = default;
 };
 inline constexpr std::string_view kStandardShapeMap = "viridis";
+inline constexpr int kMaxShapeTime = 1'000'000;
+
+// A plane through the volume that shows the volume's values, unlit.
+struct PlaneChoice {
+  ClipSlab slab = {};                     // its middle; of thickness 0
+  double opacity = 1;                     // (0, 1]
+  std::string map = {};                   // name of a colour map (NamedColorMaps); empty: "grey"
+  std::optional<ScalarRange> range = {};  // that the colour map spans; none: what the transfer function "window" spans
+  friend bool operator==(const PlaneChoice&, const PlaneChoice&) = default;
+};
+inline constexpr std::string_view kStandardPlaneMap = "grey";
+inline constexpr std::size_t kMaxPlanes = 16;
 
 // The number of a level; none: the text is kAutomatic, or neither (IsLevel).
 inline std::optional<int> LevelNumber(std::string_view text) {
@@ -108,6 +121,7 @@ struct FrameRequest {
   // says, mostly the first.
   std::string time = {};
   std::vector<ShapeChoice> shapes = {};  // at most kMaxShownShapes
+  std::vector<PlaneChoice> planes = {};  // at most kMaxPlanes
   Shading shading;
   double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
@@ -122,6 +136,10 @@ struct FrameRequest {
   bool key = false;  // pictures come with what their colours mean (PictureKey)
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
+
+inline bool ShowsShape(const FrameRequest& request, std::string_view dataset) {
+  return std::ranges::find(request.shapes, dataset, &ShapeChoice::shape) != request.shapes.end();
+}
 
 // The look of a field of this name or number; it is made if there is none.
 inline FieldChoice& ChoiceOf(std::string_view field, FrameRequest& request) {

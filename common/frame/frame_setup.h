@@ -88,7 +88,7 @@ struct FrameSetup {
   double termination = kDefaultTermination;
   std::int32_t halo = kHalo;            // voxels that a worker keeps round a box
   OpaqueFront front = {};               // empty: nothing is known
-  std::vector<ShapeSetup> shapes = {};  // at most kMaxShownShapes
+  std::vector<ShapeSetup> shapes = {};  // of the request's shapes, then of its planes: at most kMaxShownShapes + kMaxPlanes
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 

@@ -26,6 +26,7 @@ struct ShapeLook {
   double opacity = 1;            // (0, 1]; times that of vertices if these have colours and show them
   double width = 0;              // thickness of lines, diameter of points; 0: that of the shape's radii, or kStandardWidth pixels
   bool width_in_pixels = false;  // of the finished picture; else in the unit of FrameSetup
+  bool unlit = false;            // colours show as they are, and nothing lies in its shadow
   friend bool operator==(const ShapeLook&, const ShapeLook&) = default;
 };
 

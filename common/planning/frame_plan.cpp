@@ -45,7 +45,8 @@ std::int64_t PicturePixels(const Camera& camera) {
 }
 
 // Whether any fragment may lie in the box: a shape reaches it.
-bool HoldsShapes(const Box& box, const FrameSetup& setup) {
+bool HoldsShapes(const Box& voxels, const FrameSetup& setup) {
+  const Box box = setup.description.geometry.InDataSpace(voxels);
   return std::ranges::any_of(setup.shapes, [&](const ShapeSetup& shape) {
     return std::ranges::all_of(kAxes,
                                [&](Axis axis) { return shape.low[axis] <= box.end[axis] && shape.high[axis] >= box.begin[axis] - 1; });
@@ -117,8 +118,10 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
     field.look.transfer = InUnit(field.look.transfer, setup.unit);
     setup.fields.push_back(std::move(field));
   }
-  for (std::size_t i = 0; i < resolved.shapes.size(); ++i) {
-    const CoarserVolume& shape = resolved.fields.shapes[i];
+  std::vector<CoarserVolume> shapes = resolved.fields.shapes;
+  shapes.insert(shapes.end(), resolved.fields.planes.begin(), resolved.fields.planes.end());
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const CoarserVolume& shape = shapes[i];
     ShapeSetup& shown = setup.shapes.emplace_back(ShapeSetup{.bytes = {shape.dataset, shape.summary->description, {}}});
     shown.look = resolved.shapes[i];
     if (!shown.look.width_in_pixels) shown.look.width /= setup.unit;

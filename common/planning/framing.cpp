@@ -95,11 +95,9 @@ std::optional<Ball> BallOfCut(const FrameRequest& request, const std::vector<Box
 
 }  // namespace
 
-std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
+std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& places, const ClipRegion& clip,
                                const VolumeGeometry& geometry) {
-  if (bricks.empty()) return std::nullopt;
-  std::vector<Box> places = bricks;
-  for (Box& place : places) place = geometry.InDataSpace(place);
+  if (places.empty()) return std::nullopt;
   const std::optional<Ball> cut = BallOfCut(request, places, clip, geometry);
   return cut ? *cut : BallRound(places, geometry);
 }

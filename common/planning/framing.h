@@ -13,15 +13,15 @@
 
 namespace slabstream {
 
-// What a picture of `bricks` (BrickVisibility::VisibleBricks) frames: a ball round them, so that the scale stays while the view turns. A
-// slab is flat and faces the view, so its picture frames the cut instead: what `clip` leaves of the bricks fills the picture's width or its
-// height. None: there are no bricks. `request.view` has its angles (WithDefaults).
-std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
+// What a picture frames of what shows at `places`, boxes of data space (BrickVisibility::VisibleBricks, BoxAround): a ball round them, so
+// that the scale stays while the view turns. A slab is flat and faces the view, so its picture frames the cut instead: what `clip` leaves
+// of the places fills the picture's width or its height. None: there are no places. `request.view` has its angles (WithDefaults).
+std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& places, const ClipRegion& clip,
                                const VolumeGeometry& geometry);
 
 // From the volume's world to its data space.
 AffineMap FromWorld(const VolumeGeometry& geometry);
-// What a picture of the volume frames for a shape beside it: its bounds, at most kFarthestShape voxels from the first voxel.
+// Where a shape lies in the volume's data space: its bounds, at most kFarthestShape voxels from the first voxel.
 inline constexpr double kFarthestShape = 1 << 24;
 Box BoxAround(const ShapeInfo& shape, const VolumeGeometry& geometry);
 

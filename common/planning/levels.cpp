@@ -188,13 +188,8 @@ void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& l
 }
 
 void MoveSlab(ClipSlab& slab, const VolumeGeometry& finest) {
-  if (slab.through) return;
-  Vec3 middle = finest.centre();
-  if (slab.index) {
-    const Axis axis = AxisAcross(slab, finest);
-    middle[axis] = finest.stretch.ToData(*std::exchange(slab.index, std::nullopt), axis);
-  }
-  slab.through = finest.ToWorld(middle);
+  slab.through = MiddleOf(slab, finest);
+  slab.index.reset();
 }
 
 }  // namespace
@@ -228,8 +223,7 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   const int count = int(levels.levels.size());
   const VolumeGeometry& finest = levels.levels.front().geometry;
   // Coarser levels have other indices.
-  const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
-  if (!clip.ok()) return clip.status();
+  if (Status status = CheckSlices(request, finest); !status.ok()) return status;
   if (const std::optional<int> level = LevelNumber(request.level)) {
     if (*level < count) return LevelMap{.levels = {*level}};
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
@@ -290,8 +284,7 @@ Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry&
   if (!std::exchange(chosen.view.fit, false).value()) return ChosenView{chosen.view, std::nullopt};
   if (!framed) {
     // Coarser levels have other indices.
-    const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
-    if (!clip.ok()) return clip.status();
+    if (Status status = CheckSlices(request, finest); !status.ok()) return status;
     const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview, fields);
     if (!resolved.ok()) return resolved.status();
     chosen.framed = resolved->framed;
@@ -316,6 +309,7 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);
+  for (PlaneChoice& plane : request.planes) MoveSlab(plane.slab, finest);
   request.transfer.opacity_distance *= Least(finest.spacing) / Least(level.spacing);
   return request;
 }

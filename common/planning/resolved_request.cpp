@@ -194,12 +194,38 @@ Status CheckRectilinear(const FrameRequest& request, const VolumeSummary& summar
                     request.dataset));
   }
   if (!fields.others.empty()) return refused("several fields are");
-  if (!fields.shapes.empty()) return refused("shapes are");
   return request.shading.needs_light_volume() ? refused("shadows and ambient occlusion are") : Status::Ok();
 }
 
-Result<ShapeLook> LookOfShape(const ShapeChoice& choice, const CoarserVolume& dataset) {
-  const ShapeInfo* const info = dataset.summary->shape.get();
+// Values by a colour map that spans `range`. `of`: of what, in messages.
+Status ShowValues(const std::string& of, std::string_view name, const ScalarRange& range, ShapeLook& look) {
+  look.coloring = ShapeColoring::kValues;
+  const ColorMap* const map = FindNamed(NamedColorMaps(), name);
+  if (map == nullptr)
+    return Status::InvalidArgument(fmt::format("{} has map '{}', but must have one of: {}", of, name, NamesOf(NamedColorMaps())));
+  look.low = range.min;
+  look.high = range.max;
+  if (!(look.low < look.high)) look.high = std::nextafter(look.low + std::max(1.0, std::abs(look.low)), 1e300);  // one value alone
+  for (std::size_t i = 0; i < kShapeMapColors; ++i) look.map.push_back(map->At(double(i) / double(kShapeMapColors - 1)));
+  return Status::Ok();
+}
+
+// As `slice` shows the volume. Its tone curve spans percentiles of all its values.
+Result<ShapeLook> LookOfPlane(const PlaneChoice& choice, const VolumeSummary& volume, const ShownFields& fields) {
+  if (fields.dataset != nullptr && HasLabelsAlone(*fields.dataset)) {
+    return Status::InvalidArgument("a plane shows values, but the dataset has labels alone");
+  }
+  const Result<TransferFunction> window = MakePreset("window", volume);
+  if (!window.ok()) return window.status();
+  const ScalarRange whole = {window->colors.front().value, window->colors.back().value};
+  ShapeLook look{.opacity = choice.opacity, .unlit = true};
+  const Status shown = ShowValues("a plane", choice.map.empty() ? kStandardPlaneMap : std::string_view(choice.map),
+                                  choice.range ? InDataValues(*choice.range, volume) : whole, look);
+  return shown.ok() ? Result<ShapeLook>(std::move(look)) : shown;
+}
+
+Result<ShapeLook> LookOfShape(const ShapeChoice& choice, const VolumeSummary& dataset) {
+  const ShapeInfo* const info = dataset.shape.get();
   if (info == nullptr) {
     return Status::InvalidArgument(fmt::format("shape '{}' is a volume, but must be a mesh, lines or points", choice.shape));
   }
@@ -214,24 +240,27 @@ Result<ShapeLook> LookOfShape(const ShapeChoice& choice, const CoarserVolume& da
     if (!choice.color && info->has_colors) look.coloring = ShapeColoring::kVertices;
     return look;
   }
-  look.coloring = ShapeColoring::kValues;
-  const std::string_view name = choice.map.empty() ? kStandardShapeMap : std::string_view(choice.map);
-  const ColorMap* const map = FindNamed(NamedColorMaps(), name);
-  if (map == nullptr) {
-    return Status::InvalidArgument(
-        fmt::format("shape '{}' has map '{}', but must have one of: {}", choice.shape, choice.map, NamesOf(NamedColorMaps())));
-  }
   if (choice.range && choice.range->percentiles) {
     return Status::InvalidArgument(fmt::format("shape '{}' has a range of percentiles, but must have one of values", choice.shape));
   }
-  look.low = choice.range ? choice.range->min : double(info->least);
-  look.high = choice.range ? choice.range->max : double(info->largest);
-  if (!(look.low < look.high)) look.high = std::nextafter(look.low + std::max(1.0, std::abs(look.low)), 1e300);  // one value alone
-  for (std::size_t i = 0; i < kShapeMapColors; ++i) look.map.push_back(map->At(double(i) / double(kShapeMapColors - 1)));
-  return look;
+  const ScalarRange whole = {double(info->least), double(info->largest)};
+  const Status shown =
+      ShowValues(fmt::format("shape '{}'", choice.shape), choice.map.empty() ? kStandardShapeMap : std::string_view(choice.map),
+                 choice.range.value_or(whole), look);
+  return shown.ok() ? Result<ShapeLook>(std::move(look)) : shown;
 }
 
 }  // namespace
+
+Status CheckSlices(const FrameRequest& request, const VolumeGeometry& geometry) {
+  if (request.clipping.slab) {
+    if (Status status = CheckSlice("clip.slab", *request.clipping.slab, geometry); !status.ok()) return status;
+  }
+  for (const PlaneChoice& plane : request.planes) {
+    if (Status status = CheckSlice("plane", plane.slab, geometry); !status.ok()) return status;
+  }
+  return Status::Ok();
+}
 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
                                        ShownFields fields) {
@@ -240,9 +269,15 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
     return Status::InvalidArgument(fmt::format("dataset \"{}\" is a shape ({}), which shows beside a volume: --shape {}", request.dataset,
                                                NameOf(summary->shape->kind), request.dataset));
   }
+  if (Status status = CheckSlices(request, geometry); !status.ok()) return status;
   std::vector<ShapeLook> shapes;
   for (std::size_t i = 0; i < fields.shapes.size(); ++i) {
-    Result<ShapeLook> look = LookOfShape(request.shapes[i], fields.shapes[i]);
+    Result<ShapeLook> look = LookOfShape(request.shapes[i], *fields.shapes[i].summary);
+    if (!look.ok()) return look.status();
+    shapes.push_back(*std::move(look));
+  }
+  for (const PlaneChoice& plane : request.planes) {
+    Result<ShapeLook> look = LookOfPlane(plane, *summary, fields);
     if (!look.ok()) return look.status();
     shapes.push_back(*std::move(look));
   }
@@ -267,7 +302,8 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (!able.ok()) return able.status();
   // A frame along slices has pixels as wide as voxels, and blurs shapes.
   const auto blurs = [](const RendererKind* kind) { return kind->along_slices(); };
-  if (!fields.shapes.empty() && !std::ranges::all_of(*able, blurs)) std::erase_if(*able, blurs);
+  const bool has_shapes = !fields.shapes.empty() || !request.planes.empty();
+  if (has_shapes && !std::ranges::all_of(*able, blurs)) std::erase_if(*able, blurs);
   if (Status status = CheckRectilinear(request, *summary, fields); !status.ok()) return status;
   const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
   request.renderer = renderer.name();
@@ -304,8 +340,10 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (*request.view.fit) {
     const BrickVisibility visibility(*summary, renderer.DrawnTable(volume.transfer(), *summary), OtherBricks(*summary, volume));
     std::vector<Box> shown = visibility.VisibleBricks(volume.clip());
+    for (Box& bricks : shown) bricks = geometry.InDataSpace(bricks);
     if (!request.clipping.slab) {
       for (const CoarserVolume& shape : fields.shapes) shown.push_back(BoxAround(*shape.summary->shape, geometry));
+      if (!request.planes.empty()) shown.push_back(geometry.bounds());
     }
     framed = FramedBall(request, shown, volume.clip(), geometry);
     if (framed) request.view = FitView(request.view, geometry, *framed);

@@ -31,7 +31,7 @@ struct ResolvedRequest {
   std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
   ShownFields fields = {};
   double weight = 1;                   // of the volume: FieldLook::weight
-  std::vector<ShapeLook> shapes = {};  // how it shows fields.shapes. Widths are in the world's unit
+  std::vector<ShapeLook> shapes = {};  // how it shows fields.shapes, and behind them its planes. Widths are in the world's unit
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as RenderersFor and
@@ -39,6 +39,10 @@ struct ResolvedRequest {
 // NotFound: no such preset.
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary,
                                        ShownFields fields = {});
+
+// InvalidArgument: the volume has no slice with the index of the clip slab, or of a plane. Of a volume with levels: the finest geometry,
+// since others have other slices.
+Status CheckSlices(const FrameRequest& request, const VolumeGeometry& geometry);
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);

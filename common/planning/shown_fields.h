@@ -42,6 +42,7 @@ struct ShownFields {
   bool volume_shows = true;                                // FieldNumbers::volume_shows
   std::vector<FieldVolume> others = {};                    // by ascending numbers, so labels are the last one
   std::vector<CoarserVolume> shapes = {};                  // of FrameRequest::shapes: the datasets that these name
+  std::vector<CoarserVolume> planes = {};                  // of FrameRequest::planes, once it is known which voxels they go through
 
   // How many show that have values, with the volume.
   std::size_t values() const { return 1 + others.size() - (!others.empty() && others.back().labels ? 1 : 0); }

@@ -52,7 +52,7 @@ std::vector<Need> NeedsOf(const FrameRequest& request, const FieldsKnown& fields
   need(fields.weighted, Ability::kFields, "channel-opacity");
   need(fields.count > 1, Ability::kFields, fmt::format("a picture of {} fields", fields.count));
   need(fields.rectilinear, Ability::kRectilinear, "a rectilinear grid that --resample even does not resample");
-  need(!request.shapes.empty(), Ability::kShapes, "a picture with shapes");
+  need(!request.shapes.empty() || !request.planes.empty(), Ability::kShapes, "a picture with shapes");
   for (const auto& [name, text] : request.parameters) {
     add(name, [&](const RendererKind* kind) { return FindParameter(*kind, name) != nullptr; });
   }

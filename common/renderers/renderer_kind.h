@@ -31,7 +31,8 @@ enum class PickRule : std::uint8_t {
   kSurface,      // where it meets the first opaque voxel
   kLargest,      // where the volume has its largest value, or its least one
   kLeast,
-  kNone,  // no single one
+  kMean,  // no single one: the pixel shows the mean of the ray's values
+  kNone,  // no single one: the pixel is opaque where its ray meets the volume
 };
 
 // A number or a choice that a request may set for a renderer, such as sampling-rate. The command line takes it as --NAME.

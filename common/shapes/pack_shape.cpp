@@ -40,6 +40,17 @@ Status CheckLines(const std::vector<std::uint32_t>& begins, std::size_t vertices
   return Status::Ok();
 }
 
+Status CheckPlane(const Shape& shape) {
+  const PlaneValues& plane = shape.plane;
+  if (std::max(plane.columns, plane.rows) > kMaxPlaneSide || plane.samples.size() != std::size_t{plane.columns} * plane.rows) {
+    return Status::InvalidArgument(fmt::format("shape.plane has {} samples, must have {} x {}, at most {} a side", plane.samples.size(),
+                                               plane.columns, plane.rows, kMaxPlaneSide));
+  }
+  if (!plane.samples.empty() && (shape.kind != ShapeKind::kMesh || !shape.values.empty()))
+    return Status::InvalidArgument("shape.plane: only a mesh without values of vertices has one");
+  return Status::Ok();
+}
+
 Status Check(const Shape& shape) {
   const std::size_t n = shape.positions.size();
   if (Status status = CheckMost("positions", n, kMaxShapeVertices); !status.ok()) return status;
@@ -72,6 +83,7 @@ Status Check(const Shape& shape) {
       return Status::InvalidArgument(fmt::format("shape.triangles[{}] has vertex {}, must be below {}", i, most, n));
     }
   }
+  if (Status status = CheckPlane(shape); !status.ok()) return status;
   return CheckLines(shape.line_begins, n);
 }
 
@@ -259,7 +271,8 @@ ShapeHeader HeaderOf(const Shape& shape, const Cut& cut, std::size_t parts) {
   header.has_colors = shape.colors.empty() ? 0 : 1;
   header.has_values = shape.values.empty() ? 0 : 1;
   header.has_radii = shape.radii.empty() ? 0 : 1;
-  header.see_through = std::ranges::any_of(shape.colors, [](const auto& color) { return color[3] < 255; }) ? 1 : 0;
+  const bool has_holes = std::ranges::any_of(shape.plane.samples, [](float sample) { return std::isnan(sample); });
+  header.see_through = has_holes || std::ranges::any_of(shape.colors, [](const auto& color) { return color[3] < 255; }) ? 1 : 0;
   header.piece_count = std::uint32_t(cut.pieces.size());
   header.vertices = shape.positions.size();
   header.parts = parts;
@@ -273,8 +286,12 @@ ShapeHeader HeaderOf(const Shape& shape, const Cut& cut, std::size_t parts) {
     header.low[axis] = bounds.low[int(axis)];
     header.high[axis] = bounds.high[int(axis)];
   }
+  header.plane_columns = shape.plane.columns;
+  header.plane_rows = shape.plane.rows;
+  header.plane_column = shape.plane.column;
+  header.plane_row = shape.plane.row;
   bool any = false;
-  for (const float value : shape.values) {
+  for (const float value : shape.plane.samples.empty() ? shape.values : shape.plane.samples) {
     if (!std::isfinite(value)) continue;
     header.least = any ? std::min(header.least, value) : value;
     header.largest = any ? std::max(header.largest, value) : value;
@@ -316,6 +333,7 @@ Result<AlignedVector<std::byte>> PackShape(const Shape& shape) {
   gather_array(layout.values, shape.values);
   gather_array(layout.radii, shape.radii);
   put(layout.corners, cut.corners);
+  put(layout.plane, shape.plane.samples);
   return bytes;
 }
 

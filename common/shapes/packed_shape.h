@@ -8,6 +8,7 @@
 #include <span>
 
 #include "common/base/status.h"
+#include "common/math/row4.h"
 #include "common/memory/aligned_buffer.h"
 #include "common/shapes/shape.h"
 
@@ -36,12 +37,17 @@ struct ShapePiece {
 struct ShapeView {
   ShapeInfo info;
   Vec3 origin;
-  bool see_through = false;  // some vertex has a colour with an alpha below 255
+  bool see_through = false;  // some vertex has a colour with an alpha below 255, or the plane has samples that are none
   std::span<const ShapePiece> pieces;
   std::array<std::span<const float>, 3> positions;      // x, y, z from the origin; 16 more can be read behind each
   std::span<const std::uint32_t> normals;               // of a mesh: PackShapeNormal
   std::span<const std::array<std::uint8_t, 4>> colors;  // empty: it has none; so are the two below
   std::span<const float> values, radii;
+  struct Plane {  // PlaneValues; 0, 0: it has none
+    std::int32_t columns = 0, rows = 0;
+    Row4 column{}, row{};
+    std::span<const float> samples;  // more can be read behind them
+  } plane;
   std::span<const std::uint8_t> corners;  // of each part: CornersOf(kind) numbers of vertices, counted from the piece's first one
 };
 
@@ -54,8 +60,8 @@ Vec3 ShapeNormalOf(std::uint32_t packed);  // unit, or 0
 
 // Bytes that ViewShape reads, the same for the same shape on every machine, and for any order of its triangles. InvalidArgument: a number
 // of a vertex that is not there, a position that is not finite, arrays of other lengths than that of positions, too many vertices or parts
-// (kMaxShapeVertices, kMaxShapeParts); the message names the field, the value and the limit. Triangles without an area are left out. Uses
-// the threads of the caller's task arena.
+// (kMaxShapeVertices, kMaxShapeParts), planes of other sizes than their samples; the message names the field, the value and the limit.
+// Triangles without an area are left out. Uses the threads of the caller's task arena.
 Result<AlignedVector<std::byte>> PackShape(const Shape& shape);
 // Of bytes that PackShape made, perhaps with others behind them. DataLoss: they are not.
 Result<ShapeInfo> InfoOf(std::span<const std::byte> bytes);

@@ -1,5 +1,5 @@
-// The bytes of a packed shape: this header, then pieces, x, y, z, normals, colours, values, radii and corners, as far as the shape has
-// them. Each array begins at a multiple of kArrayStep bytes, and at least as many are behind its last element.
+// The bytes of a packed shape: this header, then pieces, x, y, z, normals, colours, values, radii, corners and samples of a plane, as far
+// as the shape has them. Each array begins at a multiple of kArrayStep bytes, and at least as many are behind its last element.
 #pragma once
 
 #include <array>
@@ -22,10 +22,12 @@ struct ShapeHeader {
   std::uint64_t vertex_count = 0;         // in the arrays
   std::array<double, 3> low{}, high{}, origin{};
   float least = 0, largest = 0;
+  std::uint32_t plane_columns = 0, plane_rows = 0;
+  Row4 plane_column{}, plane_row{};
 
-  static constexpr std::uint64_t kMark = 0x3165706168736c73;  // "slshape1"
+  static constexpr std::uint64_t kMark = 0x3265706168736c73;  // "slshape2"
 };
-static_assert(sizeof(ShapeHeader) == 136);
+static_assert(sizeof(ShapeHeader) == 208);
 
 inline constexpr std::size_t kArrayStep = 64;
 
@@ -45,9 +47,10 @@ struct ShapeLayout {
     values = take(header.has_values * n, 4);
     radii = take(header.has_radii * n, 4);
     corners = take(header.parts * CornersOf(ShapeKind(header.kind)), 1);
+    plane = take(std::uint64_t{header.plane_columns} * header.plane_rows, 4);
   }
   std::uint64_t end = (sizeof(ShapeHeader) + kArrayStep - 1) / kArrayStep * kArrayStep;
-  std::uint64_t pieces, positions[3], normals, colors, values, radii, corners;
+  std::uint64_t pieces, positions[3], normals, colors, values, radii, corners, plane;
 };
 
 }  // namespace slabstream

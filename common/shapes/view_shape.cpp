@@ -47,6 +47,10 @@ Result<ShapeView> ViewShape(std::span<const std::byte> bytes) {
     return Status::DataLoss(fmt::format("shape: has {} parts and {} vertices, must have at most {} and {}", header.parts,
                                         header.vertex_count, kMaxShapeParts, 3 * std::uint64_t{kMaxShapeParts}));
   }
+  if (std::max(header.plane_columns, header.plane_rows) > kMaxPlaneSide) {
+    return Status::DataLoss(fmt::format("shape: its plane has {} x {} samples, must have at most {} a side", header.plane_columns,
+                                        header.plane_rows, kMaxPlaneSide));
+  }
   const ShapeLayout layout(header);
   if (bytes.size() < layout.end) {
     return Status::DataLoss(fmt::format("shape: has {} bytes, must have at least {} for {} parts, {} vertices and {} pieces", bytes.size(),
@@ -60,7 +64,7 @@ Result<ShapeView> ViewShape(std::span<const std::byte> bytes) {
                {header.low[0], header.low[1], header.low[2]},
                {header.high[0], header.high[1], header.high[2]},
                header.has_colors == 1,
-               header.has_values == 1,
+               header.has_values == 1 || header.plane_columns * header.plane_rows > 0,
                header.has_radii == 1,
                header.least,
                header.largest};
@@ -77,6 +81,14 @@ Result<ShapeView> ViewShape(std::span<const std::byte> bytes) {
   array(view.values, layout.values, header.has_values * n);
   array(view.radii, layout.radii, header.has_radii * n);
   array(view.corners, layout.corners, header.parts * CornersOf(kind));
+  const std::uint64_t samples = std::uint64_t{header.plane_columns} * header.plane_rows;
+  array(view.plane.samples, layout.plane, samples);
+  if (samples > 0) {
+    view.plane.columns = std::int32_t(header.plane_columns);
+    view.plane.rows = std::int32_t(header.plane_rows);
+    view.plane.column = header.plane_column;
+    view.plane.row = header.plane_row;
+  }
 
   std::uint64_t vertices = 0, parts = 0;
   for (std::size_t i = 0; i < view.pieces.size(); ++i) {

@@ -61,23 +61,8 @@ constexpr double kSliceThickness = 1.0 / 64;
 // rounding.
 constexpr double kLeastThickness = 0x1p-18;
 
-// InvalidArgument: there is no slice with its index.
-Status CheckIndex(const ClipSlab& slab, const VolumeGeometry& geometry) {
-  const Axis axis = AxisAcross(slab, geometry);
-  const std::int32_t last = geometry.size[axis] - 1;
-  if (slab.index.value_or(0) <= last) return Status::Ok();
-  return Status::InvalidArgument(
-      fmt::format("clip.slab.index is {}, but the volume has slices 0 to {} along {}", *slab.index, last, Letter(axis)));
-}
-
 void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<HalfSpace>& sides) {
-  const Vec3 normal = Normalized(slab.normal);
-  Vec3 middle = geometry.centre();
-  if (slab.index) {
-    const Axis axis = AxisAcross(slab, geometry);
-    middle[axis] = geometry.stretch.ToData(*slab.index, axis);
-  }
-  const Vec3 through = slab.through.value_or(geometry.ToWorld(middle));
+  const Vec3 normal = Normalized(slab.normal), through = MiddleOf(slab, geometry);
   double thickness = kSliceThickness * geometry.least_distance();
   if (geometry.rectilinear()) thickness = std::max(thickness, kLeastThickness * Length(ToVec3(geometry.size) * geometry.spacing));
   const double half = 0.5 * std::max(slab.thickness, thickness);
@@ -89,6 +74,27 @@ void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<H
 Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry) {
   const Vec3 normal = geometry.orientation.FromWorld(slab.normal);
   return *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return std::abs(normal[axis]); });
+}
+
+Status CheckSlice(std::string_view name, const ClipSlab& slab, const VolumeGeometry& geometry) {
+  const Axis axis = AxisAcross(slab, geometry);
+  const std::int32_t last = geometry.size[axis] - 1;
+  if (slab.index.value_or(0) <= last) return Status::Ok();
+  return Status::InvalidArgument(
+      fmt::format("{}.index is {}, but the volume has slices 0 to {} along {}", name, *slab.index, last, Letter(axis)));
+}
+
+Vec3 MiddleOf(const ClipSlab& slab, const VolumeGeometry& geometry) {
+  Vec3 middle = geometry.centre();
+  if (slab.index) {
+    const Axis axis = AxisAcross(slab, geometry);
+    middle[axis] = geometry.stretch.ToData(*slab.index, axis);
+  }
+  return slab.through.value_or(geometry.ToWorld(middle));
+}
+
+HalfSpace MiddlePlane(const ClipSlab& slab, const VolumeGeometry& geometry) {
+  return FromWorld({slab.normal, -Dot(slab.normal, MiddleOf(slab, geometry))}, geometry);
 }
 
 bool ClipRegion::MayKeep(const Box& box) const {
@@ -113,7 +119,7 @@ Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry
   ClipRegion region{{}, clipping.mode};
   if (clipping.box) AddBox(*clipping.box, geometry, region.sides);
   if (clipping.slab) {
-    if (Status status = CheckIndex(*clipping.slab, geometry); !status.ok()) return status;
+    if (Status status = CheckSlice("clip.slab", *clipping.slab, geometry); !status.ok()) return status;
     AddSlab(*clipping.slab, geometry, region.sides);
   }
   for (const ClipPlane& plane : clipping.planes) region.sides.push_back(FromWorld(plane, geometry));

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -95,6 +96,12 @@ struct ClipRegion {
 
 // The axis of the voxels that is nearest to the slab's normal.
 Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry);
+// InvalidArgument: the volume has no slice with the slab's index. `name`: what the message calls the slab.
+Status CheckSlice(std::string_view name, const ClipSlab& slab, const VolumeGeometry& geometry);
+// A point of the world in the middle of a slab whose slice there is.
+Vec3 MiddleOf(const ClipSlab& slab, const VolumeGeometry& geometry);
+// The plane in its middle, whose normal is the slab's. Distance is 0 on it.
+HalfSpace MiddlePlane(const ClipSlab& slab, const VolumeGeometry& geometry);
 
 // `clipping` valid. Sides that do not cut the volume are left out, so that a box around everything costs nothing.
 // InvalidArgument: the volume has no slice with the slab's index.

@@ -113,7 +113,8 @@ void CheckShapes(const FrameSetup& setup, Checker& check) {
   }
 }
 
-// The volume alone may be rectilinear, and then there is nothing else (CheckRectilinear, common/planning/resolved_request.cpp).
+// The volume alone may be rectilinear, and then shapes are all that is shown beside it (CheckRectilinear,
+// common/planning/resolved_request.cpp).
 void CheckStretch(const FrameSetup& setup, Checker& check) {
   const auto is_even = [](const CoarserLevel& level) { return !level.description.geometry.rectilinear(); };
   check.That(std::ranges::all_of(setup.coarser, is_even), "coarser", "a rectilinear grid");

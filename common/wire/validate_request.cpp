@@ -126,6 +126,12 @@ Status CheckRules(const ImageSize& size) {
   return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
+Status CheckRules(const ClipSlab& slab, const std::string& name) {
+  if (slab.through && slab.index) return Status::InvalidArgument(name + " has both a point and an index, but one is enough");
+  if (Status s = CheckDirection(name + ".normal", slab.normal); !s.ok()) return s;
+  return InRange(name + ".slice", slab.index.value_or(0), 0, kMaxVolumeSide - 1);
+}
+
 Status CheckRules(const Clipping& clipping) {
   const auto& [box, slab, planes, mode] = clipping;
   for (const Axis axis : kAxes) {
@@ -133,11 +139,8 @@ Status CheckRules(const Clipping& clipping) {
     return Status::InvalidArgument(
         fmt::format("clipping.box is {}:{} along {}, but must rise", box->low[axis], box->high[axis], Letter(axis)));
   }
-  if (slab && slab->through && slab->index)
-    return Status::InvalidArgument("clipping.slab has both a point and an index, but one is enough");
   if (slab) {
-    if (Status s = CheckDirection("clipping.slab.normal", slab->normal); !s.ok()) return s;
-    if (Status s = InRange("clipping.slab.slice", slab->index.value_or(0), 0, kMaxVolumeSide - 1); !s.ok()) return s;
+    if (Status s = CheckRules(*slab, "clipping.slab"); !s.ok()) return s;
   }
   for (std::size_t i = 0; i < planes.size(); ++i) {
     if (Status s = CheckDirection(fmt::format("clipping.clip_planes[{}].normal", i), planes[i].normal); !s.ok()) return s;
@@ -206,6 +209,23 @@ Status CheckRules(const std::vector<FieldChoice>& fields) {
   return Status::Ok();
 }
 
+Status CheckRules(const std::vector<ShapeChoice>& shapes) {
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    if (Status s = CheckRules(shapes[i].range, fmt::format("shapes[{}].range", i).c_str()); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
+Status CheckRules(const std::vector<PlaneChoice>& planes) {
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const std::string name = fmt::format("planes[{}]", i);
+    if (Status s = CheckRules(planes[i].slab, name + ".slab"); !s.ok()) return s;
+    if (Status s = InRange(name + ".slab.thickness", planes[i].slab.thickness, 0, 0); !s.ok()) return s;
+    if (Status s = CheckRules(planes[i].range, (name + ".range").c_str()); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
 template <class T>
 Status ValidatePart(const char* name, const T& part) {
   if (Status s = CheckSchema(name, part); !s.ok()) return s;
@@ -232,6 +252,8 @@ Status Validate(const FrameRequest& request) {
   if (Status s = CheckRules(request.clipping); !s.ok()) return s;
   if (Status s = CheckRules(request.transfer); !s.ok()) return s;
   if (Status s = CheckRules(request.shading); !s.ok()) return s;
+  if (Status s = CheckRules(request.shapes); !s.ok()) return s;
+  if (Status s = CheckRules(request.planes); !s.ok()) return s;
   return CheckRules(request.fields);
 }
 

@@ -17,8 +17,10 @@ void DatasetMachine::State::On(const SeekDataset& event) {
     news.uses[event.use] = DatasetLost{known, &RefusedRequests::unknown_dataset};
     return;
   }
-  Use sought{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}};
-  for (const ShapeChoice& shape : event.request->shapes) sought.shapes.push_back({shape.shape, Seek(shape.shape)});
+  Use sought{.request = event.request,
+             .most_level_bytes = event.most_level_bytes,
+             .entries = {{name, Seek(name)}},
+             .shapes = SeekShapes(*event.request)};
   const auto use = uses.insert_or_assign(event.use, std::move(sought)).first;
   if (const Status found = Advance(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
@@ -154,9 +156,19 @@ Status DatasetMachine::State::Advance(Use& use) {
     if (Status sought = SeekSources(use); !sought.ok()) return sought;
   }
   // What shapes are there decides what the picture frames, and so the levels that it draws.
-  const bool has_shapes =
-      std::ranges::all_of(use.shapes, [&](const Use::Entry& shape) { return datasets.Find(shape.name)->state == DatasetState::kReady; });
-  return use.stage == Use::Stage::kSources && ready() && has_shapes ? SeekVoxels(use) : Status::Ok();
+  if (use.stage == Use::Stage::kSources && ready()) {
+    const Result<bool> has_shapes = SeekAtTime(*use.request, use.time, use.shapes);
+    if (!has_shapes.ok()) return has_shapes.status();
+    const Status sought = *has_shapes ? SeekVoxels(use) : Status::Ok();
+    if (!sought.ok()) return sought;
+  }
+  const bool has_voxels = use.stage == Use::Stage::kVoxels && datasets.Find(use.entries.front().name)->state == DatasetState::kReady;
+  if (has_voxels && use.planes.empty()) {
+    const DatasetTable::Entry& volume = *datasets.Find(use.volume);
+    const VolumeDescription& finest = volume.levels != nullptr ? volume.levels->levels.front() : volume.summary->description;
+    use.planes = SeekPlanes(*use.request, finest.geometry, use.entries.front().name);
+  }
+  return Status::Ok();
 }
 
 Status DatasetMachine::State::SeekSources(Use& use) {
@@ -181,6 +193,7 @@ Status DatasetMachine::State::SeekSources(Use& use) {
   use.entries.clear();
   for (const std::string& source : sources) use.entries.push_back(source == name ? dataset : Use::Entry{source, Seek(source)});
   use.fields = std::move(shown->fields);
+  use.time = shown->time;
   use.stage = Use::Stage::kSources;
   return Status::Ok();
 }
@@ -276,7 +289,7 @@ void DatasetMachine::State::AdvanceUses(const std::string& name) {
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
   DatasetReady ready;
-  std::vector<CoarserVolume> voxels, shapes;
+  std::vector<CoarserVolume> voxels, shapes, planes;
   // False: it waits for one.
   const auto add_ready = [&](const std::vector<Use::Entry>& entries, bool may_be, std::vector<CoarserVolume>& added) {
     for (const Use::Entry& awaited : entries) {
@@ -290,13 +303,17 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
     }
     return true;
   };
-  if (!add_ready(use.entries, use.stage == Use::Stage::kVoxels, voxels) || !add_ready(use.shapes, true, shapes)) return;
+  if (!add_ready(use.entries, use.stage == Use::Stage::kVoxels, voxels) || !add_ready(use.shapes, true, shapes) ||
+      !add_ready(use.planes, true, planes)) {
+    return;
+  }
   ready.dataset = voxels.front().dataset;
   ready.summary = voxels.front().summary;
   auto next = voxels.begin() + std::ptrdiff_t(use.volume_entries);
   ready.coarser.assign(voxels.begin() + 1, next);
   ready.fields = use.fields;
   ready.fields.shapes = std::move(shapes);
+  ready.fields.planes = std::move(planes);
   for (FieldVolume& field : ready.fields.others) {
     const std::ptrdiff_t count = std::ptrdiff_t(std::ranges::max(field.of_volume)) + 1;
     field.levels.assign(next, next + count);
@@ -325,13 +342,15 @@ void DatasetMachine::State::TellUses(const std::string& name) {
 void DatasetMachine::State::Lose(const std::string& name, const Status& why, RefusedAs as) {
   std::erase_if(uses, [&](const auto& each) {
     const auto& [id, use] = each;
-    if (use.begun() || !(use.WaitsFor(name) || use.request->dataset == name)) return false;
+    if (use.begun() || !(use.WaitsFor(name) || use.request->dataset == name || ShowsShape(*use.request, name))) return false;
     news.uses[id] = DatasetLost{why, as};
     return true;
   });
   std::erase_if(questions, [&](const auto& each) {
     const OpenQuestion& open = each.second;
-    if (open.asked || !(open.WaitsFor(name) || DatasetOfPart(open.entry) == name)) return false;
+    const FrameRequest* const frame = FrameOf(open.question);
+    const bool shows = frame != nullptr && ShowsShape(*frame, name);
+    if (open.asked || !(open.WaitsFor(name) || DatasetOfPart(open.entry) == name || shows)) return false;
     if (as != nullptr) ++(refused.*as);
     RefuseQuestion(open, why);
     return true;
@@ -440,6 +459,11 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
   SeekWithout(name, std::move(without));
 }
 
+// The same request, which waits for `entry` first.
+DatasetMachine::State::Use DatasetMachine::State::Anew(const Use& use, const Use::Entry& entry) {
+  return {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {entry}, .shapes = NamedShapes(*use.request)};
+}
+
 // What is there of a dataset of which owners are gone, for those who want that rather than nothing.
 void DatasetMachine::State::SeekWithout(const std::string& name, std::map<UseId, Use> without) {
   uses.merge(without);
@@ -453,7 +477,7 @@ void DatasetMachine::State::SeekWithout(const std::string& name, std::map<UseId,
     if (entry.before != nullptr) source.statistics = entry.before->overview();
     const std::string part = PartWithout(name, source.missing);
     datasets.AddPart(part, std::move(source), now);
-    use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{part, Seek(part)}}};
+    use = Anew(use, {part, Seek(part)});
     TellUse(each);
   }
 }
@@ -464,17 +488,22 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
   const std::string name = DatasetOfPart(changed);
   // What waits for a part waits for the dataset, which is opened anew.
   for (auto& [id, use] : uses) {
-    const bool waits = use.stage == Use::Stage::kDataset && use.entries.front().name == name;
-    if (use.begun() || waits || use.request->dataset != name) continue;
-    use = {.request = use.request, .most_level_bytes = use.most_level_bytes, .entries = {{name}}};
+    const std::string& dataset = use.request->dataset;
+    const bool waits = use.stage == Use::Stage::kDataset && use.entries.front().name == dataset;
+    if (use.begun() || waits || !(dataset == name || ShowsShape(*use.request, name))) continue;
+    use = Anew(use, {dataset});
   }
   for (auto& [id, open] : questions) {
-    if (open.asked || DatasetOfPart(open.entry) != name || open.entry == name) continue;
-    open.entry = name;
+    const bool is_of_part = DatasetOfPart(open.entry) == name && open.entry != name;
+    const FrameRequest* const frame = FrameOf(open.question);
+    if (open.asked || !(is_of_part || (frame != nullptr && ShowsShape(*frame, name)))) continue;
+    open.entry = DatasetOf(open.question);
     open.check = 0;
     open.fields = {};
     open.labels = {};
     open.others = {};
+    open.planes = {};
+    if (frame != nullptr) open.shapes = NamedShapes(*frame);
     open.summary = nullptr;
   }
   const bool may_grow = datasets.Find(name)->MayGrow();
@@ -549,7 +578,7 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
     bool tell = false;
     for (auto& [id, use] : uses) {
       bool over = false;
-      for (std::vector<Use::Entry>* const entries : {&use.entries, &use.shapes}) {
+      for (std::vector<Use::Entry>* const entries : {&use.entries, &use.shapes, &use.planes}) {
         for (Use::Entry& awaited : *entries) {
           if (awaited.check == 0 || awaited.name != event.name || !entry->checks.IsOver(awaited.check)) continue;
           awaited.check = 0;

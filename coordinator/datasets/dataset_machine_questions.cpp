@@ -5,16 +5,6 @@
 #include "coordinator/datasets/dataset_machine_state.h"
 
 namespace slabstream {
-namespace {
-
-// The picture that a question is about; null: it is about the dataset.
-FrameRequest* FrameOf(Question& question) {
-  if (auto* pick = std::get_if<PickQuery>(&question)) return &pick->frame;
-  if (auto* view = std::get_if<ViewQuery>(&question)) return &view->frame;
-  return nullptr;
-}
-
-}  // namespace
 
 void DatasetMachine::State::Ask(PeerToken client, Question question) {
   const std::string& name = DatasetOf(question);
@@ -33,9 +23,7 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
     return RefuseQuestion(open, known);
   }
   open.check = Seek(name);
-  for (std::size_t i = 0; frame != nullptr && i < frame->shapes.size(); ++i) {
-    open.shapes.push_back({frame->shapes[i].shape, Seek(frame->shapes[i].shape)});
-  }
+  if (frame != nullptr) open.shapes = SeekShapes(*frame);
   questions.emplace(++last_question, std::move(open));
 }
 
@@ -105,6 +93,7 @@ Status DatasetMachine::State::FindField(OpenQuestion& open) {
   }
   for (FieldVolume& other : found.others) other.of_volume = {0};
   open.fields = std::move(found);
+  open.time = shown->time;
   open.entry = volume.name;
   open.check = volume.check;
   open.labels = std::move(labels);
@@ -131,6 +120,14 @@ void DatasetMachine::State::AskExecutor() {
       }
       if (!can_be_asked(open)) continue;
     }
+    if (const FrameRequest* const frame = FrameOf(open.question)) {
+      const Result<bool> has_shapes = SeekAtTime(*frame, open.time, open.shapes);
+      if (!has_shapes.ok()) {
+        wrong.emplace_back(id, has_shapes.status());
+        continue;
+      }
+      if (!can_be_asked(open)) continue;
+    }
     const bool of_summary = std::holds_alternative<SummaryQuery>(open.question),
                about_view = std::holds_alternative<ViewQuery>(open.question);
     const auto seek_finest = [&](Use::Entry& other) {
@@ -152,6 +149,8 @@ void DatasetMachine::State::AskExecutor() {
       for (std::size_t i = 0; i < open.others.size(); ++i) open.fields.others[i].levels = {known(open.others[i])};
       open.fields.shapes.clear();
       for (const Use::Entry& shape : open.shapes) open.fields.shapes.push_back(known(shape));
+      open.fields.planes.clear();
+      for (const Use::Entry& plane : open.planes) open.fields.planes.push_back(known(plane));
     };
     note_others();
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
@@ -175,6 +174,10 @@ void DatasetMachine::State::AskExecutor() {
       if (!can_be_asked(open)) continue;
     }
     const DatasetTable::Entry& entry = *datasets.Find(open.entry);
+    if (const FrameRequest* const frame = FrameOf(open.question); frame != nullptr && !about_view && open.planes.empty()) {
+      open.planes = SeekPlanes(*frame, entry.summary->description.geometry, open.entry);
+      if (!can_be_asked(open)) continue;
+    }
     if (open.summary != nullptr) {
       VolumeSummary of_all = *open.summary;
       of_all.stored = entry.summary->stored;

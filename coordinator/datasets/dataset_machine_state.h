@@ -3,6 +3,7 @@
 //   dataset_machine.cpp            requests, voxels, checks of their files, and the Step itself
 //   dataset_machine_catalogue.cpp  the catalogue: watched folders and orders
 //   dataset_machine_questions.cpp  questions about what datasets hold
+//   dataset_machine_shapes.cpp     shapes and planes of pictures
 //   dataset_machine_uploads.cpp    datasets that clients send
 #pragma once
 
@@ -40,7 +41,9 @@ struct DatasetMachine::State {
     Stage stage = Stage::kDataset;
     std::vector<Entry> entries;
     std::vector<Entry> shapes = {};            // of the request's shapes, which it waits for, too
+    std::vector<Entry> planes = {};            // of the request's planes, once the voxels are there that they go through
     ShownFields fields = {};                   // from kSources on; `others` without levels
+    int time = 0;                              // from kSources on
     std::size_t volume_entries = 1;            // kVoxels: how many of the entries are the volume's
     std::shared_ptr<const LevelMap> map = {};  // kVoxels: of a volume with levels
     std::string volume = {};                   // kVoxels: the source of the volume
@@ -49,7 +52,8 @@ struct DatasetMachine::State {
 
     bool begun() const { return !kept.empty(); }
     bool WaitsForAny(auto&& is) const {
-      return std::ranges::any_of(entries, is, &Entry::name) || std::ranges::any_of(shapes, is, &Entry::name);
+      const auto any = [&](const std::vector<Entry>& of) { return std::ranges::any_of(of, is, &Entry::name); };
+      return any(entries) || any(shapes) || any(planes);
     }
     bool WaitsFor(const std::string& name) const {
       return WaitsForAny([&](const std::string& each) { return each == name; });
@@ -70,10 +74,12 @@ struct DatasetMachine::State {
     CheckId check = 0;                                       // the check of its files, which must be over first; 0: none
     bool asked = false;                                      // whether the executor was asked
     ShownFields fields = {};                                 // once it waits for the fields that it is about: these alone
+    int time = 0;                                            // of these
     std::shared_ptr<const VolumeSummary> summary = nullptr;  // once it waits for voxels of a level, but is about all of them
     Use::Entry labels = {};                                  // without a name: it needs none
     std::vector<Use::Entry> others = {};                     // of fields.others
     std::vector<Use::Entry> shapes = {};                     // of the shapes in the picture that it is about
+    std::vector<Use::Entry> planes = {};                     // of its planes, once the voxels are there
 
     // All of them.
     std::vector<Use::Entry> entries() const {
@@ -81,10 +87,18 @@ struct DatasetMachine::State {
       if (!labels.name.empty()) all.push_back(labels);
       all.insert(all.end(), others.begin(), others.end());
       all.insert(all.end(), shapes.begin(), shapes.end());
+      all.insert(all.end(), planes.begin(), planes.end());
       return all;
     }
     bool WaitsFor(const std::string& name) const { return std::ranges::count(entries(), name, &Use::Entry::name) > 0; }
   };
+  // The picture that a question is about; null: it is about the dataset.
+  template <class Asked>
+  static auto FrameOf(Asked& question) -> decltype(&std::get<PickQuery>(question).frame) {
+    if (auto* pick = std::get_if<PickQuery>(&question)) return &pick->frame;
+    if (auto* view = std::get_if<ViewQuery>(&question)) return &view->frame;
+    return nullptr;
+  }
   // A dataset on its way from a client.
   struct OpenUpload {
     PeerToken client = 0;
@@ -156,6 +170,11 @@ struct DatasetMachine::State {
   // NotFound: this dataset is neither known nor may be found in a folder, or a shape of the picture is not. `frame`: null: it shows none.
   Status CheckKnown(const std::string& name, const FrameRequest* frame) const;
   CheckId Seek(const std::string& name);
+  static std::vector<Use::Entry> NamedShapes(const FrameRequest& request);  // as they are before their times are sought
+  std::vector<Use::Entry> SeekShapes(const FrameRequest& request);
+  Result<bool> SeekAtTime(const FrameRequest& request, int time, std::vector<Use::Entry>& shapes);
+  std::vector<Use::Entry> SeekPlanes(const FrameRequest& request, const VolumeGeometry& finest, const std::string& through);
+  static Use Anew(const Use& use, const Use::Entry& entry);
   Status Advance(Use& use);
   Status SeekSources(Use& use);
   Status SeekVoxels(Use& use);

@@ -26,6 +26,7 @@
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/levels.h"
+#include "common/view/clip.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/datasets/check_counter.h"
 #include "data/catalogue/data_source.h"
@@ -42,6 +43,10 @@ inline std::string PartName(const std::string& dataset, int field, int time) {
 // What is shown of an owned dataset while owners are gone.
 inline std::string PartWithout(const std::string& dataset, Missing missing) {
   return dataset + (missing == Missing::kSkip ? "\nwhat is there" : "\nlast time");
+}
+inline std::string PlaneName(const std::string& through, const ClipSlab& slab) {
+  const Vec3 at = slab.through.value_or(Vec3{});
+  return fmt::format("{}\nplane {},{},{} at {},{},{}", through, slab.normal.x, slab.normal.y, slab.normal.z, at.x, at.y, at.z);
 }
 inline bool IsPart(const std::string& name) { return name.find('\n') != std::string::npos; }
 inline bool IsLevelName(const std::string& name) { return IsPart(name) && name.find(' ', name.rfind('\n')) == std::string::npos; }

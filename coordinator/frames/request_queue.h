@@ -73,6 +73,7 @@ struct OpenRequest {
         if (field.light) all.push_back(field.light->dataset);
       }
       for (const CoarserVolume& shape : fields.shapes) all.push_back(shape.dataset);
+      for (const CoarserVolume& plane : fields.planes) all.push_back(plane.dataset);
       return all;
     }
     bool DrawsFrom(const DatasetReady& ready) const {

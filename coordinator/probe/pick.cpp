@@ -9,6 +9,7 @@
 #include "common/frame/label_look.h"
 #include "common/frame/smooth_label.h"
 #include "common/renderers/renderer_kind.h"
+#include "coordinator/probe/met_shapes.h"
 
 namespace slabstream {
 namespace {
@@ -95,23 +96,62 @@ std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume
   return std::nullopt;
 }
 
-// The nearest sample with the largest value of `sign` * value.
-std::optional<double> Extreme(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
-                              const std::vector<DepthRange>& ranges, double step, double sign) {
-  std::optional<double> at;
-  double best = -kInfinity;
+// visit(depth, data value) at the samples of the ray, nearest first. Values may not be finite.
+void VisitSamples(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray, const std::vector<DepthRange>& ranges,
+                  double step, auto&& visit) {
   for (const DepthRange& range : ranges) {
     const auto count = std::int64_t(std::ceil((range.end - range.begin) / step));
     for (std::int64_t i = 0; i <= count; ++i) {
       const double depth = std::min(range.begin + double(i) * step, range.end);
       const Vec3 voxel = setup.description.geometry.stretch.ToVoxel(ray.origin + depth * ray.direction);
-      const double value = sign * setup.description.mapping.FromStored(volume.Interpolated(voxel));
-      if (!(value > best)) continue;  // also not finite
-      best = value;
-      at = depth;
+      visit(depth, setup.description.mapping.FromStored(volume.Interpolated(voxel)));
     }
   }
-  return at;
+}
+
+// What a projection of the volume shows.
+struct Projected {
+  std::optional<double> depth = {};  // of the nearest sample with the value; none: there is no such sample
+  double opacity = 0;                // of the pixel
+};
+
+Projected Project(const FrameSetup& setup, PickRule rule, const ProbeVolume& volume, const Camera::Ray& ray,
+                  const std::vector<DepthRange>& ranges, double step) {
+  Projected found;
+  const auto show = [&](double value) { found.opacity = 1 - std::pow(1 - setup.transfer.Opacity(value), setup.weight); };
+  if (rule == PickRule::kNone) {
+    found.opacity = ranges.empty() ? 0 : 1;
+  } else if (rule == PickRule::kMean) {
+    double sum = 0, count = 0;
+    VisitSamples(setup, volume, ray, ranges, step, [&](double /*depth*/, double value) {
+      if (!std::isfinite(value)) return;
+      sum += value;
+      ++count;
+    });
+    if (count > 0) show(sum / count);
+  } else {
+    const double sign = rule == PickRule::kLargest ? 1 : -1;
+    double best = -kInfinity;
+    VisitSamples(setup, volume, ray, ranges, step, [&](double depth, double value) {
+      if (!(sign * value > best)) return;  // also not finite
+      best = sign * value;
+      found.depth = depth;
+    });
+    if (found.depth) show(sign * best);
+  }
+  return found;
+}
+
+constexpr double kHalf = 0.5;  // of the light
+
+// The shape nearer than `depth` at which half of the light is lost, of which `left` reaches the shapes; null: none.
+const MetShape* ShapeThatHides(const std::vector<MetShape>& met, double left, double depth) {
+  for (const MetShape& shape : met) {
+    if (!(shape.depth < depth)) break;
+    left *= 1 - shape.opacity;
+    if (left <= kHalf) return &shape;
+  }
+  return nullptr;
 }
 
 // How a ray loses light.
@@ -198,6 +238,12 @@ class HalfLightWalk {
   HalfLightWalk(const Matter& matter, const Camera::Ray& ray, double least_per_depth)
       : matter_(matter), ray_(ray), least_per_depth_(least_per_depth) {}
 
+  // Whether half is lost there.
+  bool Meets(const MetShape& shape) {
+    left_ *= 1 - shape.opacity;
+    return left_ <= kHalf;
+  }
+
   std::optional<double> Along(const DepthRange& range, double step) {
     const auto count = std::int64_t(std::ceil((range.end - range.begin) / step));
     double stored = StoredAt(range.begin);
@@ -221,8 +267,6 @@ class HalfLightWalk {
   }
 
  private:
-  static constexpr double kHalf = 0.5;
-
   double StoredAt(double depth) const { return matter_.StoredAt(ray_.origin + depth * ray_.direction); }
 
   // `stored`: the sample at its begin, then that at its end.
@@ -244,41 +288,59 @@ class HalfLightWalk {
 
 }  // namespace
 
-std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, double x, double y) {
+std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, double x, double y, std::span<const ShapeView> shapes) {
   const Camera::Ray ray = setup.camera.RayAt(x * setup.camera.supersample, y * setup.camera.supersample);
-  const std::vector<DepthRange> ranges = DrawnRanges(setup, ray);
+  const std::vector<MetShape> met = MeetShapes(setup, shapes, ray);
+  std::vector<DepthRange> ranges = DrawnRanges(setup, ray);
+  if (!met.empty() && met.back().opacity == 1) {
+    for (DepthRange& range : ranges) range.end = std::min(range.end, met.back().depth);
+    std::erase_if(ranges, [](const DepthRange& range) { return range.begin >= range.end; });
+  }
   const Vec3& spacing = setup.description.geometry.spacing;
   const double length_per_depth = Length(ray.direction * spacing), least_per_depth = length_per_depth / Least(spacing);
   const double step = kStep * setup.description.geometry.least_distance() / length_per_depth;
 
+  const auto voxel_at = [&](double depth) {
+    return VoxelAt(setup.description.geometry.stretch.ToVoxel(ray.origin + depth * ray.direction));
+  };
   const auto picked = [&](double depth, double deeper) {
     const Box bounds = setup.description.geometry.bounds();
-    const Index3 voxel = VoxelAt(setup.description.geometry.stretch.ToVoxel(ray.origin + (depth + deeper) * ray.direction));
-    return Picked{ray.origin + depth * ray.direction, depth, Max(bounds.begin, Min(voxel, bounds.end - Uniform(1)))};
+    return Picked{ray.origin + depth * ray.direction, depth, Max(bounds.begin, Min(voxel_at(depth + deeper), bounds.end - Uniform(1)))};
   };
-  const auto extreme = [&](double sign) -> std::optional<Picked> {
-    const std::optional<double> depth = Extreme(setup, volume, ray, ranges, step, sign);
-    return depth ? std::optional(picked(*depth, 0)) : std::nullopt;
+  const auto picked_shape = [&](const MetShape& shape) {
+    return Picked{ray.origin + shape.depth * ray.direction, shape.depth, voxel_at(shape.depth), shape.shape, shape.value};
   };
-  switch (setup.renderer->PickRuleOf(setup.parameters)) {
-    case PickRule::kHalfOpacity: {
-      const Matter matter(setup, volume);
-      HalfLightWalk walk(matter, ray, least_per_depth);
-      for (const DepthRange& range : ranges) {
-        if (const std::optional<double> depth = walk.Along(range, step)) return picked(*depth, step / kStep);
+  const PickRule rule = setup.renderer->PickRuleOf(setup.parameters);
+  if (rule == PickRule::kHalfOpacity) {
+    const Matter matter(setup, volume);
+    HalfLightWalk walk(matter, ray, least_per_depth);
+    auto next = met.begin();
+    for (DepthRange rest : ranges) {
+      for (; next != met.end() && next->depth < rest.end; ++next) {
+        if (next->depth > rest.begin) {
+          if (const std::optional<double> depth = walk.Along({rest.begin, next->depth}, step)) return picked(*depth, step / kStep);
+          rest.begin = next->depth;
+        }
+        if (walk.Meets(*next)) return picked_shape(*next);
       }
-      return std::nullopt;
+      if (const std::optional<double> depth = walk.Along(rest, step)) return picked(*depth, step / kStep);
     }
-    case PickRule::kSurface: {
-      const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, ranges);
-      if (!entry) return std::nullopt;
-      return Picked{ray.origin + entry->depth * ray.direction, entry->depth, entry->voxel};
+    for (; next != met.end(); ++next) {
+      if (walk.Meets(*next)) return picked_shape(*next);
     }
-    case PickRule::kLargest: return extreme(1);
-    case PickRule::kLeast: return extreme(-1);
-    case PickRule::kNone: break;
+    return std::nullopt;
   }
-  return std::nullopt;
+  if (rule == PickRule::kSurface) {
+    const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, ranges);
+    if (const MetShape* const shape = ShapeThatHides(met, 1, entry ? entry->depth : kInfinity)) return picked_shape(*shape);
+    if (!entry) return std::nullopt;
+    return Picked{ray.origin + entry->depth * ray.direction, entry->depth, entry->voxel};
+  }
+  const Projected seen = Project(setup, rule, volume, ray, ranges, step);
+  if (1 - seen.opacity > kHalf) {
+    if (const MetShape* const shape = ShapeThatHides(met, 1 - seen.opacity, kInfinity)) return picked_shape(*shape);
+  }
+  return seen.depth ? std::optional(picked(*seen.depth, 0)) : std::nullopt;
 }
 
 }  // namespace slabstream

@@ -29,13 +29,21 @@
 namespace slabstream {
 namespace {
 
+Status UnloadedMeanwhile(const std::string& dataset) { return Status::Unavailable("dataset \"" + dataset + "\" was unloaded meanwhile"); }
+
+// What lies beside the voxels of the volume, as far as the question needs it.
+struct Beside {
+  ReadLabels labels = nullptr;                        // null: there are none
+  std::span<const VoxelServer::Samples> shapes = {};  // of FrameSetup::shapes
+};
+
 struct Dataset {
   const ProbeVolume& volume;
   std::shared_ptr<const VolumeSummary> summary;
   DatasetId id;
   std::optional<WholeNumbers> exact = {};  // where stored samples round them
   const AnswerQuestion& asked;
-  const ReadLabels& labels;  // null: there are none, or the question does not need them
+  const Beside& beside;
 };
 
 WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
@@ -128,8 +136,8 @@ Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& datase
   StatisticsReply reply{.nonce = query.nonce, .statistics = *statistics, .description = dataset.summary->description};
   if (!query.labels) return QuestionReply(std::move(reply));
   const LabelTable* const table = TableOf(dataset.asked);
-  if (table == nullptr || dataset.labels == nullptr) return NoLabels(query);
-  Result<std::map<std::uint64_t, BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, dataset.labels);
+  if (table == nullptr || dataset.beside.labels == nullptr) return NoLabels(query);
+  Result<std::map<std::uint64_t, BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, dataset.beside.labels);
   if (!of_labels.ok()) return of_labels.status();
   if (table->complete) {
     for (const Label& label : table->labels) of_labels->try_emplace(label.value);
@@ -157,16 +165,32 @@ Result<QuestionReply> Answer(const JointHistogramQuery& query, const Dataset& da
   });
 }
 
+// Shapes of a picture, then its planes.
+Result<std::vector<ShapeView>> ViewShapes(std::span<const VoxelServer::Samples> shapes, const FrameRequest& frame) {
+  std::vector<ShapeView> views;
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    if (shapes[i].volume == nullptr) return UnloadedMeanwhile(i < frame.shapes.size() ? frame.shapes[i].shape : frame.dataset);
+    const Result<ShapeView> view = ViewShape(shapes[i].volume->block.bytes);
+    if (!view.ok()) return view.status();
+    views.push_back(*view);
+  }
+  return views;
+}
+
 Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary, dataset.asked.fields);
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
+  const Result<std::vector<ShapeView>> shapes = ViewShapes(dataset.beside.shapes, query.frame);
+  if (!shapes.ok()) return shapes.status();
   PickReply reply{.nonce = query.nonce};
-  if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
+  if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y, *shapes)) {
     reply.sample =
         SampleAtVoxel(dataset.volume, *dataset.summary, dataset.summary->description.geometry.ToWorld(picked->at), picked->voxel);
     reply.depth = picked->depth * setup->unit;
+    reply.shape = picked->shape;
+    reply.value = picked->value;
   }
   return QuestionReply(std::move(reply));
 }
@@ -263,11 +287,11 @@ std::function<std::uint64_t(const Index3&)> OneLabel(const ReadLabels& labels) {
 // A question about a few points.
 template <class Query>
 Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
-                                 const ReadLabels& labels) {
+                                 const Beside& beside) {
   ReadVoxels read(from);
-  ProbeVolume volume{.voxels = read.voxels(), .label = OneLabel(labels)};
+  ProbeVolume volume{.voxels = read.voxels(), .label = OneLabel(beside.labels)};
   if (MayBeRounded(from.source->info().exact.type)) volume.exact = [&](const Index3& voxel) { return read.ExactAt(voxel); };
-  Result<QuestionReply> answer = Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, labels});
+  Result<QuestionReply> answer = Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, beside});
   return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
 
@@ -288,7 +312,7 @@ void AddKept(const ClipRegion& region, const Box& box, Box& kept) {
 }
 
 Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
-                                 const ReadLabels& labels) {
+                                 const Beside& beside) {
   const VolumeDescription& description = asked.summary->description;
   const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
   if (!region.ok()) return region.status();
@@ -298,21 +322,21 @@ Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuest
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
   const ProbeVolume volume{.voxels = VoxelBricks(*block)};
-  return Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, labels});
+  return Answer(query, Dataset{volume, asked.summary, asked.dataset, {}, asked, beside});
 }
 
 Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from,
-                                 const ReadLabels& /*labels*/) {
+                                 const Beside& /*beside*/) {
   return AnswerJointHistogram(query, *asked.summary, [&](const Box& box) { return ReadBox(from, box); });
 }
 
 Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& /*from*/,
-                                 const ReadLabels& /*labels*/) {
+                                 const Beside& /*beside*/) {
   return AnswerSummary(query, *asked.summary, asked);
 }
 
 Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& /*from*/,
-                                 const ReadLabels& /*labels*/) {
+                                 const Beside& /*beside*/) {
   return AnswerView(query, asked.summary->description.geometry, asked.summary, asked.fields);
 }
 
@@ -327,7 +351,7 @@ Status AddFields(const AnswerQuestion& asked, const std::vector<VoxelServer::Sam
   for (std::size_t i = 0; i < fields.others.size(); ++i) {
     const FieldVolume& field = fields.others[i];
     if (field.labels || samples.empty()) continue;
-    if (!others[i].any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+    if (!others[i].any()) return UnloadedMeanwhile(DatasetOf(asked.question));
     const VolumeDescription& of = field.levels.front().summary->description;
     std::optional<ReadVoxels> read;
     if (others[i].in_parts.source != nullptr) read.emplace(others[i].in_parts);
@@ -370,7 +394,7 @@ ReadLabels LabelsBesideVolume(const AnswerQuestion& asked, const VoxelServer::Sa
   };
 }
 
-Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const ReadLabels& labels) {
+Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::Samples& samples, const Beside& beside) {
   if (asked.levels != nullptr) {
     return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary, asked.fields);
   }
@@ -382,18 +406,18 @@ Result<QuestionReply> AnswerOf(const AnswerQuestion& asked, const VoxelServer::S
         fmt::format("dataset \"{}\" has labels and no values to measure: measure a volume with these labels, which may be the same file",
                     DatasetOf(asked.question)));
   }
-  if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
+  if (!samples.any()) return UnloadedMeanwhile(DatasetOf(asked.question));
   if (asked.at_time) return AnswerAtTime(std::get<SummaryQuery>(asked.question), asked, samples);
   if (samples.in_parts.source != nullptr) {
-    return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts, labels); }, asked.question);
+    return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts, beside); }, asked.question);
   }
-  ProbeVolume volume{.voxels = samples.view(), .label = OneLabel(labels)};
+  ProbeVolume volume{.voxels = samples.view(), .label = OneLabel(beside.labels)};
   if (const ExactSamples* const exact = samples.exact.get()) {
     volume.exact = [exact, size = samples.box().size()](const Index3& voxel) {
       return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
     };
   }
-  Dataset dataset{volume, asked.summary, asked.dataset, {}, asked, labels};
+  Dataset dataset{volume, asked.summary, asked.dataset, {}, asked, beside};
   if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
 }
@@ -411,9 +435,12 @@ void NameLabels(const AnswerQuestion& asked, std::span<VolumeSample> samples) {
 }  // namespace
 
 Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples,
-                               const std::vector<VoxelServer::Samples>& others, const VoxelServer::Samples& labels) {
+                               const std::vector<VoxelServer::Samples>& others, const VoxelServer::Samples& labels,
+                               const std::vector<VoxelServer::Samples>& shapes) {
   Status read_labels = Status::Ok();
-  Result<QuestionReply> reply = AnswerOf(asked, samples, labels.any() ? LabelsBesideVolume(asked, labels, read_labels) : ReadLabels());
+  Beside beside{.shapes = shapes};
+  if (labels.any()) beside.labels = LabelsBesideVolume(asked, labels, read_labels);
+  Result<QuestionReply> reply = AnswerOf(asked, samples, beside);
   if (!read_labels.ok()) return read_labels;
   if (!reply.ok()) return reply;
   std::span<VolumeSample> points;

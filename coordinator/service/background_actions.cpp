@@ -19,10 +19,12 @@
 #include "common/text/url.h"
 #include "common/threads/guarded.h"
 #include "common/volume/memory_budget.h"
+#include "coordinator/probe/plane_shape.h"
 #include "coordinator/service/answer_question.h"
 #include "coordinator/service/dataset_id.h"
 #include "data/catalogue/client_file.h"
 #include "data/catalogue/dataset_fields.h"
+#include "data/catalogue/shape_data.h"
 #include "data/owned/owned_source.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
@@ -153,9 +155,16 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   if (action.source.statistics != nullptr) found = WithStatistics(std::move(found), *action.source.statistics);
   found.labels = loaded.labels;
   found.shape = loaded.shape;
+  if (loaded.shape != nullptr && action.source.statistics != nullptr && action.source.statistics->shape != nullptr) {
+    ShapeInfo info = *loaded.shape;
+    info.least = action.source.statistics->shape->least;
+    info.largest = action.source.statistics->shape->largest;
+    found.shape = std::make_shared<const ShapeInfo>(info);
+  }
   auto summary = std::make_shared<const VolumeSummary>(std::move(found));
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
-  if (!held && MostBricksAreEqual(*summary)) {
+  // The bytes of a shape are read where they are.
+  if (!held && loaded.shape == nullptr && MostBricksAreEqual(*summary)) {
     samples.bricks = std::make_shared<const BrickedVoxels>(volume->block);
   } else {
     samples.volume = volume;
@@ -167,6 +176,26 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp, FieldsOf(action.source, loaded.file),
                             loaded.source},
               id, std::move(samples)};
+}
+
+// A plane through voxels that are loaded.
+Result<BackgroundActions::News> BackgroundActions::LoadPlane(const LoadDataset& action, const VoxelServer::Samples& samples) {
+  if (!samples.any()) return Status::Unavailable(Named(action.name) + ": its voxels were unloaded meanwhile");
+  const VolumeDescription& description = action.source.plane->summary->description;
+  const auto read = [&](const Box& box) -> Result<VoxelBlock> {
+    VoxelBlock block = MakeVoxelBlock(box, description.type);
+    if (const auto& from = samples.in_parts; from.source != nullptr) {
+      if (Status status = from.source->ReadNow(from.level, box, block.bytes); !status.ok()) return status;
+    } else {
+      samples.view().Read(box, 0, block.bytes);
+    }
+    return block;
+  };
+  const Result<Shape> shape = PlaneShape(action.source.plane->slab, description, read);
+  if (!shape.ok()) return shape.status();
+  Result<LoadedData> data = DataOfShape(*shape);
+  if (!data.ok()) return data.status();
+  return Hold(action, LoadedSource{.file = {}, .volume = std::move(data->volume), .stamp = nullptr, .shape = std::move(data->shape)});
 }
 
 // The levels of a source, or its only one.
@@ -260,6 +289,13 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const std::string barrier = Named(action.name) + " could not be loaded";
+  if (const PlaneOfVoxels* const plane = action.source.plane.get()) {
+    const std::optional<StoredAt>& stored = plane->summary->stored;
+    return Post(
+        answers_.Of(stored ? ServerOf(stored->source) : 0), barrier.c_str(),
+        [action, samples = voxels_.Find(plane->voxels)] { return LoadPlane(action, samples); },
+        EndOf<DatasetFailed>(action.name, action.load));
+  }
   const auto load = [action, inbox = inbox_] {
     const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
     Result<News> news = Load(action, tell);
@@ -301,13 +337,15 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   const std::optional<StoredAt>& stored = action.summary->stored;
-  std::vector<VoxelServer::Samples> others;
+  std::vector<VoxelServer::Samples> others, shapes;
   for (const FieldVolume& field : action.fields.others) others.push_back(voxels_.Find(field.levels.front().dataset));
+  for (const auto* const of : {&action.fields.shapes, &action.fields.planes}) {
+    for (const CoarserVolume& shape : *of) shapes.push_back(voxels_.Find(shape.dataset));
+  }
   return PostResult(
       answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset), others = std::move(others), labels = voxels_.Find(action.labels.dataset)] {
-        return AnswerTo(action, samples, others, labels);
-      },
+      [action, samples = voxels_.Find(action.dataset), others = std::move(others), labels = voxels_.Find(action.labels.dataset),
+       shapes = std::move(shapes)] { return AnswerTo(action, samples, others, labels, shapes); },
       EndOf<QuestionAnswered>(action.id));
 }
 

@@ -81,6 +81,7 @@ class BackgroundActions {
   static Result<News> Load(const LoadDataset& action, const TellRead& tell);
   static Result<News> Open(const LoadDataset& action, OpenedSource opened, const TellRead& tell);
   static Result<News> Hold(const LoadDataset& action, const LoadedSource& loaded);
+  static Result<News> LoadPlane(const LoadDataset& action, const VoxelServer::Samples& samples);
   static Result<News> LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(auto&& tasks, const char* what, auto make, auto failed);

@@ -170,7 +170,7 @@ void LeaveOutMost(FoundData& found) {
 }
 
 Status CheckHeaders(const DataSource& data) {
-  if (data.is_shape) return Status::Ok();
+  if (data.is_shape) return FindShapeFile(data.path).status();
   Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   source->options.describe = true;
@@ -392,7 +392,7 @@ Status CheckFields(const DataSource& source) {
 }
 
 DataSource::DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers)
-    : path(std::move(from_path)), folder(std::move(of_folder)), is_shape(HoldsShape(path)) {
+    : path(std::move(from_path)), folder(std::move(of_folder)), is_shape(NamesShape(path)) {
   if (!layers.overlay.empty()) overlay = std::make_shared<const DataSource>(layers.overlay, folder);
   if (layers.labels.empty()) return;
   DataSource of_labels = LabelsAt(DataSource(layers.labels, folder));

@@ -13,6 +13,8 @@
 
 #include "common/base/status.h"
 #include "common/files/file_stamp.h"
+#include "common/frame/dataset_id.h"
+#include "common/view/clip.h"
 #include "common/volume/labels.h"
 #include "common/volume/missing.h"
 #include "common/volume/stored_at.h"
@@ -38,6 +40,13 @@ struct SourceAtLevel {
   int times = 1;                                  // of its dataset
 };
 
+// A plane through voxels that are loaded.
+struct PlaneOfVoxels {
+  ClipSlab slab;  // of thickness 0, with `through`
+  DatasetId voxels = 0;
+  std::shared_ptr<const VolumeSummary> summary;  // of them
+};
+
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
 struct LoadedData {
   std::shared_ptr<const Volume> volume;
@@ -50,7 +59,7 @@ using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 // Paths, or a function whose volume never changes.
 struct DataSource {
   DataSource() = default;
-  DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers = {});  // looks at the file (HoldsShape)
+  DataSource(std::string from_path, std::string of_folder, const LayerFiles& layers = {});  // looks at the file (NamesShape)
   template <std::convertible_to<DataLoader> Loader>
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
@@ -66,7 +75,7 @@ struct DataSource {
   // Fields with a grid of their own; null: there is none. Only a named dataset has them. A source that names labels of 32 or 64 bits, and
   // no values, is a dataset of labels alone: its volume is hollow (hollow_source.h), and its labels are those of the same files.
   std::shared_ptr<const DataSource> overlay = {}, labels = {};
-  bool is_shape = false;          // by the look of its file: a mesh, lines or points (HoldsShape)
+  bool is_shape = false;          // by the look of its file: a mesh, lines or points (NamesShape)
   bool is_field = false;          // of a dataset: labels are labels, and make no hollow volume
   std::string label_colors = {};  // of labels: the table of their colours (label_table.h)
   // Range and histogram of its field over the times of its dataset. Set: this is another time than the one that the dataset shows itself,
@@ -76,6 +85,8 @@ struct DataSource {
   std::shared_ptr<VolumeSource> beside = {};
   // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
+  // Set: this is a shape, that plane (coordinator/probe/plane_shape.h), and `path` is not used.
+  std::shared_ptr<const PlaneOfVoxels> plane = {};
   // Set: `path` is not used, and voxels stay with the processes that hold them now (SourceInfo::owned). Unavailable: some are not there,
   // and `missing` wants more, or nobody has it.
   std::function<Result<std::shared_ptr<VolumeSource>>(Missing)> open = {};

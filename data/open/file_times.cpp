@@ -6,12 +6,10 @@
 #include <filesystem>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "common/files/file_stamp.h"
 #include "common/text/natural_order.h"
 #include "common/text/wildcard.h"
-#include "data/open/series_file.h"
 #include "data/volume_io/stated_field.h"
 
 namespace slabstream {
@@ -23,9 +21,6 @@ std::string FolderOf(const std::string& pattern) {
   const fs::path folder = fs::path(pattern).parent_path();
   return folder.empty() ? "." : folder.string();
 }
-
-// What it says of its files lies there, and changes when one is added.
-std::string ListOf(const std::string& path) { return IsSeriesFile(path) ? path : FolderOf(path); }
 
 Result<std::vector<std::string>> MatchingFiles(const std::string& pattern) {
   const std::string folder = FolderOf(pattern), names = fs::path(pattern).filename().string();
@@ -43,8 +38,19 @@ Result<std::vector<std::string>> MatchingFiles(const std::string& pattern) {
   return files;
 }
 
-// Those of a pattern have their numbers for times.
-Result<std::vector<TimeFile>> FilesOf(const std::string& path) {
+class FileAtTime : public DescribedSource {
+ public:
+  using DescribedSource::DescribedSource;
+
+ private:
+  Result<LevelInMemory> DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted) override {
+    return source_->ReadLevel(level, progress, wanted);
+  }
+};
+
+}  // namespace
+
+Result<std::vector<TimeFile>> FilesOfTimes(const std::string& path) {
   if (IsSeriesFile(path)) {
     Result<std::vector<TimeFile>> files = ReadSeriesFile(path, kMaxFileTimes);
     // It may name itself.
@@ -65,37 +71,31 @@ TimeAxis TimesOf(const std::vector<TimeFile>& files) {
   return StatedTimes(std::int64_t(files.size()), times, "");
 }
 
-class FileAtTime : public DescribedSource {
- public:
-  using DescribedSource::DescribedSource;
-
- private:
-  Result<LevelInMemory> DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted) override {
-    return source_->ReadLevel(level, progress, wanted);
-  }
-};
-
-}  // namespace
-
 bool NamesFileTimes(const std::string& path) {
   std::error_code error;
   return IsSeriesFile(path) || (fs::path(path).filename().string().find('*') != std::string::npos && !fs::exists(path, error));
 }
 
 Result<std::string> FirstFileOf(const std::string& path) {
-  const Result<std::vector<TimeFile>> files = FilesOf(path);
+  const Result<std::vector<TimeFile>> files = FilesOfTimes(path);
   return files.ok() ? Result(files->front().file) : files.status();
+}
+
+std::string ListOfFileTimes(const std::string& path) { return IsSeriesFile(path) ? path : FolderOf(path); }
+
+Status NoSuchFileTime(const std::string& path, int time, std::size_t count) {
+  return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]: a file each", path, time, count - 1));
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& path, const ReadOptions& options, const OpenFileFunction& open) {
   // It looks at each file of a folder, so only where it is needed.
   std::shared_ptr<const FileStamp> growth;
   if (!options.time) {
-    Result<FileStamp> stamp = StampFiles({ListOf(path)});
+    Result<FileStamp> stamp = StampFiles({ListOfFileTimes(path)});
     if (!stamp.ok()) return stamp.status();
     growth = std::make_shared<const FileStamp>(*std::move(stamp));
   }
-  Result<std::vector<TimeFile>> files = FilesOf(path);
+  Result<std::vector<TimeFile>> files = FilesOfTimes(path);
   if (!files.ok()) return files.status();
   ReadOptions of_file = options;
   of_file.time.reset();
@@ -105,9 +105,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFileTimes(const std::string& path, con
     if (!open(files->back().file, of_newest).ok()) files->pop_back();
   }
   const int count = int(files->size()), time = options.time ? options.time->first : 0;
-  if (time >= count) {
-    return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]: a file each", path, time, count - 1));
-  }
+  if (time >= count) return NoSuchFileTime(path, time, files->size());
   if (!options.time && !options.describe && count > 1) {
     return Status::InvalidArgument(
         fmt::format("{}: holds {} volumes, a file each, of which --time takes one: 0 to {}", path, count, count - 1));

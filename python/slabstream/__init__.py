@@ -21,6 +21,7 @@ from .insitu import Owner
 from .loading import Volume, load, render, view
 from .local import shutdown
 from .page_state import Camera
+from .planes import Plane
 from .presets import presets
 from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import AsyncService, Service, connect, connect_async
@@ -36,7 +37,7 @@ __version__ = "0.2.0"
 __all__ = [
     "AsyncService", "Camera", "Cancelled", "DataLoss", "Dataset", "DatasetLevel", "DeadlineExceeded", "Field", "Frame", "Geometry",
     "Histogram", "Image", "Internal", "InvalidArgument", "JointHistogram", "Label", "LabelStatistics", "Level", "Lines", "Mesh", "NotFound", "Owner",
-    "Parameter", "Points", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
+    "Parameter", "Plane", "Points", "Progress", "Region", "ResourceExhausted", "Sample", "Service", "Simulation", "SlabstreamError", "SlabstreamWarning",
     "Source", "Statistics", "Status", "TransferFunction", "Unavailable", "UnknownOption", "Viewer", "Volume", "WebTraffic",
     "Worker", "connect", "connect_async", "load", "open", "presets", "render", "shape_of", "shutdown", "to_pyvista", "view",
 ]

@@ -9,6 +9,7 @@ from typing import Any, Callable, Iterable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
 
+from . import planes as planes_in_space
 from . import schema, shapes, transfer, values
 from .errors import InvalidArgument, UnknownOption
 from .image import PictureFormat
@@ -43,7 +44,7 @@ Put = Callable[[Draft, Option, Any], None]
 _MESSAGES: dict[str, Callable[[str, Any], Any]] = {
     "ImageSize": values.size, "ScalarRange": values.scalar_range, "ClipBox": values.clip_box, "ClipPlane": values.clip_planes,
     "Isosurface": values.isosurfaces, "GradientOpacityPoint": values.gradient_opacities, "LabelOpacity": values.label_opacities,
-    "LabelRange": values.label_ranges, "Vec3": values.directions,
+    "LabelRange": values.label_ranges, "Vec3": values.directions, "PlaneChoice": planes_in_space.choices,
 }
 
 

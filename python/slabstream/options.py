@@ -64,7 +64,12 @@ _CHANNELS = {"name": "channels", "type": "CHANNELS", "help": (
 
 _SHAPE = {"path": "", "type": "SHAPE", "help": (
     "Shows a mesh, lines or points beside the volume: the name of a dataset, a Mesh, Lines or Points, or a mesh of PyVista or trimesh; with a look, "
-    "{\"shape\": \"lung\", \"color\": \"pink\", \"opacity\": 0.4, \"width\": \"3px\", \"map\": \"viridis\", \"range\": (0, 1)}, or \"lung,color=pink\"; or a list of these")}
+    "{\"shape\": \"lung\", \"color\": \"pink\", \"opacity\": 0.4, \"width\": \"3px\", \"map\": \"viridis\", \"range\": (0, 1), \"time\": 3}, or \"lung,color=pink\"; or a list of these")}
+
+
+_PLANE = {"type": "PLANE", "help": (
+    "Shows the volume's values on a plane in space: a Plane, or a text such as \"axial:z=12,opacity=0.5\", as the command line takes it; or a list of "
+    "these")}
 
 
 #: Paths of short forms: the field, and what is said of it (drafts.py).
@@ -79,6 +84,8 @@ def _in_python(entry: dict[str, Any]) -> dict[str, Any] | None:
         entry["path"] = entry["path"].removeprefix("fields.")
     if entry["name"] == "shape":
         entry |= _SHAPE
+    if entry["path"] == "planes":
+        entry |= _PLANE
     path = entry["path"]
     return None if path.startswith("fields.") else {"group": entry["group"], **_CHANNELS} if path == "channels" else entry
 

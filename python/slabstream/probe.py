@@ -64,14 +64,18 @@ class LabelStatistics:
 class Sample:
     """The voxel that holds a point."""
 
-    at: Vector                     # the point: x, y, z of the world
-    index: tuple[int, int, int]    # of the voxel, as arrays have it: z, y, x
-    value: float | int | None      # None: it is not finite; int: a whole number that float rounds
-    label: int | None = None       # as in the file; 0: none; None: the dataset has no labels
+    at: Vector                          # the point: x, y, z of the world
+    index: tuple[int, int, int] | None  # of the voxel, as arrays have it: z, y, x; None: the point is on a shape outside the volume
+    value: float | int | None           # None: it is not finite, or there is no voxel; int: a whole number that float rounds
+    label: int | None = None            # as in the file; 0: none; None: the dataset has no labels
     label_name: str = ""
     # The name and the value of each field that was asked for, or that the picture shows. None: there is no value here.
     fields: tuple[tuple[str, float | None], ...] = ()
-    depth: float | None = None     # of a point that was picked: as depths of the picture's pixels
+    depth: float | None = None          # of a point that was picked: as depths of the picture's pixels
+    # Of a point that was picked on a shape; None: the picture shows the volume there.
+    shape: str | None = None            # its name; of a plane "plane"
+    shape_number: int | None = None     # among the picture's shapes, with planes behind them
+    shape_value: float | None = None    # that it shows there, interpolated; None: it has no values
 
 
 def histogram_of(message: Any) -> Histogram:
@@ -133,4 +137,20 @@ def sample_of(message: Any, depth: float | None = None) -> Sample | None:
         label_name=message.label.name if labelled else "",
         fields=tuple((each.name, each.value if each.HasField("value") else None) for each in message.fields),
         depth=depth,
+    )
+
+
+def picked_of(reply: Any, frame: Any) -> Sample | None:
+    """The answer to a PickQuery about this frame. None: the pixel shows nothing."""
+    if not reply.HasField("sample"):
+        return None
+    sample = sample_of(reply.sample, reply.depth)
+    if not reply.HasField("shape"):
+        return sample
+    number = reply.shape
+    return dataclasses.replace(
+        sample or Sample(at=schema.xyz(reply.sample.at), index=None, value=None, depth=reply.depth),
+        shape=frame.shapes[number].shape if number < len(frame.shapes) else "plane",
+        shape_number=number,
+        shape_value=reply.value if reply.HasField("value") else None,
     )

@@ -222,14 +222,13 @@ class AsyncService:
 
     @takes_options_of("render")
     async def pick(self, /, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
-        """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
-        shows nothing there. docs/rendering.md says which point of the ray that is."""
+        """What the picture with these options shows at (x, y), the volume or a shape: pixels from its upper left corner, with the first pixel's
+        centre at 0.5. None: it shows nothing there. docs/rendering.md says which point of the ray that is."""
         draft = draft_of(dataset, options)
         await self._settle([draft])
         frame = draft.frame
         query = schema.PickQuery(frame=frame, x=values.number("x", x, 0, frame.size.width), y=values.number("y", y, 0, frame.size.height))
-        reply = await self._connection.ask("pick_query", query, timeout)
-        return probe.sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
+        return probe.picked_of(await self._connection.ask("pick_query", query, timeout), frame)
 
     async def status(self, timeout: float = ANSWER_SECONDS) -> Status:
         """Workers, datasets and counts of frames."""

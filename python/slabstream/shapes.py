@@ -14,7 +14,8 @@ from .errors import InvalidArgument
 
 _MOST_VERTICES = 1 << 30  # and parts
 _MOST_SHAPES = 64         # of a picture
-_LOOK = ("color", "opacity", "width", "map", "range")
+_LOOK = ("color", "opacity", "width", "map", "range", "time")
+_MOST_TIME = 1_000_000
 _VTK_TYPES = {"uint8": "unsigned_char", "int64": "vtktypeint64", "float32": "float", "float64": "double"}
 
 
@@ -256,6 +257,8 @@ def _choice(name: str, given: Any) -> tuple[Any, Shape | None]:
         choice.map = look["map"]
     if "range" in look:
         choice.range.CopyFrom(values.scalar_range(f"{name} range", look["range"]))
+    if "time" in look:
+        choice.time = values.integer(f"{name} time", look["time"], 0, _MOST_TIME)
     return choice, None if isinstance(shape, str) else shape_of(shape)
 
 

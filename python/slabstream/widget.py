@@ -64,13 +64,14 @@ def _module_of(gateway: Gateway) -> str:
 
 def _sample_of(picked: Mapping[str, Any]) -> Sample | None:
     """The answer of api/v1/pick."""
-    if not picked.get("hit") or not picked.get("voxel"):
+    if not picked.get("hit"):
         return None
     label = picked.get("label") or {}
-    (x, y, z), (column, row, layer) = picked["at"], picked["voxel"]
-    return Sample(at=(x, y, z), index=(layer, row, column), value=picked.get("value"), label=label.get("value"),
+    (x, y, z), voxel = picked["at"], picked.get("voxel")
+    return Sample(at=(x, y, z), index=(voxel[2], voxel[1], voxel[0]) if voxel else None, value=picked.get("value"), label=label.get("value"),
                   label_name=label.get("name", ""), fields=tuple((each["name"], each["value"]) for each in picked.get("fields", ())),
-                  depth=picked.get("depth"))
+                  depth=picked.get("depth"), shape=picked.get("shape"), shape_number=picked.get("shape_number"),
+                  shape_value=picked.get("shape_value"))
 
 
 class Widget(anywidget.AnyWidget):

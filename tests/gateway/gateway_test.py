@@ -219,6 +219,13 @@ class UploadTest(WithService):
         self.assertEqual(png_pixels(by_query), png_pixels(by_body))
         self.assertNotEqual(png_pixels(by_query), png_pixels(self.get("/api/v1/render.png", dataset="a", size=32, fit="true")[2]))
         self.assertIn("--shape", self.gateway.json("/api/v1/command?" + urllib.parse.urlencode({"dataset": "a", "shape": looks}, doseq=True))[1]["command"])
+        # A corner of the volume, seen along +y; the triangles lie in the plane y = z.
+        status, _, answer = self.get("/api/v1/pick", dataset="a", x=29.5, y=70.5, size=100, renderer="raycast", fit="false", azimuth=0,
+                                     elevation=0, shape=["right", *looks])
+        seen = json.loads(answer)
+        self.assertEqual((status, seen["hit"], seen["shape"], seen["shape_number"], seen["shape_value"]), (200, True, "left", 1, None), answer)
+        self.assertEqual(seen["voxel"], [3, 3, 3])
+        self.assertAlmostEqual(seen["at"][1], seen["at"][2], 4)
         described = self.gateway.json("/api/v1/openapi.json")[1]
         self.assertIn("shape", [each.get("name") for each in described["paths"]["/api/v1/render.png"]["get"]["parameters"]])
         for look, sentence in (("left,colour=red", "must have one of: color, opacity"), ("nobody", "nobody"), ("a", "a")):

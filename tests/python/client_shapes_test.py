@@ -110,6 +110,22 @@ class Shapes(WithAService):
         del mesh, frame
         self.expect_none()
 
+    def test_what_lies_under_a_pixel_may_be_a_shape(self) -> None:
+        vertices, faces = ball(20)
+        mesh = ss.Mesh(vertices, faces, values=vertices[:, 2].copy())
+        view = {**VIEW, "azimuth": 0, "elevation": 0, "fit": False, "look_at": tuple(CENTRE), "transfer": "none"}
+        seen = self.service.pick("head", 24, 24, shape=[mesh.look(opacity=0.2), mesh.look(opacity=0.9)], **view)
+        assert seen is not None
+        self.assertEqual((seen.shape, seen.shape_number), (self.names()[0], 1))
+        self.assertAlmostEqual(float(np.linalg.norm(np.array(seen.at) - CENTRE)), 20, delta=0.7)
+        self.assertAlmostEqual(seen.shape_value or 0, seen.at[2], delta=1e-3)
+        # Far from the volume.
+        seen = self.service.pick("head", 24, 24, shape=ss.Points(CENTRE[None] - (0, 500, 0), radii=9), **view)
+        assert seen is not None
+        self.assertEqual((seen.index, seen.value, seen.shape_number, seen.shape_value), (None, None, 0, None))
+        self.assertLess(seen.at[1], -400)
+        self.assertIsNone(self.service.pick("head", 24, 24, **view))
+
     def expect_none(self) -> None:
         for _ in range(600):
             gc.collect()

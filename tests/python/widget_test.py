@@ -227,8 +227,11 @@ class Widgets(WithAService):
         _, found = page.ask(1, "pick?dataset=head&x=20&y=20&size=40")
         page.say({"picked": json.loads(found)})
         page.say({"picked": {"hit": False}})
+        page.say({"picked": {"hit": True, "depth": 9, "at": [1, 2, 3], "inside": False, "voxel": None, "value": None, "shape": "vessel", "shape_number": 2,
+                             "shape_value": 0.5}})
         page.say({"error": "no such thing"})
-        self.assertEqual(picked, [wanted, None])
+        outside = ss.Sample(at=(1, 2, 3), index=None, value=None, depth=9, shape="vessel", shape_number=2, shape_value=0.5)
+        self.assertEqual(picked, [wanted, None, outside])
         self.assertEqual(failed, ["no such thing"])
 
     def test_a_saved_notebook_has_a_picture(self) -> None:

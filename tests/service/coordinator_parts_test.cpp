@@ -30,6 +30,7 @@
 #include "data/catalogue/dataset_fields.h"
 #include "data/volume_io/volume_writer.h"
 #include "tests/common/mesh/mesh_samples.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/random.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
@@ -55,6 +56,23 @@ TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   EXPECT_EQ(AnswerTo(asked, {}).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
   asked.dataset = 0;
   EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
+}
+
+TEST(AnswerTo, QuestionsAboutAVolumeInPartsHaveTheAnswersOfItsVoxels) {
+  const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 40}).value());
+  const VoxelServer::Samples held{.volume = sphere}, in_parts{.in_parts = {MakeMemorySource(sphere, {}), 0}};
+  AnswerQuestion asked{.dataset = 5, .summary = std::make_shared<const VolumeSummary>(Summarize(*sphere))};
+  const auto both = [&](auto query, auto&& what) {
+    query.dataset = "ball";
+    asked.question = query;
+    const QuestionReply of_held = AnswerTo(asked, held).value(), of_parts = AnswerTo(asked, in_parts).value();
+    EXPECT_EQ(what(of_parts), what(of_held));
+  };
+  both(JointHistogramQuery{}, [](const QuestionReply& reply) { return std::get<JointHistogramReply>(reply).histogram.counts; });
+  both(SummaryQuery{}, [](const QuestionReply& reply) { return std::get<SummaryReply>(reply).histogram; });
+  const ClipBox box{{3, 4, 5}, {30, 31, 22}, ClipUnit::kVoxels};
+  both(StatisticsQuery{.box = box}, [](const QuestionReply& reply) { return std::get<StatisticsReply>(reply).statistics; });
+  both(SampleQuery{.points = {{20, 20, 20}}}, [](const QuestionReply& reply) { return std::get<SampleReply>(reply).samples; });
 }
 
 // Of a volume whose voxel (x, y, z) has the value x + 10 * y + 100 * z.

@@ -1,4 +1,5 @@
 // Shapes in pictures of the service: where rays meet them, what lies in front and behind, and that none of it depends on who draws what.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,7 +8,10 @@
 
 #include "client/embedded/embedded_service.h"
 #include "data/catalogue/shape_data.h"
+#include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
+#include "tests/support/temporary_directory.h"
+#include "tests/support/whole_file.h"
 #include "tests/worker/shapes/shape_pictures.h"
 
 namespace slabstream {
@@ -131,7 +135,7 @@ TEST_F(ShapesInPictures, ShapesOutsideTheVolumeLieInFrontAndBehind) {
   }
 }
 
-// All renderers, both projections, boxes of any number: a mesh, tubes and balls, some of them translucent.
+// All renderers of voxels, both projections, boxes of any number: a mesh, tubes and balls, some of them translucent.
 TEST_F(ShapesInPictures, PicturesDoNotDependOnWhoDrawsWhat) {
   volume_ = TestSphere(kSize);
   Add("mesh", SphereMesh({30, 20, 24}, 14, 24));
@@ -139,7 +143,7 @@ TEST_F(ShapesInPictures, PicturesDoNotDependOnWhoDrawsWhat) {
   Add("lines", lines);
   Add("points", Shape{.kind = ShapeKind::kPoints, .positions = {{24, 24, 24}, {10, 30, 20}, {60, 24, 24}}, .radii = {6, 3, 8}});
   for (const RendererKind* renderer : Renderers()) {
-    if (!renderer->Can(Ability::kShapes)) continue;
+    if (!renderer->Can(Ability::kShapes) || renderer->Can(Ability::kCells)) continue;
     for (const Projection projection : renderer->projections()) {
       FrameRequest request = TestRequest(renderer, 37);
       request.view.projection = projection;
@@ -199,15 +203,125 @@ TEST_F(ShapesInPictures, APlaneDarkensTheBlockBehindIt) {
 // A plane that lies exactly where two boxes meet belongs to one of them.
 TEST_F(ShapesInPictures, APlaneOnTheBorderOfBoxesShowsOnce) {
   volume_ = Block(100);
-  for (const double y : {11.5, 23.5, 31.5}) Add("plane", Plane({23.5, y, 23.5}, {200, 0, 0}, {0, 0, 200}, 1));
-  for (const RendererKind* renderer : Blending()) {
-    FrameRequest request = RequestOf(renderer, 0.001, 0);
-    request.shapes = {{.shape = "plane", .color = Rgb{1, 0, 0}, .opacity = 0.5}};
-    request.policy.axis = AxisChoice::kY;
-    for (const int workers : {2, 3, 4, 6, 8}) {
-      EXPECT_NEAR(PixelAt(RenderBy(workers, request, workers), 48, 40).rgba[0], 0.5, 0.03) << renderer->name() << workers;
+  for (const double y : {11.5, 23.5, 31.5}) {
+    Add("plane", Plane({23.5, y, 23.5}, {200, 0, 0}, {0, 0, 200}, 1));
+    for (const RendererKind* renderer : Blending()) {
+      FrameRequest request = RequestOf(renderer, 0.001, 0);
+      request.shapes = {{.shape = "plane", .color = Rgb{1, 0, 0}, .opacity = 0.5}};
+      request.policy.axis = AxisChoice::kY;
+      for (const int workers : {2, 3, 4, 6, 8}) {
+        EXPECT_NEAR(PixelAt(RenderBy(workers, request, workers), 48, 40).rgba[0], 0.5, 0.03) << y << renderer->name() << workers;
+      }
     }
   }
+}
+
+// A ramp along x: 5 x. Slices of it are the same as a mesh whose vertices have these values.
+TEST_F(ShapesInPictures, PlanesShowTheVolume) {
+  auto volume = std::make_shared<Volume>(*Block(0));
+  for (std::size_t i = 0; i < volume->block.bytes.size(); ++i) volume->block.samples<std::uint8_t>()[i] = std::uint8_t(5 * (i % kSize));
+  volume_ = volume;
+  struct Case {
+    ClipSlab slab;
+    Vec3 u, v;  // sides of the same plane
+  };
+  const double side = kSize;
+  const std::vector<Case> cases = {{{.normal = {0, 1, 0}}, {side, 0, 0}, {0, 0, side}},
+                                   {{.normal = {0, -1, 0}, .index = 30}, {side, 0, 0}, {0, 0, side}},
+                                   {{.normal = {1, 1, 0}, .through = Vec3{23.5, 23.5, 3}}, {side, -side, 0}, {0, 0, side}}};
+  for (const Case& plane : cases) {
+    const double middle = plane.slab.index.value_or(0) > 0 ? 30 : 23.5;
+    Shape mesh = Plane({23.5, middle, 23.5}, plane.u, plane.v, 1);
+    for (const auto& p : mesh.positions) mesh.values.push_back(float(5 * (mesh.origin.x + double(p[0]))));
+    Add("mesh", mesh);
+    for (const RendererKind* renderer : {FindRenderer("raycast"), FindRenderer("zbuffer"), FindRenderer("splat")}) {
+      for (const double opacity : {1.0, 0.5}) {
+        FrameRequest request = RequestOf(renderer, opacity == 1 ? 0 : 0.01, 20);
+        request.shapes = {{.shape = "mesh", .opacity = opacity, .map = "grey", .range = ScalarRange{0, 240}}};
+        const LocalImage expected = RenderBy(1, request, 1);
+        request.shapes = {};
+        request.planes = {{.slab = plane.slab, .opacity = opacity, .range = ScalarRange{0, 240}}};
+        for (const int workers : {1, 3, 8}) {
+          // Values beyond the outermost centres are not those of the ramp: half a voxel, 2.5 of 240.
+          EXPECT_LE(LargestDifference(expected, RenderBy(workers, request, 2), request.size), 0.015)
+              << renderer->name() << ", plane " << &plane - cases.data() << ", " << workers << " workers";
+        }
+      }
+    }
+  }
+}
+
+// Shadows and lights leave planes as they are, and nothing lies in their shadow.
+TEST_F(ShapesInPictures, PlanesAreUnlit) {
+  volume_ = TestSphere(kSize);
+  FrameRequest request = RequestOf(FindRenderer("raycast"), 0.02, 20);
+  request.planes = {{.slab = {.normal = {0, 1, 0}}}};
+  request.transfer.choice = std::string("none");
+  const LocalImage plain = RenderBy(1, request, 1);
+  request.shading.model = ShadingModel::kPhong;
+  request.shading.lights = {{1, 0, 0}};
+  EXPECT_EQ(LargestDifference(plain, RenderBy(1, request, 1), request.size), 0);
+  request = RequestOf(FindRenderer("raycast"), 0.02, 0);
+  request.shading.shadows = 1;
+  request.shading.lights = {{0, 0, 1}};
+  const PixelValue bare = PixelAt(RenderBy(1, request, 1), 48, 60);
+  request.planes = {{.slab = {.normal = {0, 0, 1}}}};
+  EXPECT_THAT(PixelAt(RenderBy(3, request, 1), 48, 60).rgba, ::testing::Pointwise(::testing::FloatNear(1e-5), bare.rgba));
+}
+
+TEST_F(ShapesInPictures, WrongPlanesAreRefusedByName) {
+  Start(1);
+  const auto refused = [&](const PlaneChoice& plane) {
+    FrameRequest request = TestRequest(FindRenderer("raycast"), 0);
+    request.planes = {plane};
+    return client_->Render(request, seconds(60)).status().message();
+  };
+  EXPECT_THAT(refused({.slab = {.index = kSize}}), HasSubstr("plane.index is 48, but the volume has slices 0 to 47 along z"));
+  EXPECT_THAT(refused({.slab = {.normal = {}}}), HasSubstr("planes[0].slab.normal"));
+  EXPECT_THAT(refused({.slab = {.thickness = 2}}), HasSubstr("planes[0].slab.thickness is 2"));
+  EXPECT_THAT(refused({.map = "gray"}), HasSubstr("a plane has map 'gray', but must have one of"));
+  EXPECT_THAT(refused({.range = ScalarRange{3, 3}}), HasSubstr("planes[0].range is 3 to 3, but must rise"));
+  FrameRequest request = TestRequest(FindRenderer("raycast"), 0);
+  request.planes.resize(kMaxPlanes + 1);
+  EXPECT_THAT(client_->Render(request, seconds(60)).status().message(), HasSubstr("planes"));
+}
+
+// A square from x = `low` to `high`, before the eye.
+std::string Square(int low, int high) { return fmt::format("v {0} 0 0\nv {1} 0 0\nv {1} 0 47\nv {0} 0 47\nf 1 2 3 4\n", low, high); }
+
+// Files are times: those of the picture, or one that the picture names.
+TEST_F(ShapesInPictures, ShapesHaveTimes) {
+  const TemporaryDirectory folder;
+  WriteFile(folder / "surf_2.obj", Square(0, 23));
+  WriteFile(folder / "surf_10.obj", Square(24, 47));
+  catalogue_["surf"] = DataSource(folder / "surf_*.obj", "");
+  for (const int time : {0, 1}) {
+    WriteFile(folder / fmt::format("cell_{}.nrrd", time),
+              NrrdHeader({.size = {kSize, kSize, kSize}}, "raw") + FileBytes(kSize * kSize * kSize, 0));
+  }
+  catalogue_["cell"] = DataSource(folder / "cell_*.nrrd", "");
+  Start(2);
+  FrameRequest request = RequestOf(FindRenderer("raycast"), 0, 0);
+  request.shapes = {{.shape = "surf"}};
+  const auto shown = [&] {
+    const LocalImage image = *Render(request).image.floats();
+    return std::pair(PixelAt(image, 38, 48).rgba[3] > 0, PixelAt(image, 58, 48).rgba[3] > 0);
+  };
+  EXPECT_EQ(shown(), std::pair(true, false)) << "a dataset of one time shows the first one";
+  request.shapes[0].time = 1;
+  EXPECT_EQ(shown(), std::pair(false, true));
+  request.shapes[0].time = 2;
+  EXPECT_THAT(client_->Render(request, seconds(60)).status().message(), HasSubstr("shape 'surf' has time 2, must be in [0, 1]"));
+  request.dataset = "cell";
+  request.shapes[0].time = {};
+  request.time = "1";
+  EXPECT_EQ(shown(), std::pair(false, true));
+  request.time = "0";
+  EXPECT_EQ(shown(), std::pair(true, false));
+  WriteFile(folder / "surf_11.obj", Square(0, 47));
+  EXPECT_THAT(client_->Render(request, seconds(60)).status().message(), HasSubstr("shape 'surf' has 3 times, must have one or 2"));
+  request.shapes[0].time = 2;
+  EXPECT_EQ(shown(), std::pair(true, true));
 }
 
 TEST_F(ShapesInPictures, WrongShapesAreRefusedByName) {

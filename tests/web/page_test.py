@@ -1544,6 +1544,9 @@ class PageTest(unittest.TestCase):
         width, height = viewer.drawn()["header"]["size"]
         self.assertAlmostEqual(asked[-1]["x"], width / 2 + 10, delta=1)
         self.assertAlmostEqual(asked[-1]["y"], height / 2 + 5, delta=1)
+        answer.update(shape="vessel", shape_number=0, shape_value=0.25)
+        viewer.hover((12, 5))
+        viewer.until("document.querySelector('.readout').textContent === 'R 1.5  A −2.0  S 3.0 mmvessel 0.25value 140middle'")
         viewer.settled("axial")
         viewer.hover((10, 5), pane="axial")
         viewer.until("/^R .* mmvalue 99$/.test(document.querySelector('.readout').textContent)")

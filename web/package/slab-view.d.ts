@@ -7,7 +7,7 @@ export type SlabViewSetting =
   | "transfer" | "function" | "scalar-range" | "opacity-distance" | "gradient-opacity" | "isovalue" | "surfaces-alone"
   | "clip-box" | "clip-plane" | "clip-mode" | "label-mode" | "label-tint" | "label-surface" | "labels-shown" | "label-opacity"
   | "shape" | "overlay" | "channel" | "channel-transfer" | "channel-color" | "channel-range" | "channel-gamma" | "channel-opacity" | "blend"
-  | "layout" | "at" | "window" | "level" | "measure" | "path" | "legend" | "orientation-marker" | "scale-bar" | "axes" | "color-bar" | "machine";
+  | "layout" | "at" | "window" | "level" | "slice-opacity" | "measure" | "path" | "legend" | "orientation-marker" | "scale-bar" | "axes" | "color-bar" | "machine";
 
 type Known<T> = { readonly [name in SlabViewSetting]?: T };
 
@@ -33,6 +33,9 @@ export interface SlabViewPick {
   readonly interpolated?: number | null;
   readonly label?: { readonly value: number; readonly name: string; readonly color?: string } | null;
   readonly fields?: readonly { readonly name: string; readonly value: number | null }[];
+  readonly shape?: string; // a mesh, lines or points beside the volume was clicked at, or a "plane"
+  readonly shape_number?: number;
+  readonly shape_value?: number | null;
 }
 
 export interface SlabViewElement extends HTMLElement {

@@ -35,7 +35,7 @@ export interface LabelStatistics {
   labels: { value: number; name: string; volume: number; mean: number | null; deviation: number | null; least: number | null; largest: number | null }[];
 }
 export interface LabelName { value: number; name: string; color?: string }
-export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null; fields?: { name: string; value: number | null }[] }
+export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null; fields?: { name: string; value: number | null }[]; shape?: string; shape_value?: number | null }
 
 export class Api {
   private readonly missing = new Set<string>();

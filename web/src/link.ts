@@ -158,7 +158,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   overlay: flag("overlay"), channels: nullable(channels), channelTransfers: each(NAMES.channelTransfers, CHANNEL, transfer), channelColors: each(NAMES.channelColors, CHANNEL, text("", COLOR)), channelRanges: each(NAMES.channelRanges, CHANNEL, range("")),
   channelGammas: each(NAMES.channelGammas, CHANNEL, within("", () => GAMMAS)), channelOpacities: each(NAMES.channelOpacities, CHANNEL, share), blend: oneOf(NAMES.blend, "auto", "add", "over", "max"),
   time: text(NAMES.time, /^(last|\d{1,9}|[\d.]+[a-zµ]{1,3})$/),
-  layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
+  layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")), sliceOpacity: within("slice-opacity", () => [0, 1]),
   measures, path, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), axes: text("axes", NAME), colorBar: flag("color-bar"), machine: flag("machine"),
 };
 

@@ -40,6 +40,12 @@ function labelOptions(offers: Offers, state: State, opacities: boolean): Options
 export const projectionOf = (offers: Offers, { projection, renderer }: State): State["projection"] => (offers.can("perspective", offers.fitting(renderer)) ? projection : "orthographic");
 
 // The options of the picture, without its size.
+// The planes of the slices, in the 3-D picture.
+function planesOf({ crosshair, window, level, sliceOpacity }: State): string[] {
+  const look = (sliceOpacity < 1 ? `,opacity=${sliceOpacity}` : "") + (window !== null && level !== null ? `,range=${level - window / 2}:${level + window / 2}` : "");
+  return ["x", "y", "z"].map((axis, i) => axis + (crosshair ? `:${axis}=${crosshair[i]}` : "") + look);
+}
+
 export function renderOptions(offers: Offers, state: State): Options {
   const renderer = offers.fitting(state.renderer);
   const options: Options = {
@@ -65,6 +71,7 @@ export function renderOptions(offers: Offers, state: State): Options {
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
   const shapes = offers.can("shapes", renderer) ? shapeOptions(state.shapes) : [];
   if (shapes.length > 0) options["shape"] = shapes;
+  if (state.sliceOpacity > 0 && offers.can("shapes", renderer)) options["plane"] = planesOf(state);
   if (offers.can("labels", renderer)) Object.assign(options, labelOptions(offers, state, true));
   return options;
 }

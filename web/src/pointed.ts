@@ -64,7 +64,8 @@ export class Pointed {
     const label = value.label ?? null;
     if (label && label.value > 0) this.onLabel(label);
     const fields = (value.fields ?? []).map(field => (field.value === null ? "" : `${field.name === "volume" ? "value" : field.name} ${shown(field.value)}`));
-    this.say(this.position(value.at), ...fields, label && label.value > 0 ? label.name || `label ${label.value}` : "");
+    const shape = value.shape === undefined ? "" : `${value.shape}${typeof value.shape_value === "number" ? ` ${shown(value.shape_value)}` : ""}`;
+    this.say(this.position(value.at), shape, ...fields, label && label.value > 0 ? label.name || `label ${label.value}` : "");
   }
 
   private position(at: Vec3): string {

@@ -1,7 +1,7 @@
 // Section of the panel: the cross-hair and the window of the slices, by numbers and by names.
 import { takesFunction } from "./channels";
 import { type Context, follow } from "./context";
-import { choice, numberField, optionalField, section } from "./controls";
+import { choice, numberField, optionalField, section, slider } from "./controls";
 import { h } from "./dom";
 import { words } from "./offers";
 import { AXES, AXIS_NAMES, clamp, withAxis } from "./vec";
@@ -22,10 +22,12 @@ export function slicesSection(context: Context): HTMLElement {
     if (value !== OWN) store.update({ window: chosen?.width ?? null, level: chosen?.level ?? null }, "slice preset");
   });
   preset.element.title = "Hounsfield units, of CT";
+  const inSpace = slider("In the 3-D picture", 0, 1, 0.05, v => (v === 0 ? "Off" : `${Math.round(v * 100)} %`),
+    value => store.update({ sliceOpacity: value, ...(value > 0 && offers.turnTo("shapes", store.state.renderer)) }, "slice opacity"));
   const field = (name: string, input: HTMLElement): HTMLElement => h("label", {}, h("span", {}, name), input);
   const windowFields = h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input));
   const element = section("Slices", true, h("div", { class: "fields thirds" }, ...at.map((each, axis) => field(AXIS_NAMES[axis] as string, each.input))),
-    preset.element, windowFields);
+    preset.element, windowFields, inSpace.element);
   const update = (): void => {
     const { state } = store, volume = context.volume();
     element.hidden = state.layout !== "quad" || !volume;
@@ -37,7 +39,9 @@ export function slicesSection(context: Context): HTMLElement {
     at.forEach((each, i) => each.set((state.crosshair ?? volume.centre)[i] as number));
     window.set(state.window);
     level.set(state.level);
+    inSpace.set(state.sliceOpacity);
+    inSpace.element.hidden = !offers.titlesThatCan("shapes");
   };
-  follow(context, ["layout", "crosshair", "window", "level", "channels"], update);
+  follow(context, ["layout", "crosshair", "window", "level", "channels", "sliceOpacity"], update);
   return element;
 }

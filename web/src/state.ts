@@ -57,6 +57,7 @@ export interface State extends Viewpoint {
   crosshair: Vec3 | null; // null: the volume's centre
   window: number | null;
   level: number | null;
+  sliceOpacity: number; // in the 3-D picture; 0: they do not show there
   measures: readonly Measure[];
   path: readonly KeyFrame[]; // key frames of a movie
   // The page
@@ -77,14 +78,14 @@ export const INITIAL: State = {
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelSurface: "blocky", labelsShown: "", labelOpacities: {}, shapes: [],
   overlay: false, channels: null, channelTransfers: {}, channelColors: {}, channelRanges: {}, channelGammas: {}, channelOpacities: {}, blend: "auto", time: "",
-  layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
+  layout: "single", crosshair: null, window: null, level: null, sliceOpacity: 0, measures: [], path: [], legend: true,
   marker: true, scaleBar: true, axes: "off", colorBar: false, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.
 export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelSurface", "labelsShown", "labelOpacities", "shapes", "overlay",
-  "channels", "channelTransfers", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "measures", "path"] as const;
+  "channels", "channelTransfers", "channelColors", "channelRanges", "channelGammas", "channelOpacities", "blend", "window", "level", "sliceOpacity", "measures", "path"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
 

@@ -52,7 +52,7 @@ export class Viewer {
       window: (widen, raise, at) => this.window(widen, raise, at),
       hover: (x, y) => pointed.atPixel(this.pane.shown, ...this.pane.under(x, y), at => measuring.hover(at)),
       leave: () => pointed.clear(),
-      place: (x, y) => { if (!measuring.tool) void this.place(x, y, crosshair => context.store.update({ crosshair, layout: "quad" })); },
+      place: (x, y) => { if (!measuring.tool) void this.place(x, y, (crosshair, inside) => { if (inside) context.store.update({ crosshair, layout: "quad" }); }); },
       click: (x, y) => { if (measuring.tool) void this.place(x, y, at => measuring.place(at)); else this.tell(x, y); },
     });
   }
@@ -149,11 +149,11 @@ export class Viewer {
     if (picked && this.pane.shown) this.pointed.pick(this.pane.shown, ...this.pane.under(x, y)).then(value => { if (value) picked(value); }).catch(() => undefined);
   }
 
-  // Uses the point that a pixel shows.
-  private async place(x: number, y: number, use: (at: Vec3) => void): Promise<void> {
+  // Uses the point that a pixel shows; one of a shape may lie outside the volume.
+  private async place(x: number, y: number, use: (at: Vec3, inside: boolean) => void): Promise<void> {
     if (!this.pane.shown) return;
     const value = await this.pointed.pick(this.pane.shown, ...this.pane.under(x, y)).catch(() => null);
-    if (value?.at && value.hit !== false) use(roundedPoint(value.at));
+    if (value?.at && value.hit !== false) use(roundedPoint(value.at), value.inside !== false);
     else if (this.measuring.tool) this.context.say("Nothing shows there.");
   }
 }

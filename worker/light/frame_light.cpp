@@ -1,6 +1,7 @@
 #include "worker/light/frame_light.h"
 
 #include <algorithm>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -36,7 +37,7 @@ MatterKey KeyOf(const FrameSetup& setup) {
     for (ColorPoint& point : look.transfer.colors) point.color = {};  // colours take no light
   }
   for (const CoarserLevel* const light : LightVolumesOf(setup)) key.lights.push_back(light->dataset);
-  key.shapes = setup.shapes;
+  std::ranges::copy_if(setup.shapes, std::back_inserter(key.shapes), [](const ShapeSetup& shape) { return !shape.look.unlit; });
   for (ShapeSetup& shape : key.shapes) {
     shape.look.color = {};
     shape.look.map.clear();

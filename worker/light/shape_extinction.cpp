@@ -159,7 +159,7 @@ void AddShapes(std::span<const std::shared_ptr<const VoxelBlock>> bytes, const F
   std::vector<LightShape> shapes;
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     const Result<ShapeView> view = ViewShape(bytes[i]->bytes);
-    if (!view.ok()) continue;  // whoever draws it tells why
+    if (!view.ok() || setup.shapes[i].look.unlit) continue;  // whoever draws it tells why
     const AffineMap& to_data = setup.shapes[i].to_data;
     LightShape& shape = shapes.emplace_back(LightShape{.view = *view, .look = &setup.shapes[i].look});
     for (std::size_t axis = 0; axis < 3; ++axis) shape.map.steps[axis] = light.scale * to_data.steps[axis];

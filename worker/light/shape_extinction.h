@@ -13,7 +13,8 @@
 
 namespace slabstream {
 
-// `bytes`: of each of setup.shapes, as PackShape made them; a shape without them is left out, and so is what lies outside the grid.
+// `bytes`: of each of setup.shapes, as PackShape made them; a shape without them is left out, and so are what is
+// unlit and what lies outside the grid.
 // Extinctions add up. Parallel; the result is the same for any number of threads and any instruction set.
 void AddShapes(std::span<const std::shared_ptr<const VoxelBlock>> bytes, const FrameSetup& setup, Extinction& extinction);
 

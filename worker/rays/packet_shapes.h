@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 
+#include "worker/rays/box_fragments.h"
 #include "worker/rays/ray_box.h"
-#include "worker/shapes/fragment_order.h"
-#include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
@@ -39,12 +37,9 @@ struct PacketShapes {
       ends[lane] = kRayEnd;
       std::size_t n = 0;
       if (px < tile.x_end && py < tile.y_end) {
-        const double from_x = px - double(rays.centre_x), from_y = py - double(rays.centre_y);
-        const double length = std::sqrt(1 + (from_x * from_x + from_y * from_y) * double(rays.bend));
         for (const ShapeFragment& fragment : shapes.At(px, py)) {
           any = true;
-          const double distance = double(fragment.depth) * (rays.perspective ? length : 1);
-          const auto k = float((distance - double(rays.start_distance)) / double(rays.step) - double(jitter[lane]));
+          const auto k = float(SampleAtDepth(rays, px, py, fragment.depth) - double(jitter[lane]));
           if (fragment.rgba[3] == 1) {
             ends[lane] = k;
             break;
@@ -52,7 +47,7 @@ struct PacketShapes {
           if (n == count) Clear(layers[count++]);
           Layer& layer = layers[n++];
           layer.k[lane] = k;
-          if (!Owns(box, order.Of(px, py, fragment.depth))) continue;
+          if (!Owns(box.low, box.high, order.Of(px, py, fragment.depth))) continue;
           any_owned = true;
           layer.alpha[lane] = fragment.rgba[3];
           for (std::size_t i = 0; i < 3; ++i) layer.color[i][lane] = fragment.rgba[i] / fragment.rgba[3];
@@ -63,14 +58,6 @@ struct PacketShapes {
   }
 
  private:
-  static bool Owns(const RayBox& box, const FragmentOrder::Place& place) {
-    if (place.side != FragmentOrder::Side::kInside) return false;
-    for (const Axis axis : kAxes) {
-      const auto i = std::size_t(Number(axis));
-      if (!(place.at[axis] >= double(box.low[i]) && place.at[axis] < double(box.high[i]))) return false;
-    }
-    return true;
-  }
   static void Clear(Layer& layer) {
     layer.k.fill(kRayEnd);
     layer.alpha.fill(0);

@@ -1,5 +1,5 @@
-// What lies on a ray, composited front to back: EndSamples, and Sums. Included once for each instruction set, hence the unusual include
-// guard.
+// What lies on a ray, composited front to back: EndSamples, Sums, and fragments of shapes among samples. Included once for each instruction
+// set, hence the unusual include guard.
 #include "worker/rays/sample_look-inl.h"
 
 #if defined(SLABSTREAM_WORKER_RAYS_RAY_SUMS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -70,6 +70,30 @@ struct Sums {
     return hn::Min(hn::Max(hn::MulAdd(color, light.diffuse, light.specular), hn::Zero(FloatTag())), Set(1));
   }
 };
+
+// Adds the fragments of one layer. Their opacity is that of a surface, whatever the length of a step.
+HWY_INLINE void AddFragments(const PacketShapes::Layer& layer, Floats opaque, Sums& sums) {
+  const FloatTag df;
+  const auto alpha = hn::Load(df, layer.alpha.data());
+  const auto shown = hn::And(hn::Gt(alpha, hn::Zero(df)), hn::Lt(sums.alpha, opaque));
+  sums.AddChannels(shown, alpha, [&](std::size_t channel) HWY_ATTR { return hn::Load(df, layer.color[channel].data()); });
+}
+
+// Calls march(part) for what lies between the fragments of each of the two parts of the rays, nearest first, and adds the fragments in
+// between. `shapes`: null: there are none. `opaque`: the alpha at which a ray ends.
+template <class March>
+HWY_INLINE void MarchAmongFragments(const PacketShapes* shapes, const PacketPart (&parts)[2], Floats opaque, Sums& sums, March&& march) {
+  const FloatTag df;
+  const std::size_t layers = shapes == nullptr ? 0 : shapes->count;
+  const auto ends = shapes == nullptr ? Set(kRayEnd) : hn::Load(df, shapes->ends.data());
+  auto from = Set(-kRayEnd);
+  for (std::size_t layer = 0; layer <= layers; ++layer) {
+    const auto to = layer == layers ? ends : hn::Min(hn::Load(df, shapes->layers[layer].k.data()), ends);
+    for (const PacketPart& part : parts) march(Between(part, from, to));
+    if (layer < layers) AddFragments(shapes->layers[layer], opaque, sums);
+    from = to;
+  }
+}
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

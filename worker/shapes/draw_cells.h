@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "worker/shapes/capsule.h"
+#include "common/shapes/capsule.h"
 #include "worker/shapes/key_plane.h"
 #include "worker/shapes/shape_scene.h"
 #include "worker/shapes/tile_samples.h"

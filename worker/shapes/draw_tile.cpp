@@ -50,7 +50,7 @@ class TileDrawing {
     const ShapePiece& piece = shape.view.pieces[number - shape.first_piece];
     if (shape.view.info.kind != ShapeKind::kMesh) {
       for (std::uint32_t part = 0; part < piece.parts; ++part) {
-        const Capsule capsule = scene_.CapsuleOf(shape, piece, part);
+        const Capsule capsule = shape.CapsuleOf(scene_.camera, piece, part);
         const PixelBounds range = RangeOf(capsule);
         if (!range.empty()) DrawCapsule({scene_, samples_, translucent ? &hits_ : nullptr}, range, capsule, number << 8 | part);
       }

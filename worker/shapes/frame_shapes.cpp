@@ -22,21 +22,12 @@ Row4 Composed(const Row4& row, const AffineMap& map, const Vec3& origin) {
   return {Dot(linear, map.steps[0]), Dot(linear, map.steps[1]), Dot(linear, map.steps[2]), Apply(row, map.To(origin))};
 }
 
-SceneShape PlaceShape(const FrameMap& map, const ShapeSetup& setup, const ShapeView& view, const Vec3& spacing) {
-  SceneShape shape{.view = view, .look = setup.look};
-  const ShapeLook& look = setup.look;
-  shape.translucent = look.opacity < 1 || (look.coloring == ShapeColoring::kVertices && view.see_through);
-  shape.x = Composed(map.x, setup.to_data, view.origin);
-  shape.y = Composed(map.y, setup.to_data, view.origin);
-  shape.w = Composed(map.w, setup.to_data, view.origin);
-  shape.depth = Composed(map.depth, setup.to_data, view.origin);
-  for (std::size_t i = 0; i < 3; ++i) shape.to_physical[i] = spacing * setup.to_data.steps[i];
-  shape.offset = spacing * setup.to_data.To(view.origin);
-  const auto& [a, b, c] = shape.to_physical;
-  const double determinant = Dot(a, Cross(b, c));
-  shape.turn_normal = {Cross(b, c), Cross(c, a), Cross(a, b)};
-  for (Vec3& column : shape.turn_normal) column = (1 / determinant) * column;
-  shape.physical_length = std::cbrt(std::abs(determinant));
+SceneShape PlaceShape(const ShapeScene& scene, const ShapeSetup& setup, const ShapeView& view) {
+  SceneShape shape{MakePlacedShape(scene.camera, setup, view)};
+  shape.x = Composed(scene.map.x, setup.to_data, view.origin);
+  shape.y = Composed(scene.map.y, setup.to_data, view.origin);
+  shape.w = Composed(scene.map.w, setup.to_data, view.origin);
+  shape.depth = Composed(scene.map.depth, setup.to_data, view.origin);
   return shape;
 }
 
@@ -51,11 +42,7 @@ Placed Place(const ShapeScene& scene, const SceneShape& shape, const ShapePiece&
     return Vec3{double((i & 1) != 0 ? piece.high[0] : piece.low[0]), double((i & 2) != 0 ? piece.high[1] : piece.low[1]),
                 double((i & 4) != 0 ? piece.high[2] : piece.low[2])};
   };
-  // Balls round lines and points are as large as those at the farthest corner may be.
-  double radius = 0;
-  if (shape.view.info.kind != ShapeKind::kMesh) {
-    for (int i = 0; i < 8; ++i) radius = std::max(radius, scene.RadiusAt(shape, double(piece.radius), shape.ToPhysical(corner(i))));
-  }
+  const double radius = shape.LargestRadius(scene.camera, piece);
   // What a ball of this radius adds to each row of the map.
   const auto reach = [&](const Row4& row) { return radius * Length(Vec3{row[0], row[1], row[2]} / scene.camera.spacing); };
   const double more_x = reach(scene.map.x), more_y = reach(scene.map.y), more_w = reach(scene.map.w), more_depth = reach(scene.map.depth);
@@ -164,35 +151,11 @@ const SceneShape& ShapeScene::ShapeOf(std::uint32_t piece) const {
   return *std::prev(std::ranges::upper_bound(shapes, piece, {}, &SceneShape::first_piece));
 }
 
-double ShapeScene::RadiusAt(const SceneShape& shape, double world_radius, const Vec3& physical) const {
-  const ShapeLook& look = shape.look;
-  if (look.width == 0 && shape.view.info.has_radii) return world_radius * shape.physical_length;
-  if (look.width > 0 && !look.width_in_pixels) return 0.5 * look.width;
-  const double standard = shape.view.info.kind == ShapeKind::kLines ? kStandardLineWidth : kStandardPointWidth;
-  const double depth = Apply(camera.depth_row, physical / camera.spacing);
-  return 0.5 * (look.width > 0 ? look.width : standard) * camera.PixelSizeAt(std::max(depth, 1e-6 * camera.target_depth));
-}
-
-std::array<std::uint32_t, 2> EndsOf(const ShapeView& view, const ShapePiece& piece, std::uint32_t part) {
-  if (view.info.kind == ShapeKind::kPoints) return {piece.first_vertex + part, piece.first_vertex + part};
-  const std::uint8_t* const local = view.corners.data() + 2 * (std::size_t{piece.first_part} + part);
-  return {piece.first_vertex + local[0], piece.first_vertex + local[1]};
-}
-
-Capsule ShapeScene::CapsuleOf(const SceneShape& shape, const ShapePiece& piece, std::uint32_t part) const {
-  const auto [first, last] = EndsOf(shape.view, piece, part);
-  const auto radius = [&](std::uint32_t vertex, const Vec3& at) {
-    return RadiusAt(shape, shape.view.radii.empty() ? 0 : double(shape.view.radii[vertex]), at);
-  };
-  const Vec3 a = shape.ToPhysical(shape.Position(first)), b = shape.ToPhysical(shape.Position(last));
-  return {a, b, radius(first, a), radius(last, b)};
-}
-
 ShapeScene::CapsuleHit ShapeScene::HitOn(const Capsule& capsule, double column, double row) const {
   const FrameMap::Ray ray = map.RayAt(column, row);
   const Vec3 origin = camera.spacing * ray.origin, direction = camera.spacing * ray.direction;
   const auto [depth, s] = capsule.FirstOn(origin, direction);
-  if (!(depth < HUGE_VAL && map.w_per_depth * depth + map.w_0 > map.least_w)) return {};
+  if (!(depth < HUGE_VAL && map.Sees(depth))) return {};
   return {true, map.KeyOf(depth), s, capsule.NormalAt(origin + depth * direction, s)};
 }
 
@@ -209,7 +172,7 @@ Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& set
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     const Result<ShapeView> view = ViewShape(bytes[i]->bytes);
     if (!view.ok()) return view.status();
-    SceneShape& shape = scene.shapes.emplace_back(PlaceShape(scene.map, setup.shapes[i], *view, setup.camera.spacing));
+    SceneShape& shape = scene.shapes.emplace_back(PlaceShape(scene, setup.shapes[i], *view));
     shape.first_piece = std::uint32_t(pieces);
     scene.translucent |= shape.translucent && !view->pieces.empty();
     pieces += view->pieces.size();

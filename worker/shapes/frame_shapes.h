@@ -6,13 +6,12 @@
 // it takes of the light that those before it left. So fragments composited front to back give the mean of the samples, and the last one of
 // a pixel that is covered entirely has exactly 1.
 //
-// Parts of one shape in neighbouring samples that are less than MergedDepth apart are one surface. A surface is shaded once, where the
-// pixel's centre sees it. Opaque surfaces of one pixel that are less than MergedDepth apart are one fragment.
+// Parts of one shape in neighbouring samples that are less than FrameMap::MergedAt apart are one surface. A surface is shaded once, where
+// the pixel's centre sees it. Opaque surfaces of one pixel that are less than that apart are one fragment.
 //
 // A fragment's depth is that of its surface in the pixel's centre, or, where it is not seen there, the mean of its samples.
 //
-// Lines are tubes with round ends and joints, and points are balls; a width in pixels becomes a radius by the picture's camera, at the
-// depth of each vertex. One that holds the eye is not seen.
+// A tube or ball (PlacedShape) that holds the eye is not seen.
 #pragma once
 
 #include <array>
@@ -58,10 +57,6 @@ struct ShapeTile {
     return std::span(fragments).subspan(begin[n], begin[n + 1] - begin[n]);
   }
 };
-
-// Half of what a voxel extends in depth, or twice the width of a pixel there, whichever is more: surfaces that turn away from the eye by up
-// to about 70 degrees are one.
-double MergedDepth(const FrameSetup& setup, double depth);
 
 class FrameShapes {
  public:

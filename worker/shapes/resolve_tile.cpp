@@ -48,7 +48,7 @@ class Resolving {
   }
 
  private:
-  // Less than MergedDepth apart. Without divisions: depths of keys a and b differ by (a - b) / (a b w_per_depth), and w = -1 / a.
+  // Less than FrameMap::MergedAt apart. Without divisions: depths of keys a and b differ by (a - b) / (a b w_per_depth), and w = -1 / a.
   bool Near(float key, float other) const {
     const FrameMap& map = scene_.map;
     const double a = double(key), b = double(other), distance = std::abs(a - b);
@@ -179,11 +179,14 @@ class Resolving {
       if (shape.view.info.kind == ShapeKind::kMesh) {
         WeighTriangles(shape, pixels_.x_begin, pixels_.y_begin, begins[i], ends[i], surfaces_);
       }
-      ColorSurfaces(shape, begins[i], ends[i], surfaces_);
+      if (!shape.look.unlit) ColorSurfaces(shape, begins[i], ends[i], surfaces_);
     }
     FindDepths(scene_.map, count, surfaces_);
     if (lights > 0) FindShares(scene_, pixels_.x_begin, pixels_.y_begin, count, surfaces_);
     LightSurfaces(scene_.shading, -scene_.camera.view_direction, lights > 0, count, surfaces_);
+    for (std::size_t i = 0; i < scene_.shapes.size(); ++i) {
+      if (scene_.shapes[i].look.unlit) ColorSurfaces(scene_.shapes[i], begins[i], ends[i], surfaces_);
+    }
   }
 
   void PlaceOnTriangle(const SceneShape& shape, double column, double row, Layer& layer) {
@@ -203,7 +206,7 @@ class Resolving {
     const std::uint32_t i = layer.surface;
     const ShapePiece& piece = shape.view.pieces[(layer.element >> 8) - shape.first_piece];
     const std::uint32_t part = layer.element & 255;
-    const Capsule capsule = scene_.CapsuleOf(shape, piece, part);
+    const Capsule capsule = shape.CapsuleOf(scene_.camera, piece, part);
     ShapeScene::CapsuleHit hit = scene_.HitOn(capsule, column, row);
     if (hit.seen) {
       layer.key = float(hit.key);
@@ -213,7 +216,7 @@ class Resolving {
     }
     const double length = Length(hit.normal);
     for (std::size_t axis = 0; axis < 3; ++axis) surfaces_.normal[axis][i] = length > 0 ? float(hit.normal[int(axis)] / length) : 0;
-    const std::array<std::uint32_t, 2> ends = EndsOf(shape.view, piece, part);
+    const std::array<std::uint32_t, 2> ends = shape.EndsOf(piece, part);
     surfaces_.vertex[0][i] = surfaces_.vertex[2][i] = std::int32_t(ends[0]);
     surfaces_.vertex[1][i] = std::int32_t(ends[1]);
     surfaces_.weight[0][i] = float(1 - hit.s);

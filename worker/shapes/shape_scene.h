@@ -7,37 +7,21 @@
 #include <span>
 #include <vector>
 
-#include "common/frame/frame_setup.h"
-#include "common/shapes/packed_shape.h"
+#include "common/frame/frame_map.h"
+#include "common/frame/placed_shape.h"
 #include "worker/light/frame_light.h"
-#include "worker/shapes/capsule.h"
-#include "worker/shapes/frame_map.h"
 #include "worker/shapes/frame_shapes.h"
 
 namespace slabstream {
 
-struct SceneShape {
-  ShapeView view;
-  ShapeLook look;
-  bool translucent = false;
-  std::uint32_t first_piece = 0;    // its pieces have the numbers from here on
-  Row4 x{}, y{}, w{}, depth{};      // as those of FrameMap, of positions of `view`
-  std::array<Vec3, 3> to_physical;  // of positions: offset + p.x * to_physical[0] + ...
-  Vec3 offset;
-  std::array<Vec3, 3> turn_normal;  // n.x * turn_normal[0] + ...: in physical space, not of unit length
-  double physical_length = 1;       // of the world's unit
+struct SceneShape : PlacedShape {
+  std::uint32_t first_piece = 0;  // its pieces have the numbers from here on
+  Row4 x{}, y{}, w{}, depth{};    // as those of FrameMap, of positions of `view`
 
   bool Has(std::uint32_t piece) const { return piece >= first_piece && piece - first_piece < view.pieces.size(); }
-  Vec3 Position(std::size_t vertex) const {
-    return {double(view.positions[0][vertex]), double(view.positions[1][vertex]), double(view.positions[2][vertex])};
-  }
-  Vec3 ToPhysical(const Vec3& p) const { return offset + p.x * to_physical[0] + p.y * to_physical[1] + p.z * to_physical[2]; }
 };
 
 inline constexpr std::uint32_t kMostPieces = (1U << 24) - 1;  // Element
-
-// The vertices at the ends of a piece of a line; a point's twice.
-std::array<std::uint32_t, 2> EndsOf(const ShapeView& view, const ShapePiece& piece, std::uint32_t part);
 
 struct ShapeScene {
   FrameMap map;
@@ -58,9 +42,6 @@ struct ShapeScene {
   };
   // At a point of the frame.
   CapsuleHit HitOn(const Capsule& capsule, double column, double row) const;
-  Capsule CapsuleOf(const SceneShape& shape, const ShapePiece& piece, std::uint32_t part) const;
-  // Physical, of a vertex with this radius in the world, if its shape has radii.
-  double RadiusAt(const SceneShape& shape, double world_radius, const Vec3& physical) const;
 };
 
 // A piece in a tile, with the key (FrameMap) of the nearest point that it may have, and the pixels of the tile that it may be seen in.

@@ -101,13 +101,37 @@ void Weigh(const SceneShape& shape, double left, double top, std::size_t begin, 
   }
 }
 
+// The plane's values at positions, bilinearly; NaN: one of the samples is.
+HWY_INLINE Floats PlaneValuesAt(const ShapeView::Plane& plane, const Floats (&p)[3]) {
+  const FloatTag df;
+  const IntTag di;
+  const auto along = [&](const Row4& row, std::int32_t count, Ints& first, Ints& second) HWY_ATTR {
+    const auto place = hn::Add(Dot3(p, Set(row[0]), Set(row[1]), Set(row[2])), Set(row[3]));
+    const auto inside = hn::Min(hn::Max(place, hn::Zero(df)), Set(count - 1));
+    first = hn::Min(hn::ConvertTo(di, inside), hn::Set(di, std::max(count - 2, 0)));
+    second = hn::Min(hn::Add(first, hn::Set(di, 1)), hn::Set(di, count - 1));
+    return hn::Sub(inside, hn::ConvertTo(df, first));
+  };
+  Ints left, right, upper, lower;
+  const auto s = along(plane.column, plane.columns, left, right), t = along(plane.row, plane.rows, upper, lower);
+  const auto row = [&](Ints of) HWY_ATTR {
+    const auto begin = hn::Mul(of, hn::Set(di, plane.columns));
+    const auto a = hn::GatherIndex(df, plane.samples.data(), hn::Add(begin, left));
+    return hn::Add(a, hn::Mul(s, hn::Sub(hn::GatherIndex(df, plane.samples.data(), hn::Add(begin, right)), a)));
+  };
+  const auto a = row(upper);
+  return hn::Add(a, hn::Mul(t, hn::Sub(row(lower), a)));
+}
+
 void ColorThem(const SceneShape& shape, std::size_t begin, std::size_t end, Surfaces& surfaces) {
   const FloatTag df;
   const IntTag di;
   const ShapeLook& look = shape.look;
   const Floats one_color[3] = {Set(double(look.color.r)), Set(double(look.color.g)), Set(double(look.color.b))};
   const bool by_vertex = look.coloring == ShapeColoring::kVertices && !shape.view.colors.empty();
-  const bool by_value = look.coloring == ShapeColoring::kValues && !shape.view.values.empty() && look.map.size() == kShapeMapColors;
+  const bool by_plane = !shape.view.plane.samples.empty();
+  const bool by_value =
+      look.coloring == ShapeColoring::kValues && (by_plane || !shape.view.values.empty()) && look.map.size() == kShapeMapColors;
   for (std::size_t i = begin; i < end; i += hn::Lanes(df)) {
     Floats color[3] = {one_color[0], one_color[1], one_color[2]};
     auto opacity = Set(look.opacity);
@@ -130,10 +154,23 @@ void ColorThem(const SceneShape& shape, std::size_t begin, std::size_t end, Surf
       // An alpha that is 255 everywhere stays 1, whatever the weights are.
       if (shape.view.see_through) opacity = hn::Min(hn::Mul(opacity, hn::Mul(sum[3], Set(1.0 / 255))), Set(1));
     } else if (by_value) {
-      auto value = hn::Zero(df);
-      for (std::size_t v = 0; v < 3; ++v) {
-        const auto of_vertex = hn::GatherIndex(df, shape.view.values.data(), vertex[v]);
-        value = hn::Add(value, hn::IfThenElseZero(hn::Gt(weight[v], hn::Zero(df)), hn::Mul(weight[v], of_vertex)));
+      // Of what an array has for each vertex.
+      const auto mean = [&](const float* array) HWY_ATTR {
+        auto sum = hn::Zero(df);
+        for (std::size_t v = 0; v < 3; ++v) {
+          const auto of_vertex = hn::GatherIndex(df, array, vertex[v]);
+          sum = hn::Add(sum, hn::IfThenElseZero(hn::Gt(weight[v], hn::Zero(df)), hn::Mul(weight[v], of_vertex)));
+        }
+        return sum;
+      };
+      Floats value;
+      if (by_plane) {
+        const Floats p[3] = {mean(shape.view.positions[0].data()), mean(shape.view.positions[1].data()),
+                             mean(shape.view.positions[2].data())};
+        value = PlaneValuesAt(shape.view.plane, p);
+        opacity = hn::IfThenElseZero(hn::Eq(value, value), opacity);
+      } else {
+        value = mean(shape.view.values.data());
       }
       const auto last = double(look.map.size() - 1);
       const auto at = hn::Mul(hn::Sub(value, Set(look.low)), Set(last / (look.high - look.low)));

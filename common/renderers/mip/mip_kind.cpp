@@ -86,7 +86,7 @@ class MipKind : public ProjectionKind {
       case ProjectionMode::kMinimum: return PickRule::kLeast;
       case ProjectionMode::kMean: break;
     }
-    return PickRule::kNone;
+    return PickRule::kMean;
   }
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {

@@ -36,7 +36,7 @@ class ShearKind : public RendererKind {
       : RendererKind({.name = "shear",
                       .title = "multi-pass shears",
                       .purpose = "the volume resampled onto the picture's pixels by three one-dimensional passes, with a cubic kernel",
-                      .abilities = {Ability::kGradientOpacity, Ability::kLights, Ability::kTransfer},
+                      .abilities = {Ability::kGradientOpacity, Ability::kLights, Ability::kTransfer, Ability::kShapes},
                       .parameters = {SamplingRate(),
                                      {.name = "kernel",
                                       .purpose = "Reconstruction between samples, along one axis at a time",

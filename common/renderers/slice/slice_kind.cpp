@@ -48,7 +48,8 @@ class SliceKind : public RendererKind {
       : RendererKind({.name = "slice",
                       .title = "slicing",
                       .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture",
-                      .abilities = {Ability::kPerspective, Ability::kCells, Ability::kLights, Ability::kTransfer, Ability::kShadows},
+                      .abilities = {Ability::kPerspective, Ability::kCells, Ability::kLights, Ability::kTransfer, Ability::kShadows,
+                                    Ability::kShapes},
                       .stages = {Stage::kTransform, Stage::kSample},
                       .parameters = {SamplingRate(kPlanes)}}) {}
 

@@ -54,6 +54,18 @@ TEST(VolumeText, TellsTheValueOfEachFieldByItsName) {
   EXPECT_FALSE(SampleJson({.inside = false}).contains("fields")) << "nothing is there";
 }
 
+TEST(VolumeText, TellsTheShapeThatWasPicked) {
+  const FrameRequest frame{.shapes = {{.shape = "skin"}, {.shape = "vessel"}}};
+  const auto json = [&](const PickReply& reply) { return PickJson(reply, frame).dump(); };
+  const VolumeSample outside{.at = {1.5, -2.5, 0.25}};
+  const std::string begin = R"({"hit":true,"depth":9.5,"at":[1.5,-2.5,0.25],"inside":false,"voxel":null,"value":null)";
+  EXPECT_EQ(json({.sample = outside, .depth = 9.5}), begin + "}");
+  EXPECT_EQ(json({.sample = outside, .depth = 9.5, .shape = 1, .value = 0.5}),
+            begin + R"(,"shape":"vessel","shape_number":1,"shape_value":0.5})");
+  EXPECT_EQ(json({.sample = outside, .depth = 9.5, .shape = 2}), begin + R"(,"shape":"plane","shape_number":2,"shape_value":null})");
+  EXPECT_EQ(json({}), R"({"hit":false})");
+}
+
 StatisticsReply TwoLabels(const Orientation& orientation) {
   const Label left{3, {1, 0.5F, 0}, "left, \"upper\""}, gone{7, {}, ""};
   const VolumeDescription description{.geometry = {{4, 4, 4}, {2, 2, 0.5}, orientation}};

@@ -74,6 +74,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"occlusion-radius", {"0.25", {}}},
     {"termination", {"0.25", {}}},
     {"shape", {"vessel\\,1,color=1,0.5,0,opacity=0.25,width=3px,map=plasma,range=1:5", {}}},
+    {"plane", {"coronal:y=2,opacity=0.5,map=plasma,range=1:5", {}}},
     {"detail", {"2.5", {}}},
     {"level", {"3", {}}},
     {"brightness", {"1.5", {}}},

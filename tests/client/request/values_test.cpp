@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/cli/turntable_values.h"
 #include "client/movie/time_steps.h"
 #include "client/request/value_window.h"
 #include "common/cli/parse.h"
@@ -218,6 +219,42 @@ TEST(Values, ATurntablesOutputIsPicturesOrOneMovie) {
     EXPECT_THAT(ParseTurntableOutput("-o", neither).status().message(), HasSubstr("or the ending of a movie: .mp4, .webm or .gif"))
         << neither;
   }
+}
+
+TEST(ParsePlane, TakesAPlaneAndItsLook) {
+  const auto parse = [](const char* text) { return ParsePlane("--plane", text); };
+  EXPECT_EQ(*parse("axial"), (PlaneChoice{.slab = {.normal = {0, 0, 1}}}));
+  EXPECT_EQ(*parse("coronal:y=-4.5"), (PlaneChoice{.slab = {.normal = {0, 1, 0}, .through = Vec3{0, -4.5, 0}}}));
+  EXPECT_EQ(*parse("x:index=7,opacity=0.5,map=plasma,range=-10:250"),
+            (PlaneChoice{.slab = {.normal = {1, 0, 0}, .index = 7}, .opacity = 0.5, .map = "plasma", .range = ScalarRange{-10, 250}}));
+  EXPECT_EQ(*parse("1/0/-2:at=3/4/5,range=2%:98%"),
+            (PlaneChoice{.slab = {.normal = {1, 0, -2}, .through = Vec3{3, 4, 5}}, .range = ScalarRange{2, 98, true}}));
+  for (const char* text : {"axial", "x:index=7,opacity=0.5,map=plasma,range=-10:250", "1/0/-2:at=3/4/5,range=2%:98%", "y:at=1/2/3",
+                           "sagittal:x=2.25", "z:z=0"}) {
+    const PlaneChoice plane = *parse(text);
+    EXPECT_EQ(*parse(TextOf(plane).c_str()), plane) << text << " is written as " << TextOf(plane);
+  }
+}
+
+TEST(ParsePlane, SaysWhatIsWrong) {
+  const auto message = [](const char* text) { return ParsePlane("--plane", text).status().message(); };
+  for (const char* text : {"", ":", ",opacity=1", "oblique", "1/0", "0/0/0", "1/0/x"}) {
+    EXPECT_THAT(message(text), HasSubstr("or a normal X/Y/Z")) << text;
+  }
+  EXPECT_THAT(message("axial:x=3"), HasSubstr("has 'x=3', but must have one of: z=N, index=N, at=X/Y/Z"));
+  EXPECT_THAT(message("1/1/0:x=3"), HasSubstr("must have one of: index=N, at=X/Y/Z"));
+  EXPECT_THAT(message("axial:at=3"), HasSubstr("at '3' is not X/Y/Z"));
+  EXPECT_THAT(message("axial:index=-1"), HasSubstr("index"));
+  EXPECT_THAT(message("axial:z=far"), HasSubstr("far"));
+  EXPECT_THAT(message("axial,color=red"), HasSubstr("has 'color', but must have one of: opacity, map, range"));
+  EXPECT_THAT(message("axial,opacity=0"), HasSubstr("must lie in (0, 1]"));
+  EXPECT_THAT(message("axial,range=5:1"), HasSubstr("5"));
+}
+
+TEST(ParseShape, TakesATime) {
+  EXPECT_EQ(ParseShape("--shape", "surf,time=3")->time, 3);
+  EXPECT_EQ(TextOf(*ParseShape("--shape", "surf,time=3")), "surf,time=3");
+  EXPECT_FALSE(ParseShape("--shape", "surf,time=last").ok());
 }
 
 }  // namespace

@@ -206,5 +206,26 @@ TEST(PackedShape, DamagedBytesAreRefusedOrReadWithinTheirBounds) {
   }
 }
 
+TEST(PackedShape, KeepsTheValuesOfAPlane) {
+  Shape shape = Sheet(2);
+  shape.plane = {.columns = 3, .rows = 2, .column = {1, 2, 3, 4}, .row = {5, 6, 7, 8}, .samples = {0, 1, 2, 3, -4, 5}};
+  const AlignedVector<std::byte> bytes = PackShape(shape).value();
+  const ShapeView view = ViewShape(bytes).value();
+  EXPECT_EQ(std::tuple(view.plane.columns, view.plane.rows), std::tuple(3, 2));
+  EXPECT_EQ(view.plane.column, shape.plane.column);
+  EXPECT_EQ(view.plane.row, shape.plane.row);
+  EXPECT_TRUE(std::ranges::equal(view.plane.samples, shape.plane.samples));
+  EXPECT_EQ(std::tuple(view.info.has_values, view.info.least, view.info.largest, view.see_through), std::tuple(true, -4, 5, false));
+  shape.plane.samples[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_TRUE(ViewShape(PackShape(shape).value())->see_through);
+  shape.plane.samples.pop_back();
+  EXPECT_THAT(PackShape(shape).status().message(), HasSubstr("shape.plane has 5 samples, must have 3 x 2"));
+  shape.plane = {.columns = kMaxPlaneSide + 1, .rows = 1, .samples = std::vector<float>(kMaxPlaneSide + 1)};
+  EXPECT_THAT(PackShape(shape).status().message(), HasSubstr("at most 4096 a side"));
+  shape.plane = {.columns = 1, .rows = 1, .samples = {1}};
+  shape.values = {1, 2, 3, 4};
+  EXPECT_THAT(PackShape(shape).status().message(), HasSubstr("without values of vertices"));
+}
+
 }  // namespace
 }  // namespace slabstream

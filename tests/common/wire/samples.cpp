@@ -711,7 +711,10 @@ std::vector<PickQuery> SamplesOf() {
 
 template <>
 std::vector<PickReply> SamplesOf() {
-  return {{}, {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300}};
+  return {{},
+          {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300},
+          {kMax64, VolumeSample{.at = {1, 2, 3}}, 1, kMaxShownShapes + kMaxPlanes - 1, -1e300},
+          {.sample = VolumeSample{}, .shape = 0}};
 }
 
 template <>

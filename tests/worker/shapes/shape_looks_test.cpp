@@ -93,6 +93,44 @@ TEST(ShapeLooks, ShowValuesByAMap) {
   EXPECT_EQ(ColorAt(*none.Draw(), 100, 100), (std::array<float, 4>{0, 1, 0, 1}));
 }
 
+// Values of a plane are bilinear among its samples. It is unlit, and has holes where there is no sample.
+TEST(ShapeLooks, ShowValuesOfAPlane) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    Scene scene = {Frame(projection)};
+    Shape shape = Plane({50, 50, 50}, {60, 30, 0}, {0, 0, 60}, 1);
+    shape.plane = {.columns = 61, .rows = 61, .column = {1, 0, 0, 30}, .row = {0, 0, 1, 30}};
+    for (int row = 0; row < 61; ++row) {
+      for (int column = 0; column < 61; ++column) {
+        shape.plane.samples.push_back(row < 10 ? std::numeric_limits<float>::quiet_NaN() : float(column * row));
+      }
+    }
+    ShapeLook look = {.coloring = ShapeColoring::kValues, .low = 0, .high = 3600, .unlit = true};
+    for (std::size_t i = 0; i < kShapeMapColors; ++i) look.map.push_back({float(i) / 255, 0, 1});
+    scene.Add(shape, look);
+    scene.Add(Plane({50, 90, 50}, {100, 0, 0}, {0, 0, 100}, 1), {.color = {0, 1, 0}});
+    const auto shapes = scene.Draw();
+    int seen = 0, holes = 0;
+    ForEachPixel(scene.setup, *shapes, [&](int x, int y, std::span<const ShapeFragment> fragments) {
+      if (fragments.size() != 1 || fragments[0].rgba[3] < 1) return;
+      const Camera::Ray ray = scene.setup.camera.RayAt(x + 0.5, y + 0.5);
+      const double slope = ray.direction.y - 0.5 * ray.direction.x;  // y = 50 + (x - 50) / 2 on the plane
+      const Vec3 p = ray.origin + (50 + 0.5 * (ray.origin.x - 50) - ray.origin.y) / slope * ray.direction;
+      const double column = p.x - 20, row = p.z - 20;
+      if (std::min(column, 60 - column) < 1 || std::min(row, 60 - row) < 1 || std::abs(row - 9.5) < 1) return;
+      if (row < 9) {
+        EXPECT_GT(fragments[0].rgba[1], fragments[0].rgba[2]) << "the shape behind shows, which is green";
+        ++holes;
+      } else {
+        EXPECT_NEAR(fragments[0].rgba[0], column * row / 3600, 1e-3);
+        EXPECT_EQ(fragments[0].rgba[2], 1);
+        ++seen;
+      }
+    });
+    EXPECT_GT(seen, 1000);
+    EXPECT_GT(holes, 100);
+  }
+}
+
 TEST(ShapeLooks, OpacityIsThatOfTheLookTimesThatOfVertices) {
   Scene scene = Unlit();
   Shape shape = Plane({50, 50, 50}, {80, 0, 0}, {0, 0, 80}, 1);

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <random>
 
+#include "common/frame/frame_map.h"
 #include "common/parallel/task_arena.h"
 #include "common/renderers/registry.h"
 #include "common/volume/light_volume.h"
 #include "tests/worker/shapes/shape_pictures.h"
 #include "worker/light/shape_extinction.h"
-#include "worker/shapes/frame_map.h"
 
 namespace slabstream {
 namespace {

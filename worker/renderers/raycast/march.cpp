@@ -410,14 +410,6 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   return shaded;
 }
 
-// Adds the fragments of one layer. Their opacity is that of a surface, whatever the length of a step.
-HWY_INLINE void AddFragments(const PacketShapes::Layer& layer, Floats opaque, Sums& sums) {
-  const FloatTag df;
-  const auto alpha = hn::Load(df, layer.alpha.data());
-  const auto shown = hn::And(hn::Gt(alpha, hn::Zero(df)), hn::Lt(sums.alpha, opaque));
-  sums.AddChannels(shown, alpha, [&](std::size_t channel) HWY_ATTR { return hn::Load(df, layer.color[channel].data()); });
-}
-
 // Apart from plain frames, so that these have the registers for themselves.
 template <class T, Samples kSamples, class Voxels>
 HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket packet, const SampleInterval& owned, const PacketShapes* shapes,
@@ -444,19 +436,9 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
   for (PacketPart& part : parts) {
     for (std::size_t i = 0; i < 3; ++i) part.face[i] = hn::Div(part.face[i], Set(work.box->scale[i]));  // like a gradient there
   }
-  const FloatTag df;
-  const std::size_t layers = shapes == nullptr ? 0 : shapes->count;
-  const auto ends = shapes == nullptr ? Set(kRayEnd) : hn::Load(df, shapes->ends.data());
-  auto from = Set(-kRayEnd);
-  for (std::size_t layer = 0; layer <= layers; ++layer) {
-    const auto to = layer == layers ? ends : hn::Min(hn::Load(df, shapes->layers[layer].k.data()), ends);
-    for (const PacketPart& part : parts) {
-      const PacketPart between = Between(part, from, to);
-      shaded += MarchSamples<T, kSamples, Voxels>(work, packet, between.Of(owned), &between, sums);
-    }
-    if (layer < layers) AddFragments(shapes->layers[layer], Set(1 - work.termination), sums);
-    from = to;
-  }
+  MarchAmongFragments(shapes, parts, Set(1 - work.termination), sums, [&](const PacketPart& part) SLABSTREAM_INLINED {
+    shaded += MarchSamples<T, kSamples, Voxels>(work, packet, part.Of(owned), &part, sums);
+  });
   return shaded;
 }
 

@@ -198,17 +198,23 @@ template <class T>
 HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const StretchedSteps& steps, const PixelBounds& tile,
                                         float* HWY_RESTRICT rgba, std::size_t floats_a_row) {
   std::uint64_t shaded = 0;
-  ForEachPacket(*work.rays, tile, rgba, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT pixels) HWY_ATTR {
-    const auto zero = hn::Zero(FloatTag());
-    Sums sums = {zero, zero, zero, zero};
-    PacketPart parts[2];
-    PartsOf(work.rays->clip, packet, parts);
-    std::uint64_t found = 0;
-    for (const PacketPart& part : parts) found += MarchPart<T>(work, steps, packet, part, sums);
-    if (found != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), pixels);
-    shaded += found;
-    return found != 0;
-  });
+  const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
+  PacketShapes shapes;
+  ForEachPacket(*work.rays, tile, rgba, floats_a_row,
+                [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
+                  const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
+                  const auto zero = hn::Zero(FloatTag());
+                  Sums sums = {zero, zero, zero, zero};
+                  PacketPart parts[2];
+                  PartsOf(work.rays->clip, packet, parts);
+                  std::uint64_t found = 0;
+                  MarchAmongFragments(cut ? &shapes : nullptr, parts, Set(1 - work.termination), sums,
+                                      [&](const PacketPart& part) HWY_ATTR { found += MarchPart<T>(work, steps, packet, part, sums); });
+                  shaded += found;
+                  if (found == 0 && !(cut && shapes.any_owned)) return false;
+                  hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), pixels);
+                  return true;
+                });
   return shaded;
 }
 

@@ -173,10 +173,11 @@ class RegionCache : public BoxCache {
 // The region, in voxels of the level, and where shapes may lie.
 SampledRegion WithShapes(SampledRegion region, const FrameSetup& setup, std::uint8_t level) {
   const GridMap map = MapTo(setup, level);
+  const Stretch& stretch = setup.description.geometry.stretch;
   for (const ShapeSetup& shape : setup.shapes) {
     const bool empty = region.low.x > region.high.x;
     for (const Axis axis : kAxes) {
-      const double low = map.To(shape.low[axis], axis), high = map.To(shape.high[axis], axis);
+      const double low = map.To(stretch.ToVoxel(shape.low[axis], axis), axis), high = map.To(stretch.ToVoxel(shape.high[axis], axis), axis);
       region.low[axis] = empty ? low : std::min(region.low[axis], low);
       region.high[axis] = empty ? high : std::max(region.high[axis], high);
     }

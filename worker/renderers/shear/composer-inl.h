@@ -1,5 +1,5 @@
-// Composer: pass 3 of a tile, from resampled slices to samples of rays, which are shaded and composed. Included once for each instruction
-// set, hence the unusual include guard.
+// Composer: pass 3 of a tile, from resampled slices to samples of rays, which are shaded and composed among fragments of shapes. Included
+// once for each instruction set, hence the unusual include guard.
 #include <hwy/highway.h>
 
 #include "worker/rays/ray_sums-inl.h"
@@ -21,33 +21,73 @@ class Composer : TileContext {
  public:
   explicit Composer(const TileContext& context) : TileContext(context) {}
 
-  // The samples of a row of a chunk between slices z and z + 1. Returns how many were shaded.
+  // The samples of a row of a chunk between slices z and z + 1, and the fragments before them. Returns how many were shaded.
   std::uint64_t Row(std::int32_t z, std::int32_t row, std::int32_t chunk) {
+    const FloatTag df;
     std::uint64_t shaded = 0;
     for (std::int32_t column = chunk * kChunk; column < (chunk + 1) * kChunk; column += kVector) {
-      for (int i = 0; i < parts_; ++i) {
-        const PartRoom& part = room_.parts[i];
-        shaded += clipped_ ? ComposeVector<true>(z, row, column, part) : ComposeVector<false>(z, row, column, part);
-      }
+      auto from = Set(-kRayEnd), to = Set(kRayEnd);  // samples of each ray
+      do {
+        if (!room_.fragments.empty()) to = hn::Load(df, &room_.next_fragment_k[row][column]);
+        for (int i = 0; i < parts_; ++i) {
+          const PartRoom& part = room_.parts[i];
+          shaded += clipped_ ? ComposeVector<true>(z, row, column, part, from, to) : ComposeVector<false>(z, row, column, part, from, to);
+        }
+      } while (!room_.fragments.empty() && AddFragments(z, row, column, to, from));
     }
     return shaded;
   }
 
+  // Behind all samples.
+  void AddFragmentsLeft() {
+    for (std::size_t i = 0; i < room_.fragments.size(); ++i) {
+      const auto& [row, column, k, rgba] = room_.fragments[i];
+      if (i == room_.next_fragment[row][column]) AddFragment(row, column);
+    }
+  }
+
  private:
+  // Adds the next fragment of each ray whose next sample does not lie behind the interval. Returns whether there is any; these rays go on
+  // at `from`, and the others have no samples left here. `to`: next_fragment_k.
+  HWY_NOINLINE bool AddFragments(std::int32_t z, std::int32_t row, std::int32_t column, Floats to, Floats& from) {
+    const FloatTag df;
+    const auto at = hn::Floor(SliceOf(hn::Load(df, &room_.z_of_first[row][column]), to));
+    const auto here = z_move_ > 0 ? hn::Le(at, Set(float(z))) : hn::Ge(at, Set(float(z)));
+    if (hn::AllFalse(df, here)) return false;
+    from = hn::IfThenElse(here, to, Set(kRayEnd));
+    alignas(64) float lanes[kLanes];
+    hn::Store(from, df, lanes);
+    for (std::int32_t lane = 0; lane < kVector; ++lane) {
+      if (lanes[lane] < kRayEnd) AddFragment(row, column + lane);
+    }
+    return true;
+  }
+
+  void AddFragment(std::int32_t row, std::int32_t column) {
+    const std::size_t number = room_.next_fragment[row][column]++;
+    AddBehind(room_.fragments[number].rgba, room_.red[row][column], room_.green[row][column], room_.blue[row][column],
+              room_.alpha[row][column]);
+    const bool more =
+        number + 1 < room_.fragments.size() && room_.fragments[number + 1].row == row && room_.fragments[number + 1].column == column;
+    room_.next_fragment_k[row][column] = more ? room_.fragments[number + 1].k : kRayEnd;
+  }
+
+  // Samples [from, to) of the rays.
   template <bool kClipped>
-  HWY_INLINE std::uint64_t ComposeVector(std::int32_t z, std::int32_t row, std::int32_t column, const PartRoom& part) {
+  HWY_INLINE std::uint64_t ComposeVector(std::int32_t z, std::int32_t row, std::int32_t column, const PartRoom& part, Floats from,
+                                         Floats to) {
     const FloatTag df;
     const RayLook& look = *work_.look;
     const auto zero = hn::Zero(df), one = Set(1), opaque = Set(1 - work_.termination), z_floor = Set(float(z));
     const auto z_of_first = hn::Load(df, &room_.z_of_first[row][column]);
-    const auto end = hn::Load(df, &part.end[row][column]);
+    const auto end = hn::Min(hn::Load(df, &part.end[row][column]), to);
     Sums sums = {hn::Load(df, &room_.red[row][column]), hn::Load(df, &room_.green[row][column]), hn::Load(df, &room_.blue[row][column]),
                  hn::Load(df, &room_.alpha[row][column])};
     // The first sample of each ray here.
     const bool ascending = z_move_ > 0;
     const float edge = float(ascending ? z : z + 1) / float(scale_);
     const auto estimate = hn::Sub(hn::Ceil(hn::Mul(hn::Sub(Set(edge), z_of_first), Set(z_inverse_))), one);
-    auto k = hn::Max(hn::Load(df, &part.begin[row][column]), estimate);
+    auto k = hn::Max(hn::Max(hn::Load(df, &part.begin[row][column]), from), estimate);
     for (int step = 0; step < 2; ++step) {
       const auto floor = hn::Floor(SliceOf(z_of_first, k));
       k = hn::Add(k, hn::IfThenElseZero(ascending ? hn::Lt(floor, z_floor) : hn::Gt(floor, z_floor), one));

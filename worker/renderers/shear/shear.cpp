@@ -80,9 +80,9 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const Render
     tile.along_u = turned ? row : column;
     tile.along_v = turned ? column : row;
     tile.first = image.rgba.data() + (tile.u_begin - u_begin) * tile.along_u + (tile.v_begin - v_begin) * tile.along_v;
-    const PixelBounds pixels = turned ? PixelBounds{tile.v_begin, tile.u_begin, tile.v_end, tile.u_end}
-                                      : PixelBounds{tile.u_begin, tile.v_begin, tile.u_end, tile.v_end};
-    if (!work.hidden->HidesAll(pixels)) shaded += ShearTile(work, tile, *rooms.Mine(MakeTileRoom));
+    tile.pixels = turned ? PixelBounds{tile.v_begin, tile.u_begin, tile.v_end, tile.u_end}
+                         : PixelBounds{tile.u_begin, tile.v_begin, tile.u_end, tile.v_end};
+    if (!work.hidden->HidesAll(tile.pixels)) shaded += ShearTile(work, tile, *rooms.Mine(MakeTileRoom));
   });
   return shaded;
 }
@@ -121,6 +121,12 @@ class ShearRenderer : public Renderer {
     if (!active.empty()) reach = ReachOfBox(rays, setup.camera, WholeBox(active).low, WholeBox(active).high);
     work.k_begin = reach.begin;
     work.k_end = reach.end;
+    std::optional<BoxFragments> fragments;
+    if (const FrameShapes* const shapes = data.shapes()) {
+      work.fragments = &fragments.emplace(BoxFragments{*shapes, rays, FragmentOrder(setup), work.low, work.high});
+      const PixelBounds of_box = ReachOfBox(rays, setup.camera, owned.low, owned.high).pixels;
+      reach.pixels = Union(reach.pixels, Intersection(of_box, shapes->bounds()));
+    }
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
     const std::uint64_t shaded = RenderTiles(work, image, control, report);
 

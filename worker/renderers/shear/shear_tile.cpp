@@ -24,7 +24,14 @@ class TilePasses : TileContext {
       : TileContext(work, tile, room), resampler_(*this), composer_(*this) {}
 
   std::uint64_t Run() {
-    if (!TileRays(*this).SetUp()) return 0;
+    const std::uint64_t shaded = TileRays(*this).SetUp() ? ComposeSlices() : 0;
+    composer_.AddFragmentsLeft();
+    if (shaded != 0 || !room_.fragments.empty()) Write();
+    return shaded;
+  }
+
+ private:
+  std::uint64_t ComposeSlices() {
     const bool ascending = z_move_ > 0;
     std::int32_t z_first = std::numeric_limits<std::int32_t>::max(), z_last = std::numeric_limits<std::int32_t>::min();
     for (auto& row : room_.blocks) {
@@ -43,11 +50,9 @@ class TilePasses : TileContext {
       for (std::int32_t slice = z - 1; slice <= z + 2; ++slice) ResampleSlice(slice);
       shaded += ComposeInterval(z, ascending);
     }
-    if (shaded != 0) Write();
     return shaded;
   }
 
- private:
   bool AnyAliveAt(std::int32_t z) const {
     for (const auto& row : room_.blocks) {
       for (const BlockState& block : row) {

@@ -11,12 +11,16 @@
 // Chunks of slices without active cells, and those whose rays are opaque or elsewhere, are not resampled.
 //
 // Samples lie where those of ray casting lie, and are owned alike: sample (u, v, k) at p belongs to the box with low <= p < high.
+//
+// A fragment of a shape is composited in front of the next sample behind it. An opaque one ends its ray, like a clipping plane: the last
+// sample stands for the length up to it.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "common/image/occlusion_mask.h"
+#include "worker/rays/box_fragments.h"
 #include "worker/rays/ray_look.h"
 #include "worker/rays/view_rays.h"
 #include "worker/renderers/shear/active_macrocells.h"
@@ -38,14 +42,16 @@ struct ShearWork {
   const ActiveMacrocells* active = nullptr;
   const RayLook* look = nullptr;
   const VisibleSamples* visible = nullptr;
-  Float3 low{}, high{};                   // the box owns the positions p with low <= p < high on every axis of the volume
-  std::int32_t k_begin = 0, k_end = 0;    // its samples are among these
-  const OcclusionMask* hidden = nullptr;  // the frame's hidden tiles
-  float termination = 0;                  // a ray ends where it transmits less; 0: never
+  Float3 low{}, high{};                     // the box owns the positions p with low <= p < high on every axis of the volume
+  std::int32_t k_begin = 0, k_end = 0;      // its samples are among these
+  const OcclusionMask* hidden = nullptr;    // the frame's hidden tiles
+  float termination = 0;                    // a ray ends where it transmits less; 0: never
+  const BoxFragments* fragments = nullptr;  // of shapes; null: there are none
 };
 
 // Where a tile's pixels are stored: four floats each.
 struct TilePixels {
+  PixelBounds pixels;                                           // of the frame
   std::int32_t u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;  // at most kTileColumns x kTileRows
   float* first = nullptr;
   std::ptrdiff_t along_u = 0, along_v = 0;  // floats
@@ -59,8 +65,8 @@ struct DeleteTileRoom {
 using TileRoomPtr = std::unique_ptr<TileRoom, DeleteTileRoom>;
 TileRoomPtr MakeTileRoom();
 
-// Premultiplied RGBA of the samples that the box owns. Pixels without a visible sample stay unwritten: they must be 0 before. Returns how
-// many samples were shaded.
+// Premultiplied RGBA of the samples and translucent fragments that the box owns. Pixels without any stay unwritten: they must be 0 before.
+// Returns how many samples were shaded.
 std::uint64_t ShearTile(const ShearWork& work, const TilePixels& tile, TileRoom& room);
 
 }  // namespace slabstream::shear

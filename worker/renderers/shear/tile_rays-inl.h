@@ -1,5 +1,5 @@
-// TileRays: the rays of a tile's lattice points, and which samples of them the box owns. Included once for each instruction set, hence the
-// unusual include guard.
+// TileRays: the rays of a tile's lattice points, what shapes have on them, and which samples of them the box owns. Included once for each
+// instruction set, hence the unusual include guard.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -26,6 +26,7 @@ class TileRays : TileContext {
   // False: the box owns no sample of the tile.
   bool SetUp() {
     const FloatTag df;
+    FindFragments();
     bool any = false;
     for (std::int32_t row = 0; row < kTileRows; ++row) {
       for (std::int32_t column = 0; column < kTileColumns; column += kVector) {
@@ -54,6 +55,26 @@ class TileRays : TileContext {
   }
 
  private:
+  void FindFragments() {
+    room_.fragments.clear();
+    if (work_.fragments == nullptr) return;
+    std::fill_n(room_.next_fragment_k[0], kTileRows * kTileColumns, kRayEnd);
+    std::fill_n(room_.ray_ends[0], kTileRows * kTileColumns, kRayEnd);
+    work_.fragments->ForEachIn(tile_.pixels, [&](std::int32_t x, std::int32_t y, const ShapeFragment& fragment, float at) {
+      const std::int32_t row = (passes_.turned ? x : y) - tile_.v_begin, column = (passes_.turned ? y : x) - tile_.u_begin;
+      if (fragment.rgba[3] == 1) {
+        room_.ray_ends[row][column] = at;
+        return;
+      }
+      float& next = room_.next_fragment_k[row][column];
+      if (next == kRayEnd) {
+        next = std::ceil(at);
+        room_.next_fragment[row][column] = std::uint32_t(room_.fragments.size());
+      }
+      room_.fragments.push_back({row, column, std::ceil(at), fragment.rgba});
+    });
+  }
+
   // Pixels of the tile that are not hidden.
   Mask ValidPixels(std::int32_t row, std::int32_t column) const {
     const FloatTag df;
@@ -72,7 +93,8 @@ class TileRays : TileContext {
   void StoreParts(const RayPacket& packet, const SampleInterval& owned, bool none, std::int32_t row, std::int32_t column) {
     const FloatTag df;
     PacketPart found[2];
-    if (!none && clipped_) PartsOf(rays_.clip, packet, found);
+    const bool cut = clipped_ || work_.fragments != nullptr;
+    if (!none && cut) PartsOf(rays_.clip, packet, found);
     for (int i = 0; i < parts_; ++i) {
       PartRoom& part = room_.parts[i];
       if (none) {
@@ -80,10 +102,11 @@ class TileRays : TileContext {
         hn::Store(hn::Zero(df), df, &part.end[row][column]);
         continue;
       }
-      const SampleInterval samples = clipped_ ? found[i].Of(owned) : owned;
+      if (work_.fragments != nullptr) found[i] = Between(found[i], Set(-kRayEnd), hn::Load(df, &room_.ray_ends[row][column]));
+      const SampleInterval samples = cut ? found[i].Of(owned) : owned;
       hn::Store(samples.begin, df, &part.begin[row][column]);
       hn::Store(samples.end, df, &part.end[row][column]);
-      const EndSamples ends = EndSamplesOf(rays_, packet, LeapScalesOf(packet), clipped_ ? &found[i] : nullptr);
+      const EndSamples ends = EndSamplesOf(rays_, packet, LeapScalesOf(packet), cut ? &found[i] : nullptr);
       hn::Store(ends.first, df, &part.first[row][column]);
       hn::Store(ends.last, df, &part.last[row][column]);
       hn::Store(ends.first_excess, df, &part.first_excess[row][column]);

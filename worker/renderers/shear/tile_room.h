@@ -1,8 +1,10 @@
 // TileRoom: what the passes of a tile hand each other. One tile at a time.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "common/memory/aligned_buffer.h"
 #include "worker/renderers/shear/shear_tile.h"
@@ -41,6 +43,13 @@ struct GradientRoom {
   alignas(64) float along[3][kTileRows][kTileColumns];  // x, y and z
 };
 
+// A translucent fragment of a shape.
+struct TileFragment {
+  std::int32_t row, column;
+  float k;  // it lies in front of this sample: a whole number
+  std::array<float, 4> rgba;
+};
+
 // The memory that one tile needs.
 struct TileRoom {
   SliceRoom slots[kSlots];
@@ -52,7 +61,12 @@ struct TileRoom {
   alignas(64) float red[kTileRows][kTileColumns], green[kTileRows][kTileColumns], blue[kTileRows][kTileColumns],
       alpha[kTileRows][kTileColumns];
   PartRoom parts[2];
-  AlignedVector<float> between, between_slices[kSlots];  // beams between those of the volume
+  // Of frames with shapes. Fragments lie pixel by pixel, nearest first.
+  std::vector<TileFragment> fragments;
+  std::uint32_t next_fragment[kTileRows][kTileColumns];        // numbers in `fragments`
+  alignas(64) float next_fragment_k[kTileRows][kTileColumns];  // its k; kRayEnd: there is none
+  alignas(64) float ray_ends[kTileRows][kTileColumns];         // samples: where opaque fragments end rays, or kRayEnd
+  AlignedVector<float> between, between_slices[kSlots];        // beams between those of the volume
 };
 
 }  // namespace slabstream::shear

@@ -104,13 +104,17 @@ class SliceRenderer : public Renderer {
     const RayLook look = MakeRayLook(table, setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
     const std::span<const std::uint32_t> shown = data.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
     clock.Charge(Stage::kPrepare);
-    if (shown.empty()) return clock.Finish(MakeLocalImage(setup.format, {}), control);
+    if (shown.empty() && data.shapes() == nullptr) return clock.Finish(MakeLocalImage(setup.format, {}), control);
 
     const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
     SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) work.light = &light.emplace(data.light()->Seen());
     const RayReach reach = SetBox(box, work);
+    std::optional<BoxFragments> fragments;
+    if (data.shapes() != nullptr) {
+      work.fragments = &fragments.emplace(BoxFragments{*data.shapes(), space.rays(), FragmentOrder(setup), work.low, work.high});
+    }
     FramePoints& points = data.CacheOf<FramePoints>();
     space.Place(mesh.points, points);
     work.points = &points;
@@ -134,7 +138,7 @@ class SliceRenderer : public Renderer {
     PerThread<TileRoomPtr> rooms;
     ForEachTile(bins.tiles(), control, report, [&](std::int32_t number) {
       const std::span<const CellBins::Entry> cells = bins.VoxelsOf(number);
-      if (cells.empty()) return;
+      if (cells.empty() && work.fragments == nullptr) return;
       const PixelBounds tile = bins.TileAt(number);
       const std::size_t pixel = std::size_t(tile.y_begin - image.bounds.y_begin) * width + std::size_t(tile.x_begin - image.bounds.x_begin);
       drawn += SliceTile(work, tile, cells, *rooms.Mine(MakeTileRoom), &image.rgba[4 * pixel], 4 * width);

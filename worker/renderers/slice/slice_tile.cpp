@@ -15,44 +15,7 @@
 #include "worker/kernels/power-inl.h"
 #include "worker/rays/ray_sums-inl.h"
 #include "worker/renderers/slice/cell_shape-inl.h"
-
-#ifndef SLABSTREAM_WORKER_RENDERERS_SLICE_TILE_ROOM
-#define SLABSTREAM_WORKER_RENDERERS_SLICE_TILE_ROOM
-namespace slabstream::slice {
-
-inline constexpr std::size_t kTilePixels = std::size_t(kTileWidth) * kTileHeight, kRowPadding = 16;  // kernels may rewrite what lies behind
-
-// A cell that reaches into the chunk.
-struct ActiveMacrocell {
-  CellShape shape;
-  std::int32_t k_begin, k_end;  // planes that it may reach into
-  std::int32_t y_begin, y_end;  // rows of the tile
-};
-
-// One of the parts that clipping leaves of the rays; by pixel, [y][x].
-struct TilePart {
-  alignas(64) float begin[kTilePixels], end[kTilePixels];   // samples of the box
-  alignas(64) float first[kTilePixels], last[kTilePixels];  // EndSamples
-  alignas(64) float first_excess[kTilePixels], last_excess[kTilePixels];
-  alignas(64) float face[3][kTilePixels], face_end[kTilePixels];  // PacketPart; of clipped frames that are lit
-};
-
-constexpr std::size_t kChunkFloats = kChunkPlanes * kTilePixels + kRowPadding;  // [plane][y][x]
-
-struct TileRoom {
-  TilePart parts[2];
-  alignas(64) float length[kTilePixels];                          // of a step of each ray, in distances of planes
-  alignas(64) float first[3][kTilePixels], move[3][kTilePixels];  // of each ray (RayPacket); with a FrameLight
-  alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels], alpha[kTilePixels];
-  alignas(64) float values[4][kChunkFloats];  // the value, NaN: no cell; then the gradient's components, of frames that are lit
-  std::vector<std::size_t> chunk_first;       // of `ordered`, by chunk
-  std::vector<std::uint32_t> ordered;         // the tile's cells
-  std::vector<ActiveMacrocell> cells;         // rooms of active cells
-  std::vector<std::uint32_t> active, vacant;  // of `cells`
-};
-
-}  // namespace slabstream::slice
-#endif
+#include "worker/renderers/slice/tile_room.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::slice::HWY_NAMESPACE {
@@ -181,12 +144,13 @@ HWY_NOINLINE void CutCell(const ActiveMacrocell& cell, const Chunk& chunk, std::
   }
 }
 
-// Fills in the parts of the tile's rays and their lengths.
-HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileRoom& room) {
+// Fills in the parts of the tile's rays and their lengths. `shapes_end`: some rays, at room.ray_ends.
+HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, bool shapes_end, TileRoom& room) {
   const FloatTag df;
   const ViewRays& rays = work.space->rays();
   const std::int32_t x0 = tile.x_begin / kTileWidth * kTileWidth, y0 = tile.y_begin / kTileHeight * kTileHeight;
-  const bool clipped = !rays.clip.empty(), has_ends = work.at_border || clipped;
+  const bool clipped = !rays.clip.empty(), cut = clipped || shapes_end;
+  room.has_ends = work.at_border || cut;
   for (TilePart& part : room.parts) std::fill_n(part.end, kTilePixels, -1.0F);
   for (std::int32_t y = y0; y < y0 + kTileHeight; y += kPacketHeight) {
     for (std::int32_t x = x0; x < x0 + kTileWidth; x += kPacketWidth) {
@@ -205,10 +169,17 @@ HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileR
         spread(packet.first[i], room.first[i]);
         spread(packet.move[i], room.move[i]);
       }
-      PacketPart cut[2];
-      if (clipped) PartsOf(rays.clip, packet, cut);
+      PacketPart parts[2];
+      if (cut) PartsOf(rays.clip, packet, parts);
+      if (shapes_end) {
+        alignas(64) float ends[kLanes];
+        for (std::size_t row = 0; row < std::size_t(kPacketHeight); ++row) {
+          std::copy_n(room.ray_ends + pixel + row * kTileWidth, kPacketWidth, ends + row * kPacketWidth);
+        }
+        for (PacketPart& part : parts) part = Between(part, Set(-kRayEnd), hn::Load(df, ends));
+      }
       for (std::size_t i = 0; i < (clipped ? 2 : 1); ++i) {
-        const PacketPart* const part = clipped ? &cut[i] : nullptr;
+        const PacketPart* const part = cut ? &parts[i] : nullptr;
         const SampleInterval samples = part != nullptr ? part->Of(owned) : owned;
         spread(samples.begin, room.parts[i].begin);
         spread(samples.end, room.parts[i].end);
@@ -216,7 +187,7 @@ HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileR
           for (std::size_t axis = 0; axis < 3; ++axis) spread(part->face[axis], room.parts[i].face[axis]);
           spread(part->face_end, room.parts[i].face_end);
         }
-        if (!has_ends) continue;
+        if (!room.has_ends) continue;
         const EndSamples ends = EndSamplesOf(rays, packet, LeapScalesOf(packet), part);
         spread(ends.first, room.parts[i].first);
         spread(ends.last, room.parts[i].last);
@@ -266,7 +237,7 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
   const RayLook& look = *work.look;
   const float* const entries = look.entries.data();
   const auto zero = hn::Zero(df), one = Set(1), opaque = Set(1 - work.termination);
-  const bool has_ends = work.at_border || kClipped, perspective = work.space->perspective();
+  const bool has_ends = room.has_ends, perspective = work.space->perspective();
   std::uint64_t drawn = 0;
   for (std::size_t pixel = 0; pixel < kTilePixels; pixel += kLanes) {
     constexpr std::size_t kParts = kClipped ? 2 : 1;
@@ -330,6 +301,10 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
 // The tile's cells by the chunk where they begin, and by number. Returns the first chunk; room.chunk_first has the places of each chunk
 // from it on.
 std::int32_t OrderCells(std::span<const CellBins::Entry> cells, TileRoom& room) {
+  if (cells.empty()) {
+    room.chunk_first.assign(1, 0);
+    return 0;
+  }
   std::int32_t first = std::numeric_limits<std::int32_t>::max(), last = 0;
   for (const CellBins::Entry& entry : cells) {
     first = std::min(first, entry.chunk);
@@ -397,10 +372,11 @@ HWY_INLINE void FetchAhead(const SliceWork& work, const std::vector<std::uint32_
 
 std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<const CellBins::Entry> cells, TileRoom& room, float* rgba,
                     std::size_t floats_a_row) {
-  if (cells.empty()) return 0;
   const FloatTag df;
   const std::int32_t x0 = tile.x_begin / kTileWidth * kTileWidth, y0 = tile.y_begin / kTileHeight * kTileHeight;
-  FindRays(work, tile, room);
+  const bool shapes_end = FindFragments(work, tile, room);
+  if (cells.empty() && room.fragments.empty()) return 0;
+  FindRays(work, tile, shapes_end, room);
   for (float* channel : {room.red, room.green, room.blue, room.alpha}) std::fill_n(channel, kTilePixels, 0.0F);
   const std::int32_t first_chunk = OrderCells(cells, room);
   room.active.clear();
@@ -444,9 +420,16 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     }
     room.active.resize(kept);
     alive = false;
-    drawn += clipped ? Compose<true>(work, chunk, k_begin, k_end, room, alive) : Compose<false>(work, chunk, k_begin, k_end, room, alive);
+    for (std::int32_t k = k_begin; k < k_end;) {
+      AddFragments(k, room);
+      const bool more = room.next_fragment < room.fragments.size();
+      const std::int32_t end = more ? std::min(k_end, room.fragments[room.next_fragment].plane) : k_end;
+      drawn += clipped ? Compose<true>(work, chunk, k, end, room, alive) : Compose<false>(work, chunk, k, end, room, alive);
+      k = end;
+    }
   }
-  if (drawn == 0) return 0;
+  AddFragments(std::numeric_limits<std::int32_t>::max(), room);
+  if (drawn == 0 && room.fragments.empty()) return 0;
   for (std::int32_t y = tile.y_begin; y < tile.y_end; ++y) {
     float* to = rgba + std::size_t(y - tile.y_begin) * floats_a_row;
     std::size_t pixel = std::size_t(y - y0) * kTileWidth + std::size_t(tile.x_begin - x0);
@@ -466,9 +449,6 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace slabstream::slice {
 HWY_EXPORT(Slice);
-
-void DeleteTileRoom::operator()(TileRoom* room) const { delete room; }
-TileRoomPtr MakeTileRoom() { return TileRoomPtr(new TileRoom); }
 
 std::uint64_t SliceTile(const SliceWork& work, const PixelBounds& tile, std::span<const CellBins::Entry> cells, TileRoom& room, float* rgba,
                         std::size_t floats_a_row) {

@@ -7,6 +7,9 @@
 //      frame is lit, their gradients, too
 //   3. compose: samples that the box owns are classified and lit by RayLook, with shadows and ambient occlusion, and blend front to back
 //   4. cells that end in the chunk leave the list
+//
+// A fragment of a shape is composited in front of the next plane behind it. An opaque one ends its ray, like a clipping plane: the last
+// sample stands for the length up to it.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +19,7 @@
 
 #include "common/mesh/mesh.h"
 #include "worker/light/frame_light.h"
+#include "worker/rays/box_fragments.h"
 #include "worker/rays/ray_look.h"
 #include "worker/renderers/slice/cell_bins.h"
 #include "worker/renderers/slice/frame_space.h"
@@ -32,6 +36,7 @@ struct SliceWork {
   std::int32_t k_begin = 0, k_end = 0;      // its samples are among these
   float termination = 0;                    // a ray ends where it transmits less; 0: never
   const FrameLight::View* light = nullptr;  // shadows and ambient occlusion; null: there are none
+  const BoxFragments* fragments = nullptr;  // of shapes; null: there are none
 };
 
 // Room for what a tile computes. One tile at a time.
@@ -42,8 +47,8 @@ struct DeleteTileRoom {
 using TileRoomPtr = std::unique_ptr<TileRoom, DeleteTileRoom>;
 TileRoomPtr MakeTileRoom();
 
-// Premultiplied RGBA of the samples that the box owns in the pixels of `tile`, at most one tile; `rgba` points to the first pixel. Pixels
-// without a visible sample stay unwritten: they must be 0 before. `cells`: of CellBins. Returns how many samples were drawn.
+// Premultiplied RGBA of the samples and translucent fragments that the box owns in the pixels of `tile`, at most one tile; `rgba` points to
+// the first pixel. Pixels without any stay unwritten: they must be 0 before. `cells`: of CellBins. Returns how many samples were drawn.
 std::uint64_t SliceTile(const SliceWork& work, const PixelBounds& tile, std::span<const CellBins::Entry> cells, TileRoom& room, float* rgba,
                         std::size_t floats_a_row);
 
