@@ -5,7 +5,6 @@
 #include <vpx/vpx_encoder.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string>
 

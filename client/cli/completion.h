@@ -3,7 +3,6 @@
 //   eval "$(slabstream completion bash)"; slabstream render --rend<Tab>      # the script calls `slabstream complete render --rend`
 #pragma once
 
-#include <array>
 #include <functional>
 #include <span>
 #include <string>

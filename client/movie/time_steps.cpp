@@ -1,7 +1,5 @@
 #include "client/movie/time_steps.h"
 
-#include <string>
-
 #include "common/cli/parse.h"
 #include "data/volume_io/read_options.h"
 

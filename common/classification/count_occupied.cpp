@@ -1,6 +1,5 @@
 #include "common/classification/count_occupied.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>

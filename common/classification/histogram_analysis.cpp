@@ -1,7 +1,6 @@
 #include "common/classification/histogram_analysis.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace slabstream {

@@ -5,7 +5,6 @@
 
 #include <iterator>
 #include <random>
-#include <string>
 
 #include "common/base/check.h"
 

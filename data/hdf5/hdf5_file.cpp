@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include "common/base/printable.h"

@@ -9,7 +9,6 @@
 // The same source gives the same bytes, however many threads there are.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>

@@ -1,7 +1,6 @@
 // BoxTree: finds those of many boxes that meet another box, without a look at each of them.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>

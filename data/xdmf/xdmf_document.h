@@ -3,7 +3,6 @@
 // A file is hostile until proven otherwise: bytes, elements, depth and the search for references have limits. One thread at a time.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <initializer_list>

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "common/base/printable.h"
 #include "data/volume_io/structured_grid.h"

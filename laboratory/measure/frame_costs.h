@@ -3,7 +3,6 @@
 #pragma once
 
 #include <deque>
-#include <vector>
 
 #include "common/planning/frame_plan.h"
 #include "common/wire/payload.h"

@@ -6,6 +6,7 @@
 #include "client/request/volume_argument.h"
 #include "common/cli/parse.h"
 #include "common/transport/endpoint.h"
+#include "common/wire/validate_request.h"
 #include "simulator/model/link_model.h"
 #include "tests/fuzz/decoders.h"
 

@@ -2,6 +2,7 @@
 // one time that all had, or says in one line what it lacks.
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/service/multi_process_fixture.h"

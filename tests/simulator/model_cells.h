@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "common/frame/dataset_id.h"
 #include "common/volume/box.h"
 #include "common/wire/digest.h"
 #include "common/wire/ids.h"

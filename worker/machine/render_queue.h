@@ -14,7 +14,6 @@
 #include <optional>
 #include <set>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "common/threads/fair_turns.h"
