@@ -51,7 +51,7 @@ Status CheckShapeFile(const std::string& path) {
   if (!file.ok()) return Status(file.status().code(), "--shape " + file.status().message());
   std::error_code error;
   if (!std::filesystem::exists(file->path, error)) return Status::NotFound(fmt::format("--shape {}: no such file", Printable(path)));
-  if (NamesShape(path)) return Status::Ok();
+  if (HoldsShape(file->path)) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("--shape {} is not a mesh, lines or points: such files end in {}", Printable(path), ShapeEndings()));
 }

@@ -19,8 +19,8 @@ std::vector<DatasetMachine::State::Use::Entry> DatasetMachine::State::SeekShapes
   return shapes;
 }
 
-// Has the entries of shapes that have several times become those of the picture's time. False: some are not ready. InvalidArgument: a shape
-// does not have the time, or several times, but not as many as the dataset.
+// The entries of shapes with several times become those of the picture's time. False: some are not ready. InvalidArgument: a shape does not
+// have the time; or it has several times, but not as many as the dataset.
 Result<bool> DatasetMachine::State::SeekAtTime(const FrameRequest& request, int time, std::vector<Use::Entry>& shapes) {
   bool ready = true;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
@@ -51,8 +51,8 @@ Result<bool> DatasetMachine::State::SeekAtTime(const FrameRequest& request, int 
 std::vector<DatasetMachine::State::Use::Entry> DatasetMachine::State::SeekPlanes(const FrameRequest& request, const VolumeGeometry& finest,
                                                                                  const std::string& through) {
   std::vector<Use::Entry> planes;
+  const DatasetTable::Entry& voxels = *datasets.Find(through);
   for (const PlaneChoice& plane : request.planes) {
-    const DatasetTable::Entry& voxels = *datasets.Find(through);
     ClipSlab slab = plane.slab;
     slab.through = MiddleOf(slab, finest);
     slab.index.reset();

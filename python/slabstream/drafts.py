@@ -366,14 +366,10 @@ def camera_draft_of(dataset: str, options: Mapping[str, Any], index: int, camera
         raise InvalidArgument(f"camera {index + 1} of the path: {error}") from None
 
 
-# How one looks at a plane: the view, the plane's normal, and whether only patients have it (client/cli/slice_planes.h).
-_PLANES: dict[str, tuple[str, values.Vector, bool]] = {
-    "axial": ("inferior", (0, 0, 1), True),
-    "coronal": ("anterior", (0, 1, 0), True),
-    "sagittal": ("left", (1, 0, 0), True),
-    "z": ("top", (0, 0, 1), False),
-    "y": ("front", (0, 1, 0), False),
-    "x": ("right", (1, 0, 0), False),
+# How one looks at a plane: the view, and whether only patients have it (client/request/slice_planes.h).
+_PLANES: dict[str, tuple[str, bool]] = {
+    "axial": ("inferior", True), "coronal": ("anterior", True), "sagittal": ("left", True),
+    "z": ("top", False), "y": ("front", False), "x": ("right", False),
 }
 _SEVERAL_PLANES = {"anatomical": ("axial", "coronal", "sagittal"), "zyx": ("z", "y", "x")}
 
@@ -402,7 +398,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         planes.frame.transfer.function.CopyFrom(transfer.window(planes.window, level).message())
     drafts = []
     for name in names:
-        side, normal, of_patient = _PLANES[name]
+        side, of_patient = _PLANES[name]
         draft = draft_of(dataset, {})
         annotations = dataclasses.replace(planes.format.annotations, sides_only=True)
         draft.format = dataclasses.replace(planes.format, annotations=annotations)
@@ -416,7 +412,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         _look_from(frame.view, side, of_patient)
         frame.view.fit = True
         slab = frame.clipping.slab
-        slab.normal.CopyFrom(values.vec3(normal))
+        slab.normal.CopyFrom(values.vec3(planes_in_space.NORMALS[name]))
         slab.thickness = planes.thickness
         if planes.at is not None:
             slab.through.CopyFrom(values.vec3(planes.at))

@@ -8,7 +8,10 @@ from .errors import InvalidArgument
 
 _MOST_PLANES = 16     # of a picture
 _MOST_SLICES = 65535  # of a volume
-_NORMALS = {"axial": (0, 0, 1), "coronal": (0, 1, 0), "sagittal": (1, 0, 0), "x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+#: Planes by name: directions of the world.
+NORMALS: dict[str, values.Vector] = {
+    "axial": (0, 0, 1), "coronal": (0, 1, 0), "sagittal": (1, 0, 0), "x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1),
+}
 _LOOK = ("opacity", "map", "range")
 
 
@@ -21,9 +24,9 @@ class Plane:
                  opacity: float | None = None, map: str | None = None, range: Any = None):
         self.choice = schema.PlaneChoice()
         slab = self.choice.slab
-        normal = _NORMALS.get(plane) if isinstance(plane, str) else values.point("plane", plane)
+        normal = NORMALS.get(plane) if isinstance(plane, str) else values.point("plane", plane)
         if normal is None or not any(normal):
-            raise InvalidArgument(f"plane {plane!r} must be one of: {', '.join(_NORMALS)}, or a normal (x, y, z) other than (0, 0, 0)")
+            raise InvalidArgument(f"plane {plane!r} must be one of: {', '.join(NORMALS)}, or a normal (x, y, z) other than (0, 0, 0)")
         slab.normal.CopyFrom(values.vec3(normal))
         if at is not None and index is not None:
             raise InvalidArgument("plane has both at and index, but one is enough")
@@ -34,9 +37,7 @@ class Plane:
         if opacity is not None:
             self.choice.opacity = values.number("plane opacity", opacity, 0, 1, above=True)
         if map is not None:
-            if not isinstance(map, str) or not 1 <= len(map.encode()) <= values.MOST_NAME_BYTES:
-                raise InvalidArgument(f"plane map {map!r} must be the name of a colour map")
-            self.choice.map = map
+            self.choice.map = values.color_map_name("plane map", map)
         if range is not None:
             self.choice.range.CopyFrom(values.scalar_range("plane range", range))
 
@@ -62,7 +63,7 @@ def _of_text(name: str, text: str) -> Plane:
             raise InvalidArgument(f"{name} {text!r} has {look!r}, but must have one of: {', '.join(_LOOK)}")
         given[key] = value
     key, _, value = where.partition("=")
-    normal: Any = _NORMALS.get(plane) or (tuple(plane.split("/")) if plane.count("/") == 2 else plane)
+    normal: Any = NORMALS.get(plane) or (tuple(plane.split("/")) if plane.count("/") == 2 else plane)
     if key == "index":
         given["index"] = value
     elif key == "at":

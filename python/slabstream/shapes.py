@@ -252,9 +252,7 @@ def _choice(name: str, given: Any) -> tuple[Any, Shape | None]:
         choice.width_in_pixels = isinstance(width, str) and width.endswith("px")
         choice.width = values.number(f"{name} width", str(width)[:-2] if choice.width_in_pixels else width, 0, values.MOST_COORDINATE)
     if "map" in look:
-        if not isinstance(look["map"], str) or not 1 <= len(look["map"].encode()) <= values.MOST_NAME_BYTES:
-            raise InvalidArgument(f"{name} map {look['map']!r} must be the name of a colour map")
-        choice.map = look["map"]
+        choice.map = values.color_map_name(f"{name} map", look["map"])
     if "range" in look:
         choice.range.CopyFrom(values.scalar_range(f"{name} range", look["range"]))
     if "time" in look:

@@ -152,6 +152,12 @@ def scalar_range(name: str, value: object) -> Any:
 _CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
 
 
+def color_map_name(name: str, value: object) -> str:
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= MOST_NAME_BYTES:
+        raise InvalidArgument(f"{name} {value!r} must be the name of a colour map")
+    return value
+
+
 def clip_box(name: str, value: object) -> Any:
     """ClipBox: ((x0, x1), (y0, y1), (z0, z1)), with None for a bound that does not clip, and "v" for voxels or "%" of the sides as a fourth
     value; or "X0:X1,Y0:Y1,Z0:Z1%", where a unit behind any bound is that of all."""
