@@ -56,9 +56,13 @@ Bytes Adopt(zmq::message_t message) {
 
 int SendPart(zmq::socket_t& socket, zmq::message_t message, bool more) {
   const zmq::send_flags flags = more ? zmq::send_flags::dontwait | zmq::send_flags::sndmore : zmq::send_flags::dontwait;
-  while (true) {
+  for (bool looked = false;;) {
     try {
-      return socket.send(message, flags) ? 0 : EAGAIN;
+      if (socket.send(message, flags)) return 0;
+      if (std::exchange(looked, true)) return EAGAIN;
+      // A busy socket takes note of what was read at the other ends once a millisecond at most: a queue that is full may be empty by now.
+      // Asked for its events, it does so at once.
+      (void)socket.get(zmq::sockopt::events);
     } catch (const zmq::error_t& error) {
       if (error.num() != EINTR) return error.num();
     }
