@@ -413,10 +413,13 @@ class MakingOwner {
     for (HeldBox& each : layout.boxes) each.offset = 0;
     layout.slot_bytes = 0;
     layout.on_demand = true;
-    memory_ = OwnerMemory::Create(kIncarnation, layout).value();
+    // One of its own: a thread that has read the last owner's boxes may hold that one's memory for a moment longer.
+    static std::atomic<std::uint64_t> last = 99;
+    const std::uint64_t incarnation = ++last;
+    memory_ = OwnerMemory::Create(incarnation, layout).value();
     (void)memory_->Begin(0);
     memory_->Commit(0, 1, 0);
-    volume.field = {"rho", 1, {{SharedMemoryScope(), std::uint32_t(::getpid()), memory_->file_descriptor(), kIncarnation}}, kBoxSize};
+    volume.field = {"rho", 1, {{SharedMemoryScope(), std::uint32_t(::getpid()), memory_->file_descriptor(), incarnation}}, kBoxSize};
     volume.description = {{.size = kSize}, ScalarType::kFloat32, {}};
     volume.exact = {SampleType::kFloat32, {}};
     volume.boxes = {boxes_};
@@ -457,7 +460,6 @@ class MakingOwner {
   std::atomic<int> times_made = 0;
 
  private:
-  static constexpr std::uint64_t kIncarnation = 99;
   const std::vector<Box> boxes_;
   std::shared_ptr<OwnerMemory> memory_;
   std::mutex mutex_;
