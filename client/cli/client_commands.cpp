@@ -246,6 +246,15 @@ void DeclareIndex(const CommandLine& line) {
   TakeReadOptions(sub, options.source);
 }
 
+Result<SurfaceShare> ParseSurfaceShare(const std::string& option, const std::string& text) {
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const std::optional<int> part = ParseNumber<int>(text.substr(0, slash)),
+                           parts = ParseNumber<int>(text.substr(std::min(slash + 1, text.size())));
+  if (part && parts && *part >= 1 && *part <= *parts && *parts <= kMostSurfaceParts) return SurfaceShare{*part, *parts};
+  return Status::InvalidArgument(
+      fmt::format("{}: expected K/N, such as 3/16, with K from 1 to N and N at most {}, not '{}'", option, kMostSurfaceParts, text));
+}
+
 void DeclareIsosurface(const CommandLine& line) {
   const Command sub = line.app.AddCommand("isosurface", "Write the surface of an isovalue or of a label as a mesh");
   IsosurfaceCommandOptions& options = OptionsOf(line, sub, RunIsosurface);
@@ -272,6 +281,10 @@ void DeclareIsosurface(const CommandLine& line) {
       .Excludes(isovalue);
   AddInteger(sub, "--level", options.level, 0, kMaxLevels - 1, "The level of SOURCE; 0 is the finest one");
   sub.AddFlag("--caps", options.caps, "Close the surface where it leaves the volume");
+  AddParsed(
+      sub, "--part", options.share, ParseSurfaceShare,
+      "Make part K of N alone: start N commands that differ in K alone, on hosts that see the same files. Who ends last joins the parts")
+      .TypeName("K/N");
   AddCacheOption(sub, options.cache);
   sub.AddFlag("--progress", options.progress, "Show progress on stderr");
   AddReadOptions(sub, {"ids"});

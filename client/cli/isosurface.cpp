@@ -1,8 +1,10 @@
 // `isosurface`: the isosurface of a volume, or the surface of a label, as a mesh in a file.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
+#include <span>
 
 #include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
@@ -48,13 +50,22 @@ Status RunIsosurface(const IsosurfaceCommandOptions& options) {
                                                   .isovalue = options.isovalue.value_or(0),
                                                   .label = options.label,
                                                   .caps = options.caps,
+                                                  .share = options.share,
                                                   .progress = progress},
                                                  options.output);
-  if (made.status().code() == StatusCode::kCancelled)
-    return Status::Cancelled(fmt::format("'{}': stopped, nothing is written", options.output));
+  if (made.status().code() == StatusCode::kCancelled) return Status::Cancelled(fmt::format("stopped: '{}' is not written", options.output));
   if (!made.ok()) return made.status();
   bar.Clear();
-  std::cout << fmt::format("wrote {}: {} vertices, {} triangles\n", options.output, made->vertices, made->triangles);
+  if (made->whole) {
+    std::cout << fmt::format("wrote {}: {} vertices, {} triangles\n", options.output, made->vertices, made->triangles);
+  } else if (made->missing_parts.empty()) {
+    std::cout << fmt::format("made part {} of {}; another process has joined the parts\n", options.share.part, options.share.parts);
+  } else {
+    const auto& missing = made->missing_parts;
+    const auto first = std::span(missing).first(std::min<std::size_t>(missing.size(), 8));
+    std::cout << fmt::format("made part {} of {}; {} missing: {}{}\n", options.share.part, options.share.parts, missing.size(),
+                             fmt::join(first, ", "), missing.size() > first.size() ? ", ..." : "");
+  }
   return Status::Ok();
 }
 

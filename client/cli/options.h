@@ -17,6 +17,7 @@
 #include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
 #include "common/wire/client_messages.h"
+#include "data/isosurface/surface_share.h"
 #include "data/layers/layer_files.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
@@ -157,6 +158,7 @@ struct IsosurfaceCommandOptions {
   std::optional<std::uint64_t> label;  // at least 1
   int level = 0;                       // the level of `source`
   bool caps = false;
+  SurfaceShare share;       // what this process makes of it
   std::uint64_t cache = 0;  // bytes on disk, for what web servers send; 0: none
   bool progress = false;
 };

@@ -6,7 +6,8 @@
 // The surface of a label is where half of what lies around a place is of the label: the cubic B-spline of its membership, as labels are
 // drawn smoothly (common/frame/smooth_label.h), at voxels, and linear between them. Structures one voxel thin may vanish.
 //
-// The same source gives the same bytes, however many threads there are.
+// The same source gives the same bytes, however many threads there are. Several processes, on hosts that see the same files, may make the
+// surface together, each some slices of it.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include <string>
 
 #include "common/base/status.h"
+#include "data/isosurface/mesh_parts.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -24,16 +26,14 @@ struct IsosurfaceOptions {
   double isovalue = 0;                 // finite; without `label`
   std::optional<std::uint64_t> label;  // the source is one of labels
   bool caps = false;
+  SurfaceShare share = {};
   // Called often: bytes of voxels that are done, and all. Whether to go on.
   std::function<bool(std::uint64_t done, std::uint64_t all)> progress = [](std::uint64_t, std::uint64_t) { return true; };
 };
 
-struct MeshCounts {
-  std::int64_t vertices = 0, triangles = 0;
-};
-
-// `path` ends as FindMeshFormat wants it. InvalidArgument: there is no such surface; the message names the range of the values (survey.h).
-// Cancelled: `progress` returned false. Errors of reading, of SurfaceMaker::Add, and of MeshFile.
+// `path` ends as FindMeshFormat wants it. Of several parts, the process that makes the last one joins all (mesh_parts.h). InvalidArgument:
+// there is no such surface; the message names the range of the values (survey.h); or too many parts. Cancelled: `progress` returned false.
+// Errors of reading, of SurfaceMaker::Add, and of MeshFile.
 Result<MeshCounts> MakeIsosurface(VolumeSource& source, const IsosurfaceOptions& options, const std::string& path);
 
 }  // namespace slabstream

@@ -30,10 +30,10 @@ class MappedFile {
  public:
   MappedFile(const std::string& path, std::int64_t count) : bytes_(std::size_t(count) * sizeof(T)) {
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (bytes_ > 0) data_ = ::mmap(nullptr, bytes_, PROT_READ, MAP_PRIVATE, file.number(), 0);
+    data_ = bytes_ > 0 ? ::mmap(nullptr, bytes_, PROT_READ, MAP_PRIVATE, file.number(), 0) : nullptr;
   }
   ~MappedFile() {
-    if (ok()) ::munmap(data_, bytes_);
+    if (ok() && bytes_ > 0) ::munmap(data_, bytes_);
   }
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
@@ -41,7 +41,9 @@ class MappedFile {
   bool ok() const { return data_ != MAP_FAILED; }
   std::span<const T> all() const { return {static_cast<const T*>(data_), bytes_ / sizeof(T)}; }
   // Lets go of the memory of pages that were read. Reading them again brings them back.
-  void Forget() const { ::madvise(data_, bytes_, MADV_DONTNEED); }
+  void Forget() const {
+    if (bytes_ > 0) ::madvise(data_, bytes_, MADV_DONTNEED);
+  }
 
  private:
   const std::size_t bytes_;
@@ -57,7 +59,7 @@ void Put(std::vector<std::byte>& bytes, const T& value) {
 struct Joining {
   const MappedFile<SurfaceVertex> vertices;
   const MappedFile<SurfaceTriangle> triangles;
-  const std::string about, world;  // lines for people, without an end
+  const MeshOf& of;
   const std::function<bool()>& goes_on;
   OutputFile& out;
 
@@ -84,7 +86,7 @@ bool WritePly(Joining& of) {
       fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}\ncomment {}\nelement vertex {}\nproperty float x\nproperty float y\n"
                   "property float z\nproperty float nx\nproperty float ny\nproperty float nz\nelement face {}\n"
                   "property list uchar int vertex_indices\nend_header\n",
-                  of.about, of.world, of.vertices.all().size(), of.triangles.all().size()));
+                  of.of.surface, of.of.world, of.vertices.all().size(), of.triangles.all().size()));
   return of.Append(of.vertices, Put<SurfaceVertex>) &&
          of.Append(of.triangles, [](std::vector<std::byte>& bytes, const SurfaceTriangle& triangle) {
            Put(bytes, std::uint8_t{3});
@@ -95,7 +97,7 @@ bool WritePly(Joining& of) {
 bool WriteStl(Joining& of) {
   std::vector<std::byte> count;
   Put(count, std::uint32_t(of.triangles.all().size()));
-  of.out.Append(fmt::format("{:<80.80}", "binary STL: " + of.about));
+  of.out.Append(fmt::format("{:<80.80}", "binary STL: " + of.of.surface));
   of.out.Append(count);
   return of.Append(of.triangles, [&](std::vector<std::byte>& bytes, const SurfaceTriangle& triangle) {
     std::array<Vec3, 3> corners;
@@ -110,6 +112,8 @@ bool WriteStl(Joining& of) {
   });
 }
 
+}  // namespace
+
 std::string WorldText(const VolumeGeometry& volume) {
   const World world = volume.orientation.world;
   const std::string_view axes = world == World::kPatient ? "patient, RAS: x to the right, y to anterior, z to superior"
@@ -118,8 +122,6 @@ std::string WorldText(const VolumeGeometry& volume) {
   const LengthUnit unit = UnitOf(volume);
   return fmt::format("world: {}; unit: {}", axes, unit > LengthUnit::kFile ? NameOf(unit) : "not stated");
 }
-
-}  // namespace
 
 struct MeshFormat {
   std::string_view ending;
@@ -161,23 +163,36 @@ void MeshFile::Add(const SurfacePart& part) {
   triangles_ += std::int64_t(part.triangles.size());
 }
 
-Status MeshFile::Finish(const std::string& surface, const VolumeGeometry& volume, const std::function<bool()>& goes_on) {
-  const MeshFormat& format = *FindMeshFormat(path_);
-  if (triangles_ > format.most_triangles) {
-    return Status::ResourceExhausted(
-        fmt::format("'{}': the surface has {} triangles, a file {} at most {}", path_, triangles_, format.ending, format.most_triangles));
-  }
+template <class Write>
+Status MeshFile::Join(const MeshOf& of, const std::function<bool()>& goes_on, Write&& write) {
   for (OutputFile* const file : {&vertex_file_, &triangle_file_}) {
     if (Status closed = file->Close(); !closed.ok()) return closed;
   }
   Result<OutputFile> out = OutputFile::Create(path_);
   if (!out.ok()) return out.status();
-  Joining of{
-      {vertex_file_.written_path(), vertices_}, {triangle_file_.written_path(), triangles_}, surface, WorldText(volume), goes_on, *out};
-  if (!of.vertices.ok() || !of.triangles.ok())
+  Joining joining{{vertex_file_.written_path(), vertices_}, {triangle_file_.written_path(), triangles_}, of, goes_on, *out};
+  if (!joining.vertices.ok() || !joining.triangles.ok())
     return Status::Unavailable(fmt::format("cannot write '{}': its parts cannot be read: {}", path_, std::strerror(errno)));
-  if (!format.write(of)) return Status::Cancelled("writing was stopped");
+  if (!write(joining)) return Status::Cancelled("writing was stopped");
   return out->Finish();
+}
+
+Status MeshFile::Finish(const MeshOf& of, const std::function<bool()>& goes_on) {
+  const MeshFormat& format = *FindMeshFormat(path_);
+  if (triangles_ > format.most_triangles) {
+    return Status::ResourceExhausted(
+        fmt::format("'{}': the surface has {} triangles, a file {} at most {}", path_, triangles_, format.ending, format.most_triangles));
+  }
+  return Join(of, goes_on, format.write);
+}
+
+Status MeshFile::FinishRaw(const std::string& head, std::span<const std::byte> tail, const std::function<bool()>& goes_on) {
+  return Join({}, goes_on, [&](Joining& joining) {
+    joining.out.Append(head);
+    const bool whole = joining.Append(joining.vertices, Put<SurfaceVertex>) && joining.Append(joining.triangles, Put<SurfaceTriangle>);
+    joining.out.Append(tail);
+    return whole;
+  });
 }
 
 }  // namespace slabstream

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,14 @@ struct MeshFormat;
 const MeshFormat* FindMeshFormat(std::string_view path);  // null: its ending is that of none
 std::string MeshEndings();                                // ".ply, .stl"
 
+// What a mesh is of, in words, each one line.
+struct MeshOf {
+  std::string surface;  // "isovalue 300"
+  std::string world;    // WorldText
+  std::string level;    // of the volume: no other one has the same
+};
+std::string WorldText(const VolumeGeometry& volume);  // the axes and the unit of positions
+
 class MeshFile {
  public:
   // `path` ends as a format does. Unavailable: it cannot be written.
@@ -32,11 +41,17 @@ class MeshFile {
   std::int64_t vertices() const { return vertices_; }
   std::int64_t triangles() const { return triangles_; }
 
-  // `surface`: what it is, for the header: "isovalue 300". Calls goes_on() often. Cancelled: that returned false. ResourceExhausted: more
-  // triangles than the format can count. Unavailable: it cannot be written.
-  Status Finish(const std::string& surface, const VolumeGeometry& volume, const std::function<bool()>& goes_on);
+  // Calls goes_on() often. Cancelled: that returned false. ResourceExhausted: more triangles than the format can count. Unavailable: it
+  // cannot be written.
+  Status Finish(const MeshOf& of, const std::function<bool()>& goes_on);
+  // Instead, whatever the path ends as: `head`, vertices and triangles as they are in memory, and `tail`.
+  Status FinishRaw(const std::string& head, std::span<const std::byte> tail, const std::function<bool()>& goes_on);
 
  private:
+  // write(Joining&) returns whether it went on to the end.
+  template <class Write>
+  Status Join(const MeshOf& of, const std::function<bool()>& goes_on, Write&& write);
+
   MeshFile(std::string path, OutputFile vertex_file, OutputFile triangle_file);
 
   std::string path_;

@@ -252,29 +252,53 @@ class SurfaceMaker::Block {
   std::vector<Kind> kinds_;           // of its rows
 };
 
+Status TooManyVertices() {
+  return Status::ResourceExhausted(
+      fmt::format("the surface has more than {} vertices, which files of it can number: a coarser --level has fewer", kMaxSurfaceVertices));
+}
+
+template <class T>
+SurfaceMaker::Sides SurfaceMaker::TakeSides(const Block<T>& work, const Box& block) {
+  const auto take = [&](std::map<Index3, Rows>& from) {
+    auto node = from.extract(block.begin);
+    return node.empty() ? Rows() : std::move(node.mapped());
+  };
+  const Index3 begin = block.begin;
+  Sides sides{Rows(std::size_t(block.size().y + 1) * std::size_t(block.size().z + 1)), take(before_x_)};
+  const Rows before_y = take(before_y_), before_z = take(before_z_);
+  for (std::size_t i = 0; i < before_y.size(); ++i) sides.rows[work.RowNumber(begin.y - 1, begin.z - 1 + std::int32_t(i))] = before_y[i];
+  for (std::size_t i = 0; i < before_z.size(); ++i) sides.rows[work.RowNumber(begin.y - 1 + std::int32_t(i), begin.z - 1)] = before_z[i];
+  return sides;
+}
+
+template <class T>
+void SurfaceMaker::KeepSides(const Block<T>& work, const Box& block, Rows rows) {
+  const Index3 begin = block.begin, end = block.end;
+  const auto is_last = [&](Axis axis) { return end[axis] == domain_.end[axis]; };
+  if (!is_last(Axis::kY)) {
+    Rows& kept = before_y_[{begin.x, end.y, begin.z}];
+    for (std::int32_t z = begin.z - 1; z < end.z; ++z) kept.push_back(rows[work.RowNumber(end.y - 1, z)]);
+  }
+  if (!is_last(Axis::kZ)) {
+    Rows& kept = before_z_[{begin.x, begin.y, end.z}];
+    for (std::int32_t y = begin.y - 1; y < end.y; ++y) kept.push_back(rows[work.RowNumber(y, end.z - 1)]);
+  }
+  if (!is_last(Axis::kX)) before_x_[{end.x, begin.y, begin.z}] = std::move(rows);
+}
+
 Result<SurfacePart> SurfaceMaker::Add(const VoxelBlock& samples, const Box& block) {
   CHECK(!block.empty() && domain_.Contains(block) && samples.box.Contains(Grown(block, kSurfaceReach, bounds_)));
   return VisitScalarType(samples.type, [&]<class T>(const T* /*type*/) -> Result<SurfacePart> {
     const Block<T> work(*this, samples, block);
     const std::vector<typename Block<T>::Counts> counts = work.Count();
-    const auto take = [&](std::map<Index3, Rows>& from) {
-      auto node = from.extract(block.begin);
-      return node.empty() ? Rows() : std::move(node.mapped());
-    };
-    const auto is_last = [&](Axis axis) { return block.end[axis] == domain_.end[axis]; };
-    const Index3 begin = block.begin, end = block.end;
-
-    // The rows before the block along y and z, then its own.
-    Rows rows(std::size_t(block.size().y + 1) * std::size_t(block.size().z + 1));
-    const Rows before_x = take(before_x_), before_y = take(before_y_), before_z = take(before_z_);
-    for (std::size_t i = 0; i < before_y.size(); ++i) rows[work.RowNumber(begin.y - 1, begin.z - 1 + std::int32_t(i))] = before_y[i];
-    for (std::size_t i = 0; i < before_z.size(); ++i) rows[work.RowNumber(begin.y - 1 + std::int32_t(i), begin.z - 1)] = before_z[i];
+    Sides sides = TakeSides(work, block);
     SurfacePart part;
     std::vector<std::size_t> first_triangles(counts.size());
     std::size_t triangles = 0;
     std::int64_t vertex = vertices_;
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      Row& row = rows[work.RowNumber(begin.y + std::int32_t(i) % block.size().y, begin.z + std::int32_t(i) / block.size().y)];
+      Row& row =
+          sides.rows[work.RowNumber(block.begin.y + std::int32_t(i) % block.size().y, block.begin.z + std::int32_t(i) / block.size().y)];
       row.x = vertex;
       row.y = row.x + counts[i].x;
       row.z = row.y + counts[i].y;
@@ -282,26 +306,44 @@ Result<SurfacePart> SurfaceMaker::Add(const VoxelBlock& samples, const Box& bloc
       first_triangles[i] = triangles;
       triangles += counts[i].triangles;
     }
-    if (vertex > kMaxSurfaceVertices) {
-      return Status::ResourceExhausted(fmt::format(
-          "the surface has more than {} vertices, which files of it can number: a coarser --level has fewer", kMaxSurfaceVertices));
-    }
+    if (vertex > kMaxSurfaceVertices) return TooManyVertices();
     part.vertices.resize(std::size_t(vertex - vertices_));
     part.triangles.resize(triangles);
-    work.Make(rows, before_x, first_triangles, part);
+    work.Make(sides.rows, sides.before_x, first_triangles, part);
     vertices_ = vertex;
-
-    if (!is_last(Axis::kY)) {
-      Rows& kept = before_y_[{begin.x, end.y, begin.z}];
-      for (std::int32_t z = begin.z - 1; z < end.z; ++z) kept.push_back(rows[work.RowNumber(end.y - 1, z)]);
-    }
-    if (!is_last(Axis::kZ)) {
-      Rows& kept = before_z_[{begin.x, begin.y, end.z}];
-      for (std::int32_t y = begin.y - 1; y < end.y; ++y) kept.push_back(rows[work.RowNumber(y, end.z - 1)]);
-    }
-    if (!is_last(Axis::kX)) before_x_[{end.x, begin.y, begin.z}] = std::move(rows);
+    KeepSides(work, block, std::move(sides.rows));
     return part;
   });
+}
+
+void SurfaceMaker::Follow(const VoxelBlock& samples, const Box& slice) {
+  CHECK(slice.size().z == 1 && domain_.Contains(slice) && samples.box.Contains(Grown(slice, kSurfaceReach, bounds_)));
+  VisitScalarType(samples.type, [&]<class T>(const T* /*type*/) {
+    const Block<T> work(*this, samples, slice);
+    Rows rows = TakeSides(work, slice).rows;
+    const std::vector<typename Block<T>::Counts> counts = work.Count();
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      Row& row = rows[work.RowNumber(slice.begin.y + std::int32_t(i), slice.begin.z)];
+      row.x = kOthersVertex + others_vertices_;
+      row.y = row.x + counts[i].x;
+      row.z = row.end = row.y + counts[i].y;
+      others_vertices_ += std::int64_t{counts[i].x} + counts[i].y;
+    }
+    KeepSides(work, slice, std::move(rows));
+  });
+}
+
+std::vector<std::int32_t> SurfaceMaker::LastSlice() const {
+  std::vector<const std::pair<const Index3, Rows>*> columns;
+  for (const auto& column : before_z_) columns.push_back(&column);
+  std::ranges::sort(columns, {}, [](const auto* column) { return std::pair(column->first.y, column->first.x); });
+  std::vector<std::int32_t> numbers;
+  for (const auto* const column : columns) {
+    for (std::size_t i = 1; i < column->second.size(); ++i) {  // the first row is the last one of the column before
+      for (std::int64_t vertex = column->second[i].x; vertex < column->second[i].z; ++vertex) numbers.push_back(std::int32_t(vertex));
+    }
+  }
+  return numbers;
 }
 
 }  // namespace slabstream

@@ -13,6 +13,9 @@
 //
 // A block keeps for the next ones the number of the first vertex of each of its rows along three of its sides. So blocks share vertices,
 // and nothing else of a block is kept.
+//
+// Several makers may share a surface: each makes some slices of it, cut into the same columns. A maker that begins inside the volume counts
+// the vertices that the one before it has in its last slice (Follow), and names them by their number among these.
 #pragma once
 
 #include <array>
@@ -33,7 +36,10 @@ using SurfaceTriangle = std::array<std::int32_t, 3>;  // numbers of vertices
 
 inline constexpr std::int64_t kMaxSurfaceVertices = INT32_MAX;  // most readers of PLY take signed numbers of 32 bits
 inline constexpr double kLeastDistance = 1.0 / 1024;            // voxels
+inline constexpr std::int32_t kOthersVertex = INT32_MIN;        // plus its number among LastSlice(): a vertex of the maker before this one
 inline constexpr std::int32_t kSurfaceReach = 2;                // voxels before and behind a block that it depends on, at most
+
+Status TooManyVertices();  // ResourceExhausted, for users
 
 struct SurfacePart {
   std::vector<SurfaceVertex> vertices;  // numbered behind those of all earlier blocks
@@ -51,6 +57,13 @@ class SurfaceMaker {
   // on them. ResourceExhausted: more than kMaxSurfaceVertices.
   Result<SurfacePart> Add(const VoxelBlock& samples, const Box& block);
 
+  // Of a maker that begins inside the volume, in each column before its first block: `slice` is what the column has of the slice before it,
+  // and `samples` are as those of Add. Columns come in order of y, then of x.
+  void Follow(const VoxelBlock& samples, const Box& slice);
+  // What the maker behind this one counts, once all blocks were added: numbers of the vertices on the edges along x and y of the last
+  // slice.
+  std::vector<std::int32_t> LastSlice() const;
+
  private:
   template <class T>
   class Block;
@@ -59,12 +72,21 @@ class SurfaceMaker {
     std::int64_t x = 0, y = 0, z = 0, end = 0;
   };
   using Rows = std::vector<Row>;
+  // The rows before the block along y and z, then its own: those whose numbers are not known yet are empty.
+  struct Sides {
+    Rows rows, before_x;
+  };
+  template <class T>
+  Sides TakeSides(const Block<T>& work, const Box& block);
+  // For the blocks behind it.
+  template <class T>
+  void KeepSides(const Block<T>& work, const Box& block, Rows rows);
 
   const VolumeGeometry geometry_;
   const Box bounds_, domain_;
   const double isovalue_;  // as samples are stored
   const bool falls_;       // values fall where stored samples rise
-  std::int64_t vertices_ = 0;
+  std::int64_t vertices_ = 0, others_vertices_ = 0;
   // Rows of earlier blocks, by the beginning of the block that needs them: those before it along an axis.
   std::map<Index3, Rows> before_x_, before_y_, before_z_;
 };

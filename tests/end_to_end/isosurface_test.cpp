@@ -27,6 +27,8 @@ TEST_F(IsosurfaceTest, EveryFormatAndEveryWayToReadGiveTheSameSurface) {
     }
     EXPECT_EQ(ReadFile("b.ply").size(), ReadFile("a.ply").size());
   }
+  EXPECT_EQ(MustRun({"isosurface", "s.nrrd", "--isovalue", "100", "--part", "2/2", "-o", "b.ply"}).out, "made part 2 of 2; 1 missing: 1\n");
+  EXPECT_EQ(MustRun({"isosurface", "s.nrrd", "--isovalue", "100", "--part", "1/2", "-o", "b.ply"}).out, "wrote b.ply" + counts);
   const std::string coarse = MustRun({"isosurface", "s.ome.zarr", "--isovalue", "100", "--level", "1", "-o", "c.ply"}).out;
   EXPECT_LT(ReadFile("c.ply").size(), ReadFile("a.ply").size() / 2) << coarse;
   EXPECT_EQ(Files(), (std::vector<std::string>{"a.ply", "b.ply", "b.stl", "c.ply", "s.nii.gz", "s.npy", "s.nrrd"}));

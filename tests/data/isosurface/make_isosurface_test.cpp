@@ -1,10 +1,12 @@
 #include "data/isosurface/make_isosurface.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "common/parallel/task_arena.h"
 #include "tests/data/isosurface/surface.h"
@@ -65,6 +67,83 @@ TEST_F(MakeIsosurfaceTest, PiecesAndTheOrderOfSlicesDoNotMatter) {
   EXPECT_EQ(MakeIsosurface(*source, {.isovalue = 1.1, .progress = stop_at_once}, Path("b.ply")).status().code(), StatusCode::kCancelled);
   EXPECT_EQ(calls, 1);
   EXPECT_EQ(FileCount(), 1U);
+}
+
+// Whoever makes the last part joins them, whatever the order. Two columns along x, and blocks that parts cut.
+TEST_F(MakeIsosurfaceTest, PartsAreTogetherTheSurface) {
+  Random random(3);
+  SCOPED_TRACE(random.trace());
+  const auto volume = std::make_shared<Volume>(MakeTestVolume({4200, 6, 81}, ScalarType::kUint8, [&](const Index3& v) {
+    return (v.x / 90 + v.y / 7 + v.z / 15) % 3 + (random.Chance(0.002) ? 1 : 0);
+  }));
+  const std::shared_ptr<VolumeSource> values = MakeMemorySource(volume, {}), labels = MakeMemorySource(volume, {.labels = true});
+  for (const int parts : {2, 5}) {
+    for (const bool label : {false, true}) {
+      IsosurfaceOptions options{.caps = random.Chance(0.5)};
+      if (label) options.label = 2;
+      if (!label) options.isovalue = 1.5;
+      VolumeSource& source = label ? *labels : *values;
+      const SurfacePart expected = Make(source, options);
+      std::filesystem::remove(Path("a.ply"));
+      std::vector<int> order;
+      for (int part = 1; part <= parts; ++part) order.push_back(part);
+      for (std::size_t i = 1; i < order.size(); ++i) std::swap(order[i], order[random.Integer<std::size_t>(0, i)]);
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        options.share = {order[i], parts};
+        const Result<MeshCounts> made = MakeIsosurface(source, options, Path("a.ply"));
+        ASSERT_TRUE(made.ok()) << made.status().message();
+        std::vector<int> missing(order.begin() + std::ptrdiff_t(i) + 1, order.end());
+        std::ranges::sort(missing);
+        EXPECT_EQ(made->missing_parts, missing);
+        EXPECT_EQ(made->whole, missing.empty());
+      }
+      const SurfacePart joined = ReadPly(ReadFile(Path("a.ply")));
+      EXPECT_EQ(Sorted(joined), Sorted(expected));
+      EXPECT_EQ(joined.vertices.size(), expected.vertices.size());
+      EXPECT_EQ(FileCount(), 1U);
+    }
+  }
+}
+
+TEST_F(MakeIsosurfaceTest, PartsOfAnotherSurfaceOrCutOffAreMissing) {
+  const std::shared_ptr<VolumeSource> source =
+      MakeMemorySource(std::make_shared<Volume>(MakeTestVolume({9, 9, 64}, ScalarType::kUint8, [](const Index3& v) { return v.x; })), {});
+  const auto make = [&](int part, double isovalue) {
+    return MakeIsosurface(*source, {.isovalue = isovalue, .share = {part, 3}}, Path("a.ply")).value().missing_parts;
+  };
+  EXPECT_EQ(make(1, 3.5), std::vector<int>({2, 3}));
+  EXPECT_EQ(make(2, 4.5), std::vector<int>({1, 3}));
+  EXPECT_EQ(make(3, 3.5), std::vector<int>({2}));
+  std::filesystem::resize_file(Path("a.ply.part1of3"), std::filesystem::file_size(Path("a.ply.part1of3")) - 1);
+  EXPECT_EQ(make(2, 3.5), std::vector<int>({1}));
+  std::ofstream(Path("a.ply.joining")) << "left by a command that was killed";
+  EXPECT_EQ(make(1, 3.5), std::vector<int>());
+  EXPECT_EQ(FileCount(), 1U);
+  const IsosurfaceOptions too_many{.isovalue = 3.5, .share = {1, 5}};
+  EXPECT_THAT(MakeIsosurface(*source, too_many, Path("b.ply")).status().message(), HasSubstr("--part 1/5: the level has 64 slices"));
+  for (const int part : {1, 2}) {
+    const Result<MeshCounts> none = MakeIsosurface(*source, {.isovalue = 99, .share = {part, 2}}, Path("b.ply"));
+    EXPECT_EQ(none.ok(), part == 1) << "the parts together have no surface";
+    EXPECT_THAT(none.status().message(), HasSubstr(part == 1 ? "" : "no surface; values are 0 to 8"));
+  }
+  EXPECT_EQ(FileCount(), 1U);
+}
+
+// A part whose triangles name vertices that are not there.
+TEST_F(MakeIsosurfaceTest, ADamagedPartIsNamed) {
+  const std::shared_ptr<VolumeSource> source =
+      MakeMemorySource(std::make_shared<Volume>(MakeTestVolume({9, 9, 64}, ScalarType::kUint8, [](const Index3& v) { return v.x; })), {});
+  const auto make = [&](int part) { return MakeIsosurface(*source, {.isovalue = 3.5, .share = {part, 2}}, Path("a.ply")); };
+  ASSERT_TRUE(make(2).ok());
+  std::string bytes = ReadFile(Path("a.ply.part2of2"));
+  const std::string whole = bytes;
+  for (const std::uint8_t high : {0x7f, 0xbf}) {
+    bytes[bytes.size() - 1] = char(high);  // of the last number of the last triangle: the last part has no last slice
+    std::ofstream(Path("a.ply.part2of2"), std::ios::binary) << bytes;
+    EXPECT_EQ(make(1).status().message(), fmt::format("'{}' is damaged: remove it and make this part again", Path("a.ply.part2of2")));
+  }
+  std::ofstream(Path("a.ply.part2of2"), std::ios::binary) << whole;
+  EXPECT_TRUE(make(1).value().whole);
 }
 
 TEST_F(MakeIsosurfaceTest, ThreadsDoNotChangeAByte) {

@@ -131,6 +131,54 @@ TEST(SurfaceMaker, RandomVolumesHaveNoHolesAndBlocksAndThreadsDoNotMatter) {
   }
 }
 
+TEST(SurfaceMaker, MakersThatFollowEachOtherShareTheVerticesOfTheSliceBetweenThem) {
+  Random random(11);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 60; ++i) {
+    const Index3 size = {random.Integer(1, 14), random.Integer(1, 12), random.Integer(2, 14)};
+    const Volume volume = MakeTestVolume(size, ScalarType::kUint8, [&](const Index3&) { return random.Integer(0, 3); });
+    const Wanted wanted = {random.Integer(0, 7) / 2.0, random.Chance(0.5)};
+    const SurfacePart expected = Extract(volume, wanted);
+    Cuts cuts;
+    SurfacePart all;
+    std::vector<std::int32_t> before;  // the last slice of the maker before, in `all`
+    for (std::int32_t begin = 0; begin < size.z;) {
+      SurfaceMaker maker(volume.description, wanted.isovalue, wanted.caps);
+      const Box& domain = maker.domain();
+      if (begin == 0) cuts = RandomCuts(random, domain);
+      const std::int32_t end = std::min(begin + random.Integer(1, 6), size.z);
+      std::vector<std::int32_t> slices = {begin == 0 ? domain.begin.z : begin, end == size.z ? domain.end.z : end};
+      if (end - begin > 2) slices.insert(slices.begin() + 1, random.Integer(begin + 1, end - 1));
+      const auto own = std::int32_t(all.vertices.size());
+      for (std::size_t y = 0; y + 1 < cuts[1].size(); ++y) {
+        for (std::size_t x = 0; x + 1 < cuts[0].size(); ++x) {
+          const auto column = [&](std::int32_t from, std::int32_t to) {
+            return Box{{cuts[0][x], cuts[1][y], from}, {cuts[0][x + 1], cuts[1][y + 1], to}};
+          };
+          const auto samples = [&](const Box& block) { return CutBlock(volume.block, Grown(block, kSurfaceReach, volume.block.box)); };
+          if (begin > 0) maker.Follow(samples(column(begin - 1, begin)), column(begin - 1, begin));
+          for (std::size_t z = 0; z + 1 < slices.size(); ++z) {
+            const Box block = column(slices[z], slices[z + 1]);
+            const Result<SurfacePart> part = maker.Add(samples(block), block);
+            all.vertices.insert(all.vertices.end(), part->vertices.begin(), part->vertices.end());
+            for (SurfaceTriangle triangle : part->triangles) {
+              for (std::int32_t& corner : triangle)
+                corner = corner >= 0 ? own + corner : before.at(std::size_t(std::int64_t{corner} - kOthersVertex));
+              all.triangles.push_back(triangle);
+            }
+          }
+        }
+      }
+      before = maker.LastSlice();
+      for (std::int32_t& vertex : before) vertex += own;
+      begin = end;
+    }
+    EXPECT_EQ(Sorted(all), Sorted(expected));
+    EXPECT_EQ(all.vertices.size(), expected.vertices.size());
+    if (wanted.caps) ExpectClosed(all);
+  }
+}
+
 // Distances in the world from a point, less than `radius` inside.
 template <class Distance>
 Volume Sample(const VolumeGeometry& geometry, const Distance& distance) {

@@ -262,7 +262,7 @@ TEST(ShapeFiles, KeepIsosurfaces) {
     Result<MeshFile> file = MeshFile::Create(directory / name);
     ASSERT_TRUE(file.ok());
     file->Add(part);
-    ASSERT_TRUE(file->Finish("isovalue 3", {}, [] { return true; }).ok());
+    ASSERT_TRUE(file->Finish({"isovalue 3", "world", "level"}, [] { return true; }).ok());
     const Result<Shape> shape = ReadShape(directory / name);
     ASSERT_TRUE(shape.ok()) << shape.status().message();
     ASSERT_EQ(shape->triangles.size(), part.triangles.size());
