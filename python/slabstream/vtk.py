@@ -4,7 +4,7 @@
 
     plotter.add_mesh(mesh)
     with ss.load(array, spacing=spacing) as volume:
-        image = sv.compose(plotter, volume.service, volume.name, transfer="ct-bone")
+        image = sv.compose(plotter, volume.service, volume.name, renderer="zbuffer", isovalue=120)
 
 Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of
 the render window.
@@ -23,10 +23,7 @@ from .moves import ball_of, perspective_of
 from .options import takes_options_of
 from .runs import Floats
 from .service import Service
-from .values import integer
 from .volumes import slabs_of, volume_of
-
-_MOST_FRONTS = 64
 
 
 def to_pyvista(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None) -> Any:
@@ -89,15 +86,11 @@ def _shown(plotter: Any) -> tuple[Any, Floats, Floats]:
 
 
 @takes_options_of("render")
-def compose(plotter: Any, service: Service, dataset: str, *, fronts: int = 16, **options: Any) -> Image:
-    """The picture of a dataset together with the opaque meshes that a pyvista.Plotter or a vtkRenderer shows, with its camera, size and
-    background.
-
-    A picture with depths, as the Z-buffer makes them, is exact: the nearer of both is seen at each pixel. Others have no depths, so the part of the
-    volume in front of the meshes is rendered up to `fronts` depths, 1 to 64, from the nearest to the farthest point of the meshes, and is
-    interpolated between them: as many pictures more. Those cut by planes, so options that cut something away are refused.
+def compose(plotter: Any, service: Service, dataset: str, **options: Any) -> Image:
+    """The picture of a dataset together with the opaque things that a pyvista.Plotter or a vtkRenderer shows, with its camera, size and
+    background: at each pixel the nearer of both. The picture must have depths, as renderer="zbuffer" makes them; in others, meshes stand as
+    shapes (option `shape`).
     """
-    fronts = integer("fronts", fronts, 1, _MOST_FRONTS)
     for name in ("background", "camera"):
         if options.get(name) is not None:
             raise InvalidArgument(f"{name} is given, but must be the plotter's own")
@@ -108,41 +101,10 @@ def compose(plotter: Any, service: Service, dataset: str, *, fronts: int = 16, *
     assert geometry is not None
     eye_depth = renderer.GetActiveCamera().GetDistance() - geometry.target_depth  # of the service's depth 0, under a parallel projection
     meshes = meshes - eye_depth
-    front, depth = whole.rgba, None
-    if whole.depth is not None:
-        front = numpy.where((whole.depth < meshes)[..., None], whole.rgba, numpy.float32(0))
-        depth = numpy.minimum(whole.depth, meshes).astype(numpy.float32)
-    elif numpy.isfinite(meshes).any():
-        front = _in_front(service, dataset, options, whole, meshes, fronts)
+    if whole.depth is None:
+        raise InvalidArgument("the picture has no depths: give renderer=\"zbuffer\", or the meshes as shapes (render(..., shape=mesh))")
+    front = numpy.where((whole.depth < meshes)[..., None], whole.rgba, numpy.float32(0))
+    depth = numpy.minimum(whole.depth, meshes).astype(numpy.float32)
     alpha = front[..., 3:]
     return Image(numpy.concatenate([front[..., :3] + (1 - alpha) * rgb, numpy.ones_like(alpha)], axis=2), depth, format=whole.format,
                  geometry=geometry, statistics=whole.statistics)
-
-
-def _in_front(service: Service, dataset: str, options: dict[str, Any], whole: Image, meshes: Floats, fronts: int) -> Floats:
-    """Of each pixel, the part of the volume before the mesh."""
-    if options.get("clip_mode") == "cut-away":
-        raise InvalidArgument("clip_mode 'cut-away' has no picture in front of a mesh: must be 'keep'")
-    given = options.get("clip_plane") or []
-    planes = [given] if isinstance(given, str) or (given and isinstance(given[0], (int, float))) else list(given)
-    geometry = whole.geometry
-    assert geometry is not None
-    forward = numpy.array(geometry.forward)
-    seen = numpy.isfinite(meshes) & (whole.rgba[..., 3] > 0)
-    if not seen.any():
-        return whole.rgba
-    ends = numpy.unique(numpy.quantile(meshes[seen], numpy.linspace(0, 1, fronts)))
-    frames = []
-    for end in ends:
-        through = numpy.array(geometry.target) + (end - geometry.target_depth) * forward
-        cut_off: dict[str, Any] = {"clip_plane": [*planes, (*-forward, float(forward @ through))]}
-        frames.append(service.submit(dataset, **options | cut_off))
-    result = whole.rgba.copy()
-    before, before_end = numpy.zeros_like(result), -numpy.inf
-    for end, frame in zip(ends, frames):
-        cut = frame.result().rgba
-        here = seen & (meshes > before_end) & (meshes <= end)
-        share = (meshes[here] - before_end) / (end - before_end) if numpy.isfinite(before_end) else numpy.ones(here.sum())
-        result[here] = before[here] + share[:, None] * (cut[here] - before[here])
-        before, before_end = cut, end
-    return result
