@@ -4,7 +4,7 @@
 
     plotter.add_mesh(mesh)
     with ss.load(array, spacing=spacing) as volume:
-        image = sv.compose(plotter, volume.service, volume.name, renderer="zbuffer", isovalue=120)
+        image = sv.compose(plotter, volume.service, volume.name, renderer=one_with_depths, isovalue=120)
 
 Meshes and volume lie in one world: that of the volume's file, or that of load(). VTK is imported where it is used. For one thread, that of
 the render window.
@@ -88,7 +88,7 @@ def _shown(plotter: Any) -> tuple[Any, Floats, Floats]:
 @takes_options_of("render")
 def compose(plotter: Any, service: Service, dataset: str, **options: Any) -> Image:
     """The picture of a dataset together with the opaque things that a pyvista.Plotter or a vtkRenderer shows, with its camera, size and
-    background: at each pixel the nearer of both. The picture must have depths, as renderer="zbuffer" makes them; in others, meshes stand as
+    background: at each pixel the nearer of both. The picture must have depths, as the Z-buffer makes them; in others, meshes stand as
     shapes (option `shape`).
     """
     for name in ("background", "camera"):
@@ -102,7 +102,7 @@ def compose(plotter: Any, service: Service, dataset: str, **options: Any) -> Ima
     eye_depth = renderer.GetActiveCamera().GetDistance() - geometry.target_depth  # of the service's depth 0, under a parallel projection
     meshes = meshes - eye_depth
     if whole.depth is None:
-        raise InvalidArgument("the picture has no depths: give renderer=\"zbuffer\", or the meshes as shapes (render(..., shape=mesh))")
+        raise InvalidArgument("the picture has no depths: choose a renderer that makes them, or give meshes as shapes (render(..., shape=mesh))")
     front = numpy.where((whole.depth < meshes)[..., None], whole.rgba, numpy.float32(0))
     depth = numpy.minimum(whole.depth, meshes).astype(numpy.float32)
     alpha = front[..., 3:]
