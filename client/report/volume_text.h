@@ -29,8 +29,8 @@ Json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 // {"at", "inside", "voxel", "value", "label": {"value", "name"} if there are labels, "fields": [{"name", "value"}, ...], "interpolated"}.
 // Null: there is none. Outside the volume: the first four.
 Json SampleJson(const VolumeSample& sample);
-// The same with "hit", "depth", and of a shape or plane of `frame`, whose picture it is, "shape" (its name, or "plane"), "shape_number"
-// and "shape_value". {"hit": false} if there is none.
+// What a pixel of the picture of `frame` shows: a SampleJson with "hit" and "depth". If it is a shape or a plane, also "shape" (its name,
+// or "plane"), "shape_number" and "shape_value". If it is nothing: {"hit": false}.
 Json PickJson(const PickReply& picked, const FrameRequest& frame);
 
 // {"from", "to", "length", "values"}: what samples along a line hold, at least two of them. Null: nothing, or no finite value.

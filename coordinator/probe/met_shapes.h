@@ -22,8 +22,8 @@ struct MetShape {
   std::optional<double> value = {};  // that its vertices have, interpolated; none: they have none there
 };
 
-// Nearest first; only the last one may be opaque. `shapes`: of each of setup.shapes. `ray`: of setup.camera. Pure; takes about a
-// millisecond for a million triangles.
+// The nearest one comes first, and only the last one may be opaque. `shapes`: the shape of each of setup.shapes, in their order. `ray`: of
+// setup.camera. Pure; takes about a millisecond for a million triangles.
 std::vector<MetShape> MeetShapes(const FrameSetup& setup, std::span<const ShapeView> shapes, const Camera::Ray& ray);
 
 }  // namespace slabstream

@@ -51,9 +51,12 @@ class Part {
   }
 
   std::uint64_t vertices() const { return vertices_; }
-  Result<std::vector<SurfaceVertex>> Vertices(std::uint64_t first) const { return Read<SurfaceVertex>(begin_, first, vertices_); }
-  Result<std::vector<SurfaceTriangle>> Triangles(std::uint64_t first) const {
-    return Read<SurfaceTriangle>(begin_ + vertices_ * sizeof(SurfaceVertex), first, triangles_);
+  // Each calls take(some of them) until all were taken. Cancelled: goes_on() returned false.
+  Status VisitVertices(const std::function<bool()>& goes_on, auto&& take) const {
+    return Visit<SurfaceVertex>(begin_, vertices_, goes_on, take);
+  }
+  Status VisitTriangles(const std::function<bool()>& goes_on, auto&& take) const {
+    return Visit<SurfaceTriangle>(begin_ + vertices_ * sizeof(SurfaceVertex), triangles_, goes_on, take);
   }
   Result<std::vector<std::int32_t>> LastSlice() const {
     return Read<std::int32_t>(EndOf() - last_slice_ * sizeof(std::int32_t), 0, last_slice_, last_slice_);
@@ -72,6 +75,18 @@ class Part {
     return some;
   }
 
+  template <class T>
+  Status Visit(std::uint64_t begin, std::uint64_t count, const std::function<bool()>& goes_on, auto&& take) const {
+    for (std::uint64_t done = 0; done < count;) {
+      if (!goes_on()) return Status::Cancelled("was stopped");
+      Result<std::vector<T>> some = Read<T>(begin, done, count);
+      if (!some.ok()) return some.status();
+      done += some->size();
+      if (Status status = take(*std::move(some)); !status.ok()) return status;
+    }
+    return Status::Ok();
+  }
+
   std::uint64_t EndOf() const {
     return begin_ + vertices_ * sizeof(SurfaceVertex) + triangles_ * sizeof(SurfaceTriangle) + last_slice_ * sizeof(std::int32_t);
   }
@@ -86,28 +101,20 @@ class Part {
 // Adds a part whose first vertex has the number `first` in the mesh. `before`: numbers in the mesh of the last slice before it.
 Status AddPart(const Part& part, std::int64_t first, const std::vector<std::int32_t>& before, MeshFile& file,
                const std::function<bool()>& goes_on) {
-  for (std::uint64_t done = 0;;) {
-    if (!goes_on()) return Status::Cancelled("was stopped");
-    Result<std::vector<SurfaceVertex>> vertices = part.Vertices(done);
-    if (!vertices.ok()) return vertices.status();
-    if (vertices->empty()) break;
-    done += vertices->size();
-    file.Add({*std::move(vertices), {}});
-  }
-  for (std::uint64_t done = 0;;) {
-    if (!goes_on()) return Status::Cancelled("was stopped");
-    Result<std::vector<SurfaceTriangle>> triangles = part.Triangles(done);
-    if (!triangles.ok()) return triangles.status();
-    if (triangles->empty()) break;
-    for (std::int32_t& corner : std::span(triangles->front().data(), 3 * triangles->size())) {
+  const Status added = part.VisitVertices(goes_on, [&](std::vector<SurfaceVertex> vertices) {
+    file.Add({std::move(vertices), {}});
+    return Status::Ok();
+  });
+  if (!added.ok()) return added;
+  return part.VisitTriangles(goes_on, [&](std::vector<SurfaceTriangle> triangles) {
+    for (std::int32_t& corner : std::span(triangles.front().data(), 3 * triangles.size())) {
       const std::int64_t own = corner, others = own - kOthersVertex;
       if (own >= std::int64_t(part.vertices()) || (own < 0 && others >= std::int64_t(before.size()))) return part.Damaged();
       corner = own >= 0 ? std::int32_t(first + own) : before[std::size_t(others)];
     }
-    done += triangles->size();
-    file.Add({{}, *std::move(triangles)});
-  }
-  return Status::Ok();
+    file.Add({{}, std::move(triangles)});
+    return Status::Ok();
+  });
 }
 
 Status AddParts(const std::vector<Part>& parts, MeshFile& file, const std::function<bool()>& goes_on) {

@@ -43,7 +43,8 @@ Shape RandomMesh(Random& random, std::uint32_t triangles) {
   return shape;
 }
 
-// T. Moeller, B. Trumbore: Fast, minimum storage ray-triangle intersection, 1997. `margin`: how near the ray comes to an edge, as a share.
+// T. Moeller, B. Trumbore: Fast, minimum storage ray-triangle intersection, 1997. `margin`: the least
+// barycentric coordinate of the place where the ray meets the triangle's plane, without its sign. Near 0, the ray passes near an edge.
 struct Hit {
   double depth = kNone, value = 0, margin = 0;
 };
