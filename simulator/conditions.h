@@ -48,6 +48,7 @@ class Conditions {
   virtual WorkerEvent Answer(Job& job) = 0;
   virtual bool CancelsInTime() { return false; }  // a rendering that is to be cancelled: it ends now
   virtual void Perform(Node node, SendChunkRequest& action) = 0;
+  virtual void Perform(Node, const DrawTiles&) {}
   virtual void Perform(Node, const OpenBox&) {}
   virtual void Perform(Node, const DropBox&) {}
   virtual void Perform(Node, const ReleaseImage&) {}

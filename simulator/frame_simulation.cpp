@@ -57,6 +57,7 @@ FramePlan PlanForMachines(const FramePlan& plan, std::uint32_t frame, const std:
   out.setup.cells = false;  // the one voxel stands for them, too
   out.setup.fields = {};    // and for their voxels
   out.setup.front = {};     // box costs know what is hidden
+  out.tiles = {};
   out.setup.description.geometry.size = {1, 1, std::numeric_limits<std::int32_t>::max()};
   for (GroupPlan& group : out.groups) {
     for (Placement& placement : group.placements) {

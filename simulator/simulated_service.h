@@ -96,7 +96,7 @@ class SimulatedService {
   void Perform(auto& action) { conditions_.Perform(action); }
 
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
-  void Perform(Node, AnyOf<ConnectVoxels, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups> auto&) {}
+  void Perform(Node, AnyOf<ConnectVoxels, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups, KeepTiles> auto&) {}
   void Perform(Node node, StartRender& action) {
     const ImageHandle image = action.image;
     const std::uint32_t place = Order(node, action);

@@ -16,6 +16,7 @@
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
 #include "common/planning/resolved_request.h"
+#include "common/planning/tile_plan.h"
 #include "common/planning/worker_id.h"
 #include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
@@ -72,6 +73,7 @@ struct FramePlan {
   std::string combine;            // the combining scheme, never empty
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
+  std::vector<TileOrder> tiles;   // of shapes
   Turn turn;
   ClientTakes client;
   WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible. In shares: the first one's

@@ -199,6 +199,7 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apar
     if (group.schedule.roots.size() > 1) plan.display = group.placements[group.schedule.roots.front()].worker;
     group.color = ChooseColor(plan, group);
   }
+  plan.tiles = PlanTiles(plan);
   return Status::Ok();
 }
 

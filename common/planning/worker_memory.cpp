@@ -90,12 +90,6 @@ std::string SizeText(const FrameSetup& setup) {
   return same ? size : fmt::format("{} (rendered as {}x{})", size, frame.width(), frame.height());
 }
 
-// What shapes show in the pixels of a frame (worker/shapes), of those that a process keeps: of each pixel it counts two fragments.
-std::uint64_t FragmentBytes(const FrameSetup& setup) {
-  constexpr std::uint64_t kFrames = 3, kOfPixel = 2 * 20 + 8;
-  return setup.shapes.empty() ? 0 : kFrames * kOfPixel * std::uint64_t(FrameBounds(setup).pixel_count());
-}
-
 std::uint64_t ShapeBytes(const FrameSetup& setup) {
   std::uint64_t bytes = 0;
   for (const ShapeSetup& shape : setup.shapes) bytes += std::uint64_t(shape.bytes.description.voxel_bytes());
@@ -122,8 +116,14 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
+std::uint64_t TileBytes(const FrameSetup& setup) {
+  constexpr std::uint64_t kOfPixel = 2 * 20 + 8;
+  return setup.shapes.empty() ? 0 : kOfPixel * std::uint64_t(FrameBounds(setup).pixel_count());
+}
+
 std::uint64_t SharedBytes(const FrameSetup& setup) {
-  std::uint64_t bytes = FragmentBytes(setup);
+  constexpr std::uint64_t kLatestFrames = 3;  // worker/service/shared_shapes.h
+  std::uint64_t bytes = kLatestFrames * TileBytes(setup);
   if (!setup.light) return bytes;
   // Of two looks: extinction in two orders, and shares of light for two lights.
   constexpr std::uint64_t kOfVoxel = 24, kOfLight = 8;
@@ -174,7 +174,7 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   std::uint64_t group_bytes = 0;
   for (const GroupPlan& group : plan.groups) group_bytes = std::max(group_bytes, GroupImageBytes(plan.setup, group.placements));
   // Every worker of a plan may be the next frame's display worker.
-  const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
+  const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup) + TileBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
   const double derived_share = DerivedShare(plan.setup);

@@ -4,6 +4,7 @@
 #include <google/protobuf/stubs/logging.h>
 
 #include <array>
+#include <numeric>
 #include <string>
 
 #include "common/base/check.h"
@@ -85,6 +86,9 @@ std::size_t PayloadBytesOf(const SentPicture& message) { return message.bytes; }
 std::size_t PayloadBytesOf(const PartialImage& message) {
   if (message.shared) return sizeof(ColumnSpan) * std::size_t(message.shared->bounds.height());
   return message.packed ? message.packed->bytes : PayloadBytes(message.image);
+}
+std::size_t PayloadBytesOf(const ShapeTiles& message) {
+  return message.packed ? message.packed->bytes : std::accumulate(message.bytes.begin(), message.bytes.end(), std::size_t{0});
 }
 std::size_t PayloadBytesOf(const Chunk& message) { return message.encoded_bytes; }
 std::size_t PayloadBytesOf(const VolumePart& message) { return message.bytes; }

@@ -11,6 +11,6 @@ namespace slabstream {
 // Payloads with fewer bytes are not acknowledged: they measure a link's latency rather than its rate.
 inline constexpr std::size_t kLeastAcknowledgedBytes = std::size_t{64} << 10;
 
-using WorkerToWorker = std::variant<PartialImage, ImageRefused, ImageReceived>;
+using WorkerToWorker = std::variant<PartialImage, ImageRefused, ImageReceived, ShapeTiles>;
 
 }  // namespace slabstream

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/frame/shape_grid.h"
 #include "common/planning/frame_occlusion.h"
 #include "common/renderers/registry.h"
 #include "common/volume/light_volume.h"
@@ -139,6 +141,19 @@ void CheckPeers(const GroupAssignment& m, Checker& check) {
   for (const Placement& placement : m.group.placements) require(placement.worker);
 }
 
+void CheckTiles(const GroupAssignment& m, Checker& check) {
+  const auto scope = check.In("tiles");
+  check.That(m.tiles.empty() || (!m.setup.shapes.empty() && m.key.group == 0), "", "without shapes, or not with the first group");
+  const std::uint32_t count = ShapeGrid(FrameBounds(m.setup)).count();
+  for (std::size_t i = 0; i < m.tiles.size(); ++i) {
+    const auto of_order = check.In("", i);
+    const TileOrder& order = m.tiles[i];
+    check.That(order.from != order.to, "to", "the sender");
+    const bool ascend = std::ranges::adjacent_find(order.tiles, std::ranges::greater_equal()) == order.tiles.end();
+    check.That(ascend && (order.tiles.empty() || order.tiles.back() < count), "tiles", "not ascending numbers of the frame's tiles");
+  }
+}
+
 void CheckHidden(const GroupAssignment& m, Checker& check) {
   const auto scope = check.In("hidden");
   check.That(m.hidden.empty() || m.key.group > 0, "", "a mask for the first group, in front of which there is nothing");
@@ -229,6 +244,7 @@ void Rules(const GroupAssignment& m, Checker& check) {
   check.Range("first_group", m.first_group, 0, m.key.group);
   check.Range("groups_done", m.groups_done, 0, m.key.group);
   CheckPeers(m, check);
+  CheckTiles(m, check);
   CheckHidden(m, check);
   CheckGroup(m.group, m.setup, check);
   CheckShares(m, check);

@@ -23,6 +23,7 @@ void Rules(const BlockName&, Checker&);
 void Rules(const SharedImage&, Checker&);
 void Rules(const PackedRuns&, Checker&);
 void Rules(const PartialImage&, Checker&);
+void Rules(const ShapeTiles&, Checker&);
 void Rules(const ChunkRequest&, Checker&);
 void Rules(const Chunk&, Checker&);
 void Rules(const ChunkRefused&, Checker&);

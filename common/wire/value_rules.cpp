@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <string>
 
 #include "common/image/run_image.h"
@@ -15,6 +17,12 @@ std::uint32_t LastChunk(const Box& box) { return std::max(ChunkCount(box, Scalar
 void CheckChunkNumber(const Box& box, std::uint32_t chunk, Checker& check) {
   const bool of_cells = IsCellChunk(chunk) && chunk - kFirstCellChunk < CellChunkCount(kMaxCellBytes);
   if (!of_cells) check.Range("chunk", chunk, 0, LastChunk(box));
+}
+
+// `raw`: bytes of the payload that was packed.
+void CheckPacked(const PackedRuns& packed, std::uint64_t raw, std::string_view what, Checker& check) {
+  check.That(packed.bytes < raw, "packed.bytes",
+             std::to_string(packed.bytes) + " are not less than the " + std::to_string(raw) + " of the " + std::string(what));
 }
 
 }  // namespace
@@ -95,11 +103,18 @@ void Rules(const PartialImage& m, Checker& check) {
                std::to_string(m.shared->planes.size()) + " of " + std::to_string(planes));
     check.That(!m.packed, "packed", "beside a shared image");
   }
-  if (m.packed) {
-    const std::uint64_t raw = PayloadBytes(m.image);
-    check.That(m.packed->bytes < raw, "packed.bytes",
-               std::to_string(m.packed->bytes) + " are not less than the " + std::to_string(raw) + " of the runs");
-  }
+  if (m.packed) CheckPacked(*m.packed, PayloadBytes(m.image), "runs", check);
+}
+
+void Rules(const ShapeTiles& m, Checker& check) {
+  check.That(!m.tiles.empty(), "tiles", "none");
+  check.That(std::ranges::adjacent_find(m.tiles, std::ranges::greater_equal()) == m.tiles.end(), "tiles", "not ascending");
+  check.That(m.bytes.size() == m.tiles.size(), "bytes",
+             std::to_string(m.bytes.size()) + " of " + std::to_string(m.tiles.size()) + " tiles");
+  check.That(std::ranges::all_of(m.bytes, [](std::uint32_t bytes) { return bytes % 4 == 0; }), "bytes", "no multiple of 4");
+  const std::uint64_t raw = std::accumulate(m.bytes.begin(), m.bytes.end(), std::uint64_t{0});
+  check.That(raw <= kMaxRunsBytes, "bytes", std::to_string(raw) + " in all, at most " + std::to_string(kMaxRunsBytes));
+  if (m.packed) CheckPacked(*m.packed, raw, "tiles", check);
 }
 
 // ---- the voxels plane

@@ -387,11 +387,13 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
   RunningFrame::HandOut out = frame.NextGroup(now);
   out.assignment.epoch = config.epoch;
   out.assignment.finished_before = frames.finished_before();
-  for (Peer& peer : out.assignment.peers) {
-    const Register& description = roster.Find(peer.worker)->description;
-    peer.images_endpoint = description.images_endpoint;
-    peer.memory_scope = description.memory_scope;
-    peer.images_key = description.images_key;
+  for (std::vector<Peer>* const peers : {&out.assignment.peers, &out.assignment.others}) {
+    for (Peer& peer : *peers) {
+      const Register& description = roster.Find(peer.worker)->description;
+      peer.images_endpoint = description.images_endpoint;
+      peer.memory_scope = description.memory_scope;
+      peer.images_key = description.images_key;
+    }
   }
   if (const Member* display = roster.Find(out.assignment.display); display != nullptr && !display->description.images_key.empty()) {
     out.assignment.pictures = frame.request().pictures;

@@ -82,7 +82,7 @@ class RunningFrame {
   // ---- handing out
   bool CanHandOut() const;  // a group is left, and no new attempt is due or wanted
   struct HandOut {
-    GroupAssignment assignment;  // epoch, finished_before and the endpoints of the peers are left to the caller
+    GroupAssignment assignment;  // epoch, finished_before and the endpoints of peers and others are left to the caller
     std::vector<WorkerId> workers;
   };
   HandOut NextGroup(Time now);  // needs CanHandOut()

@@ -212,6 +212,7 @@ class CoordinatorScript {
   Planner planner;
   bool plans_at_once = true;       // else plans wait in `plans` for Plan()
   std::vector<PlanRequest> plans;  // plans that were not made yet
+  std::function<void(FramePlan&)> alter_plan;
 
   // All that comes of the event, of the plans that are made at once, too.
   Actions Step(const auto& event) {
@@ -232,7 +233,12 @@ class CoordinatorScript {
   Actions Plan() {
     const PlanRequest request = std::move(plans.front());
     plans.erase(plans.begin());
-    const auto planned = planner.Plan(request);
+    auto planned = planner.Plan(request);
+    if (alter_plan && planned.ok()) {
+      auto altered = std::make_shared<PlannedFrame>(**planned);
+      alter_plan(altered->plan);
+      planned = std::shared_ptr<const PlannedFrame>(std::move(altered));
+    }
     return Step(Planned{request.plan, planned});
   }
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {

@@ -58,6 +58,42 @@ TEST(CoordinatorFrames, FrameRunsGroupByGroupToItsPicture) {
   EXPECT_TRUE(ToClients<FrameReply>(script.Image(last, 3)).empty()) << "a late copy";
 }
 
+// Also those that have no box in the first group.
+TEST(CoordinatorFrames, AllWorkersHearWhoDrawsTilesOfShapes) {
+  CoordinatorScript script;
+  std::vector<FakeWorker> workers;
+  for (PeerToken token = 11; token < 14; ++token) workers.push_back(script.Join(token, token));
+  WorkerId other = 0;
+  std::vector<TileOrder> orders;
+  script.alter_plan = [&](FramePlan& plan) {
+    GroupPlan& first = plan.groups.front();
+    const auto at = std::ranges::find_if(first.placements, [&](const Placement& each) { return each.worker != plan.display; });
+    other = at->worker;
+    first.placements.erase(at);
+    first.schedule = {"fan-in", Rank(first.placements.size()), {0}};
+    plan.setup.shapes.resize(1);
+    orders = plan.tiles = {{other, plan.display, {0}}, {plan.display, other, {1, 2}}};
+  };
+  const Actions start = script.Submit(kClient, Frame(1, 2));
+  const auto groups = HandedOut(start);
+  ASSERT_EQ(groups.size(), 2U);
+  EXPECT_EQ(groups[0].tiles, orders);
+  EXPECT_FALSE(WorkersOf(groups[0]).contains(other));
+  ASSERT_THAT(groups[0].others, SizeIs(1));
+  EXPECT_EQ(groups[0].others[0].worker, other);
+  EXPECT_THAT(groups[0].others[0].images_endpoint, testing::HasSubstr("inproc://images"));
+  std::size_t copies = 0;
+  for (const auto& sent : ToWorkers<GroupAssignment>(start)) copies += sent.message.key.group == 0 ? 1 : 0;
+  EXPECT_EQ(copies, 3U);
+  EXPECT_TRUE(groups[1].tiles.empty() && groups[1].others.empty());
+
+  script.alter_plan = nullptr;
+  const auto again = HandedOut(script.Kill(script.WorkerOf(other)));
+  ASSERT_FALSE(again.empty());
+  EXPECT_EQ(again[0].key.attempt, 2U);
+  EXPECT_TRUE(again[0].tiles.empty()) << "nobody knows what was lost";
+}
+
 TEST(CoordinatorFrames, WindowSpansFramesAndTwoFramesRunAtMost) {
   CoordinatorScript script;
   script.Join(11, 1);

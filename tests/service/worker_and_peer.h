@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -83,9 +84,13 @@ class WorkerAndPeer : public testing::Test {
     return std::get<Message>(AwaitEither<Message>());
   }
 
+  // Zeros, unless `voxels_of_` has the whole dataset, of one chunk.
   void Serve(const std::string& identity, const ChunkRequest& request) {
     Chunk chunk = {.epoch = kEpoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-    const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::size_t(request.box.voxel_count()))), Codec::kRaw, chunk);
+    const auto known = voxels_of_.find(request.dataset);
+    std::vector<std::byte> voxels =
+        known == voxels_of_.end() ? std::vector<std::byte>(std::size_t(request.box.voxel_count())) : known->second;
+    const Bytes payload = PackChunk(Bytes(std::move(voxels)), Codec::kRaw, chunk);
     ASSERT_TRUE(voxels_.Send(identity, Encode(chunk), payload).ok());
   }
 
@@ -122,6 +127,7 @@ class WorkerAndPeer : public testing::Test {
   std::uint64_t memory_scope_ = 0;  // the worker's
   std::uint64_t peer_scope_ = 0;    // the same, unless a test makes it another host's
   Bytes payload_;                   // the payload of the message that Await returned
+  std::map<DatasetId, std::vector<std::byte>> voxels_of_;
 };
 
 }  // namespace slabstream

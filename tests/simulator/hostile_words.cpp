@@ -143,9 +143,10 @@ WorkerToWorker HostileWords::MakeToWorker(const Speaker& self) {
   const Epoch epoch = EpochLike(self.epoch);
   const WorkerId worker = self.worker == 0 || random_.Chance(0.5) ? kNobody : self.worker;
   const std::uint64_t pixel = random_.Integer<std::uint64_t>(0, 5);
-  switch (random_.Integer(0, 3)) {
+  switch (random_.Integer(0, 4)) {
     case 0: return ImageRefused{epoch, worker, Key(), Number32(), {pixel, pixel + 1}};
     case 1: return ImageReceived{epoch, worker, Number()};
+    case 2: return ShapeTiles{.epoch = epoch, .from_worker = worker, .key = Key(), .tiles = {Number32()}, .bytes = {0}};
     default:
       return PartialImage{.epoch = epoch,
                           .from_worker = kNobody,

@@ -48,7 +48,7 @@ WorkerEvent ModelWorker::Answer(Job& job) {
 
 void ModelWorker::OnRequest(const ChunkRequest& request) {
   const std::uint32_t bytes = IsCellChunk(request.chunk) ? BytesOfCellChunk(cells_.BytesOf(request.dataset, request.box), request.chunk)
-                                                         : PartOfChunk(request.box, kVoxelType, request.chunk).bytes;
+                                                         : PartOfChunk(request.box, TypeOf(request.dataset), request.chunk).bytes;
   requested_[{request.dataset, request.box, request.chunk}] = {bytes, service_.time()};
 }
 
@@ -126,6 +126,7 @@ double ModelWorker::Begin(Job&, const StartRender& action) {
     tally_.Add(Count::kRendersBesideOthers);
   }
   EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
+  for (const BoxKey& shape : action.shapes) EXPECT_TRUE(Complete(shape)) << "a shape is drawn before it is complete";
   EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.at(), *action.setup))) << "a padded box without the voxels of its box";
   EXPECT_EQ(action.padded.dataset, DatasetOf(*action.setup, action.placement.level));
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);

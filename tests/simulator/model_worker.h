@@ -18,6 +18,8 @@
 namespace slabstream {
 
 inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // the type of the only volume
+inline constexpr DatasetId kShapeDataset = 1000000;             // bytes of the only shape
+inline constexpr ScalarType TypeOf(DatasetId dataset) { return dataset == kShapeDataset ? ScalarType::kUint8 : kVoxelType; }
 
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds

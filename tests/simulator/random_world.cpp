@@ -94,6 +94,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   world.policy.combine = RandomCombining(random);
   if (random.Chance(0.1)) world.policy.combine.clear();
   if (random.Chance(0.3)) world.policy.teams = random.Integer(2, 4);
+  world.shapes = !owned && random.Chance(0.2);
   return world;
 }
 

@@ -21,6 +21,7 @@ struct SimulatedWorld {
   std::shared_ptr<const OccupancyGrid> occupied;
   bool in_parts = false;  // nobody holds the volume
   bool owned = false;     // processes own it (ModelOwners)
+  bool shapes = false;    // pictures show a shape, too
   WorkerConfig worker_config;
   WorkerSpeed speed;
   Policy policy;

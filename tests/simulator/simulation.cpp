@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/renderers/registry.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {
@@ -475,6 +476,14 @@ void Simulation::Perform(const CountDataset& action) {
 // Plans come late, and not always in the order in which they were asked for.
 void Simulation::Perform(const PlanRequest& action) {
   Planned planned{action.plan, planner_->Plan(action)};
+  if (world_.shapes && planned.frame.ok()) {
+    auto with_shape = std::make_shared<PlannedFrame>(**planned.frame);
+    FramePlan& plan = with_shape->plan;
+    plan.setup.shapes.resize(1);
+    plan.setup.shapes[0].bytes = {kShapeDataset, {.geometry = {{100, 1, 1}}, .type = TypeOf(kShapeDataset)}};
+    plan.tiles = PlanTiles(plan);
+    planned.frame = std::shared_ptr<const PlannedFrame>(std::move(with_shape));
+  }
   if (random_.Chance(current_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
   service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), std::move(planned));
 }
@@ -533,6 +542,27 @@ Arrivals Simulation::ToPeer(Node to, Job& sends) {
   words_.Overhear(image, sends.payload ? *sends.payload : Bytes());
   image = std::get<PartialImage>(OnTheWay(WorkerToWorker(image)));
   return network_.Send({int(sends.node), int(to)}, service_.now());
+}
+
+void Simulation::Perform(Node node, const DrawTiles& action) {
+  tally_.Add(Count::kTilesDrawn);
+  service_.queue().At(service_.now() + random_.Real(0, world_.speed.render), [this, node, action] {
+    if (!service_.alive(node)) return;
+    for (const DrawTiles::For& receiver : action.receivers) {
+      const ShapeTiles tiles = {.epoch = action.epoch,
+                                .from_worker = action.from,
+                                .key = action.key,
+                                .tiles = receiver.tiles,
+                                .bytes = std::vector<std::uint32_t>(receiver.tiles.size())};
+      const auto message = Widen<MessageToWorker>(OnTheWay(WorkerToWorker(tiles)));
+      const Node to = ParseNumber<Node>(receiver.to.images_endpoint).value();
+      const Arrivals arrivals = network_.Send({int(node), int(to)}, service_.now());
+      for (int i = 0; i < arrivals.count; ++i) {
+        service_.queue().At(arrivals.times[i], [this, to, message] { service_.StepWorker(to, MessageReceived{message, {}}); });
+      }
+    }
+    service_.StepWorker(node, TilesDrawn{action.key, {Stage::kRender, 0, 1}});
+  });
 }
 
 void Simulation::Perform(Node node, SendChunkRequest& action) {
@@ -604,6 +634,7 @@ VoxelsToWorker Simulation::ReadOf(const ChunkRequest& request) {
 }
 
 VoxelsToWorker Simulation::AnswerOf(const ChunkRequest& request) {
+  if (request.dataset == kShapeDataset) return ChunkOf(request);
   if (!published_.contains(request.dataset)) {
     return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")};
   }
@@ -621,7 +652,7 @@ Chunk Simulation::ChunkOf(const ChunkRequest& request) {
     EXPECT_LT(request.chunk - kFirstCellChunk, CellChunkCount(chunk.cell_bytes)) << "a chunk of cells that there is not";
     chunk.raw_bytes = BytesOfCellChunk(chunk.cell_bytes, request.chunk);
   } else {
-    chunk.raw_bytes = PartOfChunk(request.box, kVoxelType, request.chunk).bytes;
+    chunk.raw_bytes = PartOfChunk(request.box, TypeOf(request.dataset), request.chunk).bytes;
   }
   chunk.encoded_bytes = chunk.raw_bytes;
   return chunk;

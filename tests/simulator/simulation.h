@@ -124,6 +124,7 @@ class Simulation : private Conditions {
   WorkerEvent Answer(Job& job) override;
   bool CancelsInTime() override { return random_.Chance(0.7); }
   void Perform(Node node, SendChunkRequest& action) override;
+  void Perform(Node node, const DrawTiles& action) override;
   void Perform(Node node, const OpenBox& action) override { workers_[node].Perform(action); }
   void Perform(Node node, const DropBox& action) override { workers_[node].Perform(action); }
   void Perform(Node node, const ReleaseImage& action) override { workers_[node].Perform(action); }

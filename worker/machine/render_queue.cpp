@@ -1,6 +1,7 @@
 #include "worker/machine/render_queue.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace slabstream {
 
@@ -45,8 +46,20 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
   job.waited = !Complete(job);
 }
 
+void RenderQueue::AwaitTiles(FrameId frame, std::set<WorkerId> from, Time until) {
+  if (!from.empty()) tiles_[frame] = {std::move(from), until};
+}
+
+void RenderQueue::TilesCame(FrameId frame, WorkerId from) {
+  const auto awaited = tiles_.find(frame);
+  if (awaited == tiles_.end()) return;
+  awaited->second.from.erase(from);
+  if (awaited->second.from.empty()) tiles_.erase(awaited);
+}
+
 bool RenderQueue::Complete(const Job& job) const {
-  return std::ranges::all_of(job.boxes, [this](BoxFetcher::Generation box) { return boxes_.complete(box); });
+  return !tiles_.contains(job.render.key.frame) &&
+         std::ranges::all_of(job.boxes, [this](BoxFetcher::Generation box) { return boxes_.complete(box); });
 }
 
 bool RenderQueue::HasRoom(const Job& job) const {
@@ -123,6 +136,7 @@ void RenderQueue::EndTurn(Time now) {
 }
 
 void RenderQueue::StartNext(Time now, WorkerActions& actions) {
+  std::erase_if(tiles_, [now](const auto& awaited) { return awaited.second.until <= now; });
   if (turn_ && (OnlyTurns() || now < turn_->begin + kTurn)) return;
   const std::optional<ClientId> next = NextInTurn();
   if (!next) return;
@@ -151,7 +165,11 @@ void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
   actions.push_back(begun.job.render);
 }
 
-Time RenderQueue::NextTurn() const { return turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max(); }
+Time RenderQueue::NextStart() const {
+  Time next = turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max();
+  for (const auto& [group, awaited] : tiles_) next = std::min(next, awaited.until);
+  return next;
+}
 
 std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions) {
   const auto ended = std::ranges::find_if(begun_, [&](const auto& begun) { return begun.second.job.render.image == done.image; });

@@ -1,8 +1,8 @@
 // RenderQueue: the ranks that this worker has yet to render, and those that it is rendering. The ranks of a client are rendered one after
 // the other, in order of frame, group and rank. The next one is the first whose boxes are complete: its padded box, and those of the light
-// volumes and of the other fields that the frame shows. The clients take turns of at least
-// kTurn. The next turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a
-// client's turn is over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
+// volumes and of the other fields that the frame shows; and whose frame awaits no tiles. The clients take turns of at least kTurn. The next
+// turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a client's turn is
+// over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
 //
 // A render that is told to pause stops only between two of its pieces. A render that is cancelled ends soon, but not at once. So other
 // renders run beside it for a moment. Renders of several clients, paused ones included, use the same padded box at the same time, as long
@@ -31,10 +31,14 @@ class RenderQueue {
   void Add(ClientId client, const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
            const std::shared_ptr<const OcclusionMask>& hidden, Time now, WorkerActions& actions);
   void DropGroup(const GroupKey& key, Time now, WorkerActions& actions);  // its renders are cancelled
+  // The frame's ranks wait for tiles of its shapes from these workers, until `until` at most.
+  void AwaitTiles(FrameId frame, std::set<WorkerId> from, Time until);
+  void TilesCame(FrameId frame, WorkerId from);
+  void ForgetTiles(FrameId frame) { tiles_.erase(frame); }
   // Gives the turn to the client that it belongs to.
   void StartNext(Time now, WorkerActions& actions);
   // When to call StartNext although nothing else has happened. Time::max(): never.
-  Time NextTurn() const;
+  Time NextStart() const;
   // The client has used this much of the worker's time for something other than rendering.
   void Charge(ClientId client, Duration used) { turns_.Charge(client, used); }
 
@@ -69,6 +73,11 @@ class RenderQueue {
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;
 
+  struct Awaited {
+    std::set<WorkerId> from;  // not empty
+    Time until;
+  };
+
   bool Complete(const Job& job) const;
   bool HasRoom(const Job& job) const;  // for what it derives, if others that have begun use its boxes
   void Release(const Job& job);
@@ -85,6 +94,7 @@ class RenderQueue {
   BoxFetcher& boxes_;
   ImageNames& names_;
   Waiting waiting_;
+  std::map<FrameId, Awaited> tiles_;
   std::map<ClientId, Begun> begun_;  // at most one of a client; all but that of the client whose turn it is are paused or dropped
   std::optional<TurnNow> turn_;
   FairTurns<ClientId> turns_;

@@ -9,7 +9,7 @@
 #include "common/planning/worker_memory.h"
 #include "common/volume/memory_budget.h"
 #include "worker/machine/box_fetcher.h"
-#include "worker/machine/early_images.h"
+#include "worker/machine/early_messages.h"
 #include "worker/machine/frame_accumulator.h"
 #include "worker/machine/group_run.h"
 #include "worker/machine/peer_links.h"
@@ -17,13 +17,27 @@
 
 namespace slabstream {
 
+namespace {
+
+// Among all that the assignment names; null: it names none such.
+const Peer* PeerIn(const GroupAssignment& assignment, WorkerId worker) {
+  for (const auto* peers : {&assignment.peers, &assignment.others}) {
+    const auto found = std::ranges::find(*peers, worker, &Peer::worker);
+    if (found != peers->end()) return &*found;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
 struct WorkerMachine::State {
   explicit State(WorkerConfig c)
       : config(std::move(c)),
         incarnation(config.incarnation),
         boxes(config),
         renders(boxes, names),
-        early(EarlyImageBytes(config)),
+        early_images(EarlyImageBytes(config)),
+        early_tiles(EarlyImageBytes(config)),
         links(config) {}
 
   // They are images of groups, which have room.
@@ -38,16 +52,20 @@ struct WorkerMachine::State {
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
     std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
     std::optional<FrameAccumulator> accumulator;  // display worker
-    // Of a picture with shapes: what its accumulator awaits. Acquired.
+    // Of a picture with shapes: what its accumulator, and drawing for others, await. Acquired.
     std::vector<BoxFetcher::Generation> shapes = {}, lights = {};
+    std::optional<DrawTiles> to_draw = {};         // without its boxes
+    std::shared_ptr<const FrameSetup> setup = {};  // null: no tiles are shared
+
+    bool AwaitsShapes() const { return to_draw || (accumulator && accumulator->AwaitsShapes()); }
 
     std::vector<BoxFetcher::Generation> boxes() const {
       std::vector<BoxFetcher::Generation> all = shapes;
       all.insert(all.end(), lights.begin(), lights.end());
       return all;
     }
-    // Memory of images, if this worker's memory is limited: of its largest group, and of its picture.
-    std::uint64_t group_bytes = 0, picture_bytes = 0, shared_bytes = 0;
+    // Memory of images, if this worker's memory is limited: of its largest group, of its picture, and of shapes.
+    std::uint64_t group_bytes = 0, picture_bytes = 0, shared_bytes = 0, tile_bytes = 0;
   };
 
   // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
@@ -61,6 +79,7 @@ struct WorkerMachine::State {
   void On(const RenderDone& done);
   void On(const CombineDone& done);
   void On(const HiddenFound& found);
+  void On(const TilesDrawn& drawn);
   void On(const SendFailed& failed);
   void On(const PartialSent& sent) { links.On(sent, now); }
   void On(const PeerUnreachable& peer);
@@ -77,6 +96,7 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(PartialImage&& partial, const Bytes& payload);
+  void On(ShapeTiles&& tiles, const Bytes& payload);
   void On(const ImageReceived& received, const Bytes&) {
     if (received.epoch == epoch) links.On(received, now);
   }
@@ -101,7 +121,10 @@ struct WorkerMachine::State {
   void EndRuns(const Frame& frame);
   void CheckAccumulator(FrameId id, Frame& frame);
   void AcquireShapes(FrameId id, Frame& frame, const FrameSetup& setup);
-  void GiveShapes();  // to accumulators that await them
+  void ShareTiles(Frame& frame, const GroupAssignment& assignment, const std::shared_ptr<const FrameSetup>& setup);
+  void TakeTiles(const Frame& frame, ShapeTiles&& tiles, const Bytes& payload);
+  void ForgetEarly(auto&& over);  // over(GroupKey, Epoch)
+  void GiveShapes();              // to those that await them
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
   void Tend();  // what is due, and what voxels and renderings need
   std::uint64_t RoomForVoxels() const;
@@ -121,7 +144,8 @@ struct WorkerMachine::State {
   ImageNames names;
   BoxFetcher boxes;
   RenderQueue renders;
-  EarlyImages early;
+  EarlyMessages<PartialImage> early_images;
+  EarlyMessages<ShapeTiles> early_tiles;
   PeerLinks links;
 
   // All that most steps need.
@@ -154,7 +178,7 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   timeout = std::chrono::milliseconds(welcome.timeout_ms);
   last_heard = now;
   next_heartbeat = now;
-  early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
+  ForgetEarly([&](const GroupKey&, Epoch of) { return of != epoch; });
   links.Begin(epoch, worker, actions);
   actions.push_back(ConnectVoxels{welcome.voxels_endpoint});
 }
@@ -186,7 +210,7 @@ void WorkerMachine::State::On(const StopRequested&) {
 
 void WorkerMachine::State::Unregister() {
   while (!frames.empty()) DropFrame(frames.begin()->first);
-  early.Forget([](const PartialImage&) { return true; });
+  ForgetEarly([](const GroupKey&, Epoch) { return true; });
   finished_before = 0;
   cancelled.clear();
   boxes.ForgetRequests();
@@ -244,7 +268,13 @@ void WorkerMachine::State::FinishBefore(FrameId frame) {
   finished_before = std::max(finished_before, frame);
   while (!frames.empty() && frames.begin()->first < finished_before) DropFrame(frames.begin()->first);
   cancelled.erase(cancelled.begin(), cancelled.lower_bound(finished_before));
-  early.Forget([&](const PartialImage& image) { return Over(image.key.frame); });
+  ForgetEarly([&](const GroupKey& key, Epoch) { return Over(key.frame); });
+}
+
+void WorkerMachine::State::ForgetEarly(auto&& over) {
+  const auto forget = [&](const auto& message) { return over(message.key, message.epoch); };
+  early_images.Forget(forget);
+  early_tiles.Forget(forget);
 }
 
 void WorkerMachine::State::DropFrame(FrameId id) {
@@ -253,6 +283,7 @@ void WorkerMachine::State::DropFrame(FrameId id) {
   EndRuns(found->second);
   if (found->second.accumulator) found->second.accumulator->Drop(actions);
   for (const BoxFetcher::Generation box : found->second.boxes()) boxes.Release(box);
+  renders.ForgetTiles(id);
   frames.erase(found);
 }
 
@@ -267,16 +298,44 @@ void WorkerMachine::State::AcquireShapes(FrameId id, Frame& frame, const FrameSe
   for (const CoarserLevel* const light : LightVolumesOf(setup)) frame.lights.push_back(acquire(*light));
 }
 
+// Workers of one process share what they draw anyway.
+void WorkerMachine::State::ShareTiles(Frame& frame, const GroupAssignment& assignment, const std::shared_ptr<const FrameSetup>& setup) {
+  if (assignment.tiles.empty() || config.images_endpoint.starts_with("inproc://")) return;
+  frame.setup = setup;
+  std::set<WorkerId> awaited;
+  DrawTiles draw = {.client = assignment.client, .epoch = epoch, .from = worker, .key = assignment.key, .setup = setup};
+  for (const TileOrder& order : assignment.tiles) {
+    if (order.to == worker) awaited.insert(order.from);
+    const Peer* const to = order.from == worker ? PeerIn(assignment, order.to) : nullptr;
+    if (to != nullptr) draw.receivers.push_back({*to, order.tiles, links.DeliveryTo(*to).bytes_per_second});
+  }
+  if (!draw.receivers.empty()) frame.to_draw = std::move(draw);
+  renders.AwaitTiles(assignment.key.frame, std::move(awaited), now + config.tile_patience);
+  for (auto& [tiles, payload] : early_tiles.Take(assignment.key.frame)) TakeTiles(frame, std::move(tiles), payload);
+}
+
+void WorkerMachine::State::TakeTiles(const Frame& frame, ShapeTiles&& tiles, const Bytes& payload) {
+  if (tiles.key.attempt != frame.attempt) return;
+  renders.TilesCame(tiles.key.frame, tiles.from_worker);
+  actions.push_back(KeepTiles{frame.setup, std::move(tiles), payload});
+}
+
 void WorkerMachine::State::GiveShapes() {
   for (auto& [id, frame] : frames) {
-    if (!frame.accumulator || !frame.accumulator->AwaitsShapes()) continue;
+    if (!frame.AwaitsShapes()) continue;
     if (!std::ranges::all_of(frame.boxes(), [this](BoxFetcher::Generation box) { return boxes.complete(box); })) continue;
     const auto keys = [this](const std::vector<BoxFetcher::Generation>& of) {
       std::vector<BoxKey> result;
       for (const BoxFetcher::Generation box : of) result.push_back(boxes.key(box));
       return result;
     };
-    frame.accumulator->SetShapes({keys(frame.shapes), keys(frame.lights)}, now, actions);
+    const FrameAccumulator::ShapeBoxes shapes = {keys(frame.shapes), keys(frame.lights)};
+    if (frame.to_draw) {
+      frame.to_draw->shapes = shapes.shapes;
+      frame.to_draw->lights = shapes.lights;
+      actions.push_back(*std::exchange(frame.to_draw, std::nullopt));
+    }
+    if (frame.accumulator && frame.accumulator->AwaitsShapes()) frame.accumulator->SetShapes(shapes, now, actions);
   }
 }
 
@@ -285,6 +344,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   FinishBefore(assignment.finished_before);
   const GroupKey key = assignment.key;
   links.Name(assignment.peers, actions);
+  links.Name(assignment.others, actions);
   if (Over(key.frame)) return;
   Frame& frame = frames[key.frame];
   if (key.attempt < frame.attempt) return;
@@ -297,10 +357,11 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
     frame.group_bytes = std::max(frame.group_bytes, GroupImageBytes(assignment.setup, assignment.group.placements));
     frame.picture_bytes = PictureBytes(assignment.setup);
     frame.shared_bytes = SharedBytes(assignment.setup);
+    frame.tile_bytes = TileBytes(assignment.setup);
   }
 
+  AcquireShapes(key.frame, frame, assignment.setup);
   if (const std::optional<std::size_t> share = ShareOf(assignment.group, assignment.display, worker)) {
-    AcquireShapes(key.frame, frame, assignment.setup);
     if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, *share, names, config.preview_interval);
     if (frame.accumulator->groups_done() < assignment.first_group) {
       return Trouble(key, Status::DataLoss(fmt::format("the display worker holds {} groups of the frame, expected {}",
@@ -311,6 +372,9 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
 
   const auto setup = std::make_shared<const FrameSetup>(assignment.setup);
   const OcclusionMask accumulated = assignment.hidden;
+  ShareTiles(frame, assignment, setup);
+  assignment.tiles.clear();
+  assignment.others.clear();
   GroupRun& run = entry->second.emplace(std::move(assignment), worker, names);
   for (const Rank rank : run.ranks()) {
     if (!run.failure().ok()) break;
@@ -325,7 +389,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
       renders.Add(run.client(), key, rank, placement, setup, hidden, now, actions);
     }
   }
-  for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), payload, actions);
+  for (auto& [partial, payload] : early_images.Take(key)) run.OnPartial(std::move(partial), payload, actions);
   AfterRun(run);
 }
 
@@ -333,8 +397,11 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
   EndRuns(frame);
   frame.groups.clear();
   frame.met.clear();
+  frame.to_draw.reset();
+  frame.setup.reset();
+  renders.ForgetTiles(id);
   frame.attempt = assignment.key.attempt;
-  early.Forget([&](const PartialImage& image) { return image.key.frame == id && image.key.attempt < frame.attempt; });
+  ForgetEarly([&](const GroupKey& key, Epoch) { return key.frame == id && key.attempt < frame.attempt; });
   if (!frame.accumulator) return;
   // Others may have lost their shares, and need what this worker rendered of them.
   const bool divided = frame.accumulator->share_count() > 1 || assignment.group.schedule.roots.size() > 1;
@@ -348,7 +415,7 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
 
 void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
-  if (worker == 0) return (void)early.Keep(std::move(partial), payload, now);
+  if (worker == 0) return (void)early_images.Keep(std::move(partial), payload, now);
   if (partial.epoch != epoch) return;
   links.Acknowledge(partial, payload.size(), actions);
   if (GroupRun* run = FindRun(partial.key)) {
@@ -362,7 +429,20 @@ void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
     if (partial.key.attempt == frame->second.attempt && frame->second.groups.contains(partial.key.group)) return;  // over
   }
   const GroupKey key = partial.key;
-  if (const Status kept = early.Keep(std::move(partial), payload, now); !kept.ok()) Trouble(key, kept);
+  if (const Status kept = early_images.Keep(std::move(partial), payload, now); !kept.ok()) Trouble(key, kept);
+}
+
+void WorkerMachine::State::On(ShapeTiles&& tiles, const Bytes& payload) {
+  if (worker != 0 && (tiles.epoch != epoch || Over(tiles.key.frame))) return;
+  const auto frame = frames.find(tiles.key.frame);
+  if (frame != frames.end() && frame->second.setup != nullptr) return TakeTiles(frame->second, std::move(tiles), payload);
+  if (frame != frames.end() && tiles.key.attempt < frame->second.attempt) return;
+  (void)early_tiles.Keep(std::move(tiles), payload, now);  // without them, the tiles are drawn here
+}
+
+void WorkerMachine::State::On(const TilesDrawn& drawn) {
+  const auto frame = frames.find(drawn.key.frame);
+  if (frame != frames.end()) renders.Charge(frame->second.client, Duration(drawn.span.end_ns - drawn.span.begin_ns));
 }
 
 void WorkerMachine::State::On(const RenderDone& done) {
@@ -512,7 +592,8 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 void WorkerMachine::State::Tend() {
   boxes.ExpireRequests(now);
   if (config.memory_bytes != 0) boxes.SetRoom(RoomForVoxels());
-  early.ForgetSince(now - config.early_image_patience);
+  early_images.ForgetSince(now - config.early_image_patience);
+  early_tiles.ForgetSince(now - config.early_image_patience);
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
@@ -520,7 +601,7 @@ void WorkerMachine::State::Tend() {
     auto [by_client, of_next] = renders.BoxesInTurn();
     const bool renders_none = by_client.empty();
     for (const auto& [id, frame] : frames) {
-      if (frame.accumulator && frame.accumulator->AwaitsShapes()) by_client.push_back(frame.boxes());
+      if (frame.AwaitsShapes()) by_client.push_back(frame.boxes());
     }
     if (renders_none && !by_client.empty()) of_next = by_client.front().size();
     boxes.RequestChunks(by_client, renders.AnyPaused() ? 0 : of_next, epoch, worker, now, actions);
@@ -537,7 +618,7 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
   for (const auto& [id, frame] : frames) {
     light = std::max(light, frame.shared_bytes);
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
-    taken += frame.group_bytes * std::uint64_t(runs);
+    taken += frame.group_bytes * std::uint64_t(runs) + frame.tile_bytes;
     if (frame.accumulator) taken += frame.group_bytes * frame.accumulator->groups_waiting() + frame.picture_bytes;
   }
   return config.memory_bytes - std::min(config.memory_bytes, taken + light);
@@ -546,7 +627,7 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
 Time WorkerMachine::State::NextWake() const {
   if (ended) return Time::max();
   if (worker == 0) return next_register;
-  return std::min({next_heartbeat, last_heard + timeout, boxes.NextExpiry(), renders.NextTurn(), leave_by.value_or(Time::max())});
+  return std::min({next_heartbeat, last_heard + timeout, boxes.NextExpiry(), renders.NextStart(), leave_by.value_or(Time::max())});
 }
 
 Time WorkerMachine::NextWake() const { return state_->wake; }
@@ -558,7 +639,7 @@ WorkerSizes WorkerMachine::sizes() const {
   const State& state = *state_;
   return {.frames = state.frames.size(),
           .cancelled = state.cancelled.size(),
-          .early_images = state.early.size(),
+          .early_images = state.early_images.size() + state.early_tiles.size(),
           .renders = state.renders.size(),
           .chunk_requests = state.boxes.chunk_requests(),
           .boxes = state.boxes.size()};

@@ -17,16 +17,18 @@
 //                     turns, also in the midst of a rank (RenderQueue)
 //   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
+//   shapes            workers draw tiles of them for each other (common/planning/tile_plan.h): each draws its own as soon as it has the
+//                     shapes, and its ranks wait for those of others, but not for long
 //   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
 //                     (with the tiles hidden by then), sends a preview if wanted (FrameAccumulator), and after the last group the frame
 // PartialImages that arrive before their assignment or before the Welcome are kept, within a byte limit and for some time; those of
 // finished frames and older attempts are dropped. A second copy of any message changes nothing.
 //
-// The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
-// StartCombine, FindHidden, SendPartial and SendFrame of a client in the order given, and not let those of another one wait for them; drop
-// messages of the images plane that come with another key than their sender's (FindPeer); call Step(Tick) no later than NextWake(). If it
-// calls late, the machine assumes that its own process was held up (stopped), and gives the coordinator as much more time: messages not
-// read meanwhile do not mean that the coordinator was silent.
+// The executor must: run StartRender, StartCombine, FindHidden, DrawTiles and StoreChunk on other threads and answer each with exactly one
+// event; run StartCombine, FindHidden, SendPartial and SendFrame of a client in the order given, and not let those of another one wait for
+// them; drop messages of the images plane that come with another key than their sender's (FindPeer); call Step(Tick) no later than
+// NextWake(). If it calls late, the machine assumes that its own process was held up (stopped), and gives the coordinator as much more
+// time: messages not read meanwhile do not mean that the coordinator was silent.
 #pragma once
 
 #include <algorithm>
@@ -94,6 +96,7 @@ struct WorkerConfig {
   Duration drain = std::chrono::seconds(30);                   // from LeaveRequested to the end; 0: at once
   std::uint64_t early_image_bytes = std::uint64_t{1} << 30;    // payloads of PartialImages kept before their assignment; then WorkerTrouble
   Duration early_image_patience = std::chrono::seconds(10);    // so long they are kept, at least
+  Duration tile_patience = std::chrono::seconds(1);            // then a rank is rendered without the tiles of other workers
   // What this process reads from web servers, unless others tell of it; null: nothing.
   std::function<std::vector<WebTraffic>()> web_traffic = nullptr;
 };
@@ -143,6 +146,10 @@ struct HiddenFound {
   ImageHandle image = 0;
   OcclusionMask hidden;
 };
+struct TilesDrawn {
+  GroupKey key;
+  Span span;
+};
 // A SendPartial or SendFrame failed.
 struct SendFailed {
   GroupKey key;
@@ -165,8 +172,8 @@ struct Moved {
 struct LeaveRequested {};  // SIGTERM: take no new work, end when the old is done
 struct StopRequested {};   // end now
 struct Tick {};
-using WorkerEvent = std::variant<MessageReceived, ImageUnreadable, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed,
-                                 PartialSent, PeerUnreachable, Moved, LeaveRequested, StopRequested, Tick>;
+using WorkerEvent = std::variant<MessageReceived, ImageUnreadable, ChunkStored, RenderDone, CombineDone, HiddenFound, TilesDrawn,
+                                 SendFailed, PartialSent, PeerUnreachable, Moved, LeaveRequested, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -216,6 +223,27 @@ struct StartRender {
   std::vector<BoxKey> lights = {};                 // LightVolumesOf the setup, whole
   std::vector<std::optional<BoxKey>> fields = {};  // by FrameSetup::fields; none: it does not reach there
   std::vector<BoxKey> shapes = {};                 // of FrameSetup::shapes, whole
+};
+// Draws tiles of the frame's shapes and sends each receiver its tiles, as ShapeTiles. What fails is not sent. -> TilesDrawn
+struct DrawTiles {
+  struct For {
+    Peer to;
+    std::vector<std::uint32_t> tiles;  // ascending
+    double bytes_per_second = 0;       // Delivery::bytes_per_second
+  };
+  ClientId client = 0;
+  Epoch epoch = 0;
+  WorkerId from = 0;
+  GroupKey key;
+  std::shared_ptr<const FrameSetup> setup;
+  std::vector<For> receivers;
+  std::vector<BoxKey> shapes = {}, lights = {};  // as those of StartRender
+};
+// Keeps what has come, for renders and pictures of the frame that begin later.
+struct KeepTiles {
+  std::shared_ptr<const FrameSetup> setup;
+  ShapeTiles message;
+  Bytes payload;
 };
 // These name a started render by its image. RenderDone has not come for it. PauseRender: it stops soon, between two of
 // its pieces, and keeps what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.
@@ -289,9 +317,9 @@ struct ForgetGroups {
   std::vector<FrameId> cancelled;
   GroupKey next;  // in its frame, earlier groups and older attempts are over
 
+  bool Over(FrameId frame) const { return frame < finished_before || std::ranges::find(cancelled, frame) != cancelled.end(); }
   bool Over(const GroupKey& key) const {
-    return key.frame < finished_before || std::ranges::find(cancelled, key.frame) != cancelled.end() ||
-           (key.frame == next.frame && (key.attempt < next.attempt || key.group < next.group));
+    return Over(key.frame) || (key.frame == next.frame && (key.attempt < next.attempt || key.group < next.group));
   }
 };
 // Makes the picture of `pixels` of `image`, a frame or a share of it, encodes it, fills message.picture and a report, sends it to the
@@ -314,15 +342,15 @@ struct ReleaseImage {
 struct StopProcess {
   std::uint32_t rendered_ranks = 0;  // since the process began: for the log
 };
-using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectVoxels, OpenBox, StoreChunk, DropBox, StartRender, PauseRender,
-                                  ResumeRender, CancelRender, StartCombine, FindHidden, SendPartial, ResendImage, AnswerPeer, AdmitKeys,
-                                  ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
+using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectVoxels, OpenBox, StoreChunk, DropBox, StartRender, DrawTiles,
+                                  KeepTiles, PauseRender, ResumeRender, CancelRender, StartCombine, FindHidden, SendPartial, ResendImage,
+                                  AnswerPeer, AdmitKeys, ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;
 
 // Entries in the machine's tables. At rest, all but those of cached padded boxes are 0.
 struct WorkerSizes {
   std::size_t frames = 0, cancelled = 0;
-  std::size_t early_images = 0;  // groups that images have come for too early
+  std::size_t early_images = 0;  // groups and frames that images and tiles have come for too early
   std::size_t renders = 0;       // waiting, running or paused
   std::size_t chunk_requests = 0;
   std::size_t boxes = 0;

@@ -1,17 +1,19 @@
 #include "worker/service/executor.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/image/coverage_map.h"
 #include "common/image/image_view.h"
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/threads/guarded.h"
 #include "common/wire/payload.h"
 #include "worker/shapes/compose_shapes.h"
-#include "worker/shapes/shared_shapes.h"
+#include "worker/shapes/tile_coding.h"
 
 namespace slabstream {
 namespace {
@@ -143,9 +145,28 @@ std::shared_ptr<const FrameLight> LightFrom(const std::vector<std::shared_ptr<St
 
 // Null: the frame has none.
 Result<std::shared_ptr<const FrameShapes>> ShapesFrom(const ShapeBytes& shapes, const std::shared_ptr<const FrameLight>& light,
-                                                      const FrameSetup& setup) {
-  if (shapes.empty()) return std::shared_ptr<const FrameShapes>();
-  return SharedFrameShapes(setup, shapes, light);
+                                                      SharedShapes* shared) {
+  if (shared == nullptr) return std::shared_ptr<const FrameShapes>();
+  return shared->Make(shapes, light);
+}
+
+// A message of tiles that a worker has drawn for another one, and its payload. Tiles that would make it too large are left out.
+std::pair<ShapeTiles, Bytes> PackTiles(const DrawTiles& draw, const DrawTiles::For& receiver, const ShapeGrid& grid,
+                                       const FrameShapes& shapes) {
+  constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  ShapeTiles message{.epoch = draw.epoch, .from_worker = draw.from, .key = draw.key};
+  PooledVector<std::byte> bytes;
+  for (const std::uint32_t number : receiver.tiles) {
+    const PixelBounds pixels = grid.PixelsOf(number);
+    const ShapeTile& tile = shapes.TileAt(pixels.x_begin, pixels.y_begin);
+    const std::size_t size = BytesOf(tile);
+    if (bytes.size() + size > kMostBytes) continue;
+    message.tiles.push_back(number);
+    message.bytes.push_back(std::uint32_t(size));
+    AppendTile(tile, bytes);
+  }
+  Bytes payload = PackForLink(Bytes(std::move(bytes)), receiver.bytes_per_second, message.packed);
+  return {std::move(message), std::move(payload)};
 }
 
 // The picture of an accumulated frame, or of a share of it.
@@ -167,6 +188,7 @@ Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threa
       chunk_thread_([this] { Break(); }),
       combine_(threads, [this] { Break(); }),
       finish_(threads, [this] { Break(); }),
+      draw_(threads, [this] { Break(); }),
       render_(threads, [this] { Break(); }) {}
 
 void Executor::Break() {
@@ -215,7 +237,7 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  RenderedBoxes boxes = {BoxOf(action.padded), ShapeBoxesOf(action.shapes, action.lights), {}};
+  RenderedBoxes boxes = {BoxOf(action.padded), ShapeBoxesOf(action.key.frame, action), {}};
   for (const std::optional<BoxKey>& field : action.fields) boxes.fields.push_back(field ? BoxOf(*field) : nullptr);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
@@ -241,7 +263,7 @@ RenderDone Executor::Render(const StartRender& action, const RenderedBoxes& boxe
     const ShapeBytes shape_bytes = BytesOf(boxes.shapes.shapes);
     const std::shared_ptr<const FrameLight> light = LightFrom(boxes.shapes.lights, shape_bytes, action.client, *action.setup);
     lease.data().SetLight(light);
-    const auto shapes = ShapesFrom(shape_bytes, light, *action.setup);
+    const auto shapes = ShapesFrom(shape_bytes, light, boxes.shapes.shared.get());
     if (!shapes.ok()) return shapes.status();
     lease.data().SetShapes(*shapes);
     // Fields that share a box have a lease each: renderers derive other data for each.
@@ -285,11 +307,53 @@ void Executor::Perform(const CancelRender& action) {
   if (const auto control = ControlOf(action.image)) control->Cancel();
 }
 
-Executor::ShapeBoxes Executor::ShapeBoxesOf(const std::vector<BoxKey>& shapes, const std::vector<BoxKey>& lights) const {
+std::shared_ptr<SharedShapes> Executor::SharedShapesOf(FrameId frame, const FrameSetup& setup) {
+  std::shared_ptr<SharedShapes>& shared = shapes_[frame];
+  if (shared == nullptr) shared = SharedShapes::Of(setup);
+  return shared;
+}
+
+template <class Action>
+Executor::ShapeBoxes Executor::ShapeBoxesOf(FrameId frame, const Action& action) {
   ShapeBoxes boxes;
-  for (const BoxKey& shape : shapes) boxes.shapes.push_back(BoxOf(shape));
-  for (const BoxKey& light : lights) boxes.lights.push_back(BoxOf(light));
+  for (const BoxKey& shape : action.shapes) boxes.shapes.push_back(BoxOf(shape));
+  for (const BoxKey& light : action.lights) boxes.lights.push_back(BoxOf(light));
+  if (!boxes.shapes.empty()) boxes.shared = SharedShapesOf(frame, *action.setup);
   return boxes;
+}
+
+void Executor::Perform(DrawTiles&& action) {
+  ShapeBoxes boxes = ShapeBoxesOf(action.key.frame, action);
+  ClientLane& lane = draw_.Of(action.client);
+  lane.thread.Post([this, &lane, boxes = std::move(boxes), draw = std::move(action)] {
+    const std::int64_t begin = NowNs();
+    const Status status = Guard("tiles", [&] {
+      return lane.arena.Run([&] {
+        const ShapeBytes bytes = BytesOf(boxes.shapes);
+        const auto shapes = ShapesFrom(bytes, LightFrom(boxes.lights, bytes, draw.client, *draw.setup), boxes.shared.get());
+        if (!shapes.ok()) return shapes.status();
+        const ShapeGrid grid(FrameBounds(*draw.setup));
+        std::set<std::uint32_t> all;
+        for (const DrawTiles::For& receiver : draw.receivers) all.insert(receiver.tiles.begin(), receiver.tiles.end());
+        const std::vector<std::uint32_t> tiles(all.begin(), all.end());
+        ParallelFor(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+          const PixelBounds pixels = grid.PixelsOf(tiles[i]);
+          (*shapes)->TileAt(pixels.x_begin, pixels.y_begin);
+        });
+        for (const DrawTiles::For& receiver : draw.receivers) {
+          auto [message, payload] = PackTiles(draw, receiver, grid, **shapes);
+          if (!message.tiles.empty()) outbox_.Post(OutgoingPartial{receiver.to, Encode(message), std::move(payload), false, 0, draw.key});
+        }
+        return Status::Ok();
+      });
+    });
+    if (!status.ok()) LogWarning(status.message());  // whoever needs them draws them
+    outbox_.Post(WorkerEvent(TilesDrawn{draw.key, {Stage::kRender, begin, NowNs()}}));
+  });
+}
+
+void Executor::Perform(const KeepTiles& action) {
+  SharedShapesOf(action.message.key.frame, *action.setup)->Add(action.message, action.payload);
 }
 
 std::shared_ptr<StoredBox> Executor::BoxOf(const BoxKey& key) const {
@@ -400,6 +464,7 @@ void Executor::Perform(const ForgetGroups& action) {
   const auto over = [&](const GroupKey& key) { return action.Over(key); };
   lent_.Forget(over);
   sent_.Forget(over);
+  std::erase_if(shapes_, [&](const auto& shapes) { return action.Over(shapes.first); });
 }
 
 void Executor::Perform(const ResendImage& action) {
@@ -420,7 +485,7 @@ void Executor::Perform(SendFrame&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const bool finished = action.message.groups_done == action.message.group_count;
   ClientLane& lane = (finished ? finish_ : combine_).Of(action.client);
-  ShapeBoxes shapes = ShapeBoxesOf(action.shapes, action.lights);
+  ShapeBoxes shapes = ShapeBoxesOf(action.message.frame, action);
   lane.thread.Post([this, &lane, image = std::move(image), shapes = std::move(shapes), send = std::move(action)]() mutable {
     TrySend("picture", KeyOf(send.message), [&] { return MakePicture(*image, send, shapes, lane.arena); });
   });
@@ -445,7 +510,7 @@ Status Executor::MakePicture(LocalImage& frame, SendFrame& send, const ShapeBoxe
     if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color);
     FillRows(image);
     const ShapeBytes bytes = BytesOf(shape_boxes.shapes);
-    const auto shapes = ShapesFrom(bytes, LightFrom(shape_boxes.lights, bytes, send.client, *send.setup), *send.setup);
+    const auto shapes = ShapesFrom(bytes, LightFrom(shape_boxes.lights, bytes, send.client, *send.setup), shape_boxes.shared.get());
     if (!shapes.ok()) return shapes.status();
     const LocalImage picture = *shapes == nullptr ? renderer.Finish(image, *send.setup) : FinishWithShapes(image, send, **shapes);
     resolved_ns = NowNs();

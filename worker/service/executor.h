@@ -1,6 +1,6 @@
 // Executor: runs the slow actions of a WorkerMachine. For each client, one thread renders; another combines and encodes; a third makes
-// finished pictures while the next frames are combined (ClientLanes). Another one unpacks chunks. Rendering uses all render threads of the
-// worker; the machine lets one client's render go on at a time.
+// finished pictures while the next frames are combined; a fourth draws shapes for other workers (ClientLanes). Another one unpacks chunks.
+// Rendering uses all render threads of the worker; the machine lets one client's render go on at a time.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. The result goes to the outbox: an event for the machine, or a message that is ready to be sent.
@@ -31,12 +31,13 @@
 #include "worker/service/lent_images.h"
 #include "worker/service/peer_memory.h"
 #include "worker/service/sent_tallies.h"
+#include "worker/service/shared_shapes.h"
 #include "worker/service/stored_box.h"
 #include "worker/service/thread_share.h"
 
 namespace slabstream {
 
-// An encoded message from a combining thread.
+// An encoded message to another worker's images plane.
 struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
@@ -67,6 +68,8 @@ class Executor {
   void Perform(StoreChunk&& action);
   void Perform(const DropBox& action);
   void Perform(StartRender&& action);
+  void Perform(DrawTiles&& action);
+  void Perform(const KeepTiles& action);
   void Perform(const PauseRender& action);
   void Perform(const ResumeRender& action);
   void Perform(const CancelRender& action);
@@ -96,11 +99,15 @@ class Executor {
   void Break();
   // The entry of the table, which exists.
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
-  // What shapes are drawn with.
+  // What the shapes of a frame are drawn with, and what they are drawn into. A frame without shapes has none of it.
   struct ShapeBoxes {
     std::vector<std::shared_ptr<StoredBox>> shapes, lights;  // as of StartRender and SendFrame
+    std::shared_ptr<SharedShapes> shared;
   };
-  ShapeBoxes ShapeBoxesOf(const std::vector<BoxKey>& shapes, const std::vector<BoxKey>& lights) const;
+  // `action`: a StartRender, DrawTiles or SendFrame.
+  template <class Action>
+  ShapeBoxes ShapeBoxesOf(FrameId frame, const Action& action);
+  std::shared_ptr<SharedShapes> SharedShapesOf(FrameId frame, const FrameSetup& setup);
   Status MakePicture(LocalImage& frame, SendFrame& send, const ShapeBoxes& shape_boxes, TaskArena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
@@ -122,13 +129,14 @@ class Executor {
   LentImages lent_;
   SentTallies sent_;
   PeerMemory peer_memory_;
+  std::map<FrameId, std::shared_ptr<SharedShapes>> shapes_;      // of frames that are not over
   std::map<ImageHandle, std::weak_ptr<RenderControl>> renders_;  // their tasks hold them
   const RendererFactory make_renderer_;
   const TaskHook hook_;
   std::atomic<bool> broken_ = false;
   const ThreadShare threads_;
   TaskThread chunk_thread_;
-  ClientLanes combine_, finish_, render_;
+  ClientLanes combine_, finish_, draw_, render_;
 };
 
 }  // namespace slabstream

@@ -44,10 +44,12 @@ Incarnation RandomIncarnation() {
 
 // The worker that sent a message of the images plane.
 WorkerId SenderOf(const MessageToWorker& message) {
-  if (const auto* partial = std::get_if<PartialImage>(&message)) return partial->from_worker;
-  if (const auto* refused = std::get_if<ImageRefused>(&message)) return refused->from_worker;
-  const auto* received = std::get_if<ImageReceived>(&message);
-  return received == nullptr ? 0 : received->from_worker;
+  return std::visit(
+      [](const auto& each) -> WorkerId {
+        if constexpr (requires { each.from_worker; }) return each.from_worker;
+        return 0;
+      },
+      message);
 }
 
 // What a coordinator says to a worker that has come to the endpoint for clients.

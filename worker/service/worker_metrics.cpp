@@ -59,8 +59,9 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Single("worker_fetched_bytes_total", MetricType::kCounter, "Voxels that it has received or read.", counts.fetched_bytes);
   out.Single("worker_store_bytes_total", MetricType::kCounter, "Bytes that it has read from stores itself, as they are stored.",
              stored_bytes_);
-  out.Family("worker_sent_bytes_total", MetricType::kCounter,
-             "Bytes over sockets by plane: images to workers (not those in shared memory), pictures to the coordinator.");
+  out.Family(
+      "worker_sent_bytes_total", MetricType::kCounter,
+      "Bytes over sockets by plane: images to workers (also tiles of shapes; not images in shared memory), pictures to the coordinator.");
   out.Value(image_bytes_, {{"plane", "images"}});
   out.Value(picture_bytes_, {{"plane", "pictures"}});
   out.Single("worker_unsent_total", MetricType::kCounter, "Images and pictures that could not be sent.", unsent_);

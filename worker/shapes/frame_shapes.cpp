@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <mutex>
 #include <utility>
@@ -71,24 +73,47 @@ Placed Place(const ShapeScene& scene, const SceneShape& shape, const ShapePiece&
   return {pixels, std::nextafter(float(scene.map.KeyOf(nearest)), -std::numeric_limits<float>::infinity())};
 }
 
+// Neighbouring pieces of a shape. They are placed when a tile that some of them may be seen in is drawn.
+struct PieceGroup {
+  static constexpr std::size_t kPieces = 16;
+
+  PieceGroup(const SceneShape& of, std::size_t first_piece) : shape(of), first(first_piece) {}
+  std::span<const ShapePiece> pieces() const {
+    return shape.view.pieces.subspan(first, std::min(kPieces, shape.view.pieces.size() - first));
+  }
+  // What holds all of them.
+  ShapePiece Whole() const {
+    ShapePiece whole = pieces().front();
+    for (const ShapePiece& piece : pieces()) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        whole.low[axis] = std::min(whole.low[axis], piece.low[axis]);
+        whole.high[axis] = std::max(whole.high[axis], piece.high[axis]);
+      }
+      whole.radius = std::max(whole.radius, piece.radius);
+    }
+    return whole;
+  }
+
+  const SceneShape& shape;
+  const std::size_t first;
+  std::once_flag once;
+  std::array<Placed, kPieces> placed;
+};
+
 class Shapes final : public FrameShapes {
  public:
-  Shapes(ShapeScene scene, std::vector<std::shared_ptr<const VoxelBlock>> kept, const PixelBounds& frame)
-      : scene_(std::move(scene)),
-        kept_(std::move(kept)),
-        frame_(frame),
-        columns_((frame.width() + kShapeTile - 1) / kShapeTile),
-        tiles_(std::size_t(columns_) * std::size_t((frame.height() + kShapeTile - 1) / kShapeTile)) {
-    PlacePieces();
+  Shapes(ShapeScene scene, std::vector<std::shared_ptr<const VoxelBlock>> kept, const PixelBounds& frame, std::shared_ptr<DrawnTiles> drawn)
+      : scene_(std::move(scene)), kept_(std::move(kept)), drawn_(std::move(drawn)), grid_(frame), tiles_(grid_.count()) {
+    PlaceGroups();
   }
 
   const ShapeTile& TileAt(std::int32_t x, std::int32_t y) const override {
-    const std::int32_t column = x / kShapeTile, row = y / kShapeTile;
-    Tile& tile = tiles_[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
+    const std::uint32_t number = grid_.NumberOf(x, y);
+    Tile& tile = tiles_[number];
     std::call_once(tile.once, [&] {
-      const PixelBounds pixels =
-          Intersection(frame_, {column * kShapeTile, row * kShapeTile, (column + 1) * kShapeTile, (row + 1) * kShapeTile});
-      tile.drawn = DrawShapeTile(scene_, pixels, tile.opaque, tile.translucent);
+      const PixelBounds pixels = grid_.PixelsOf(number);
+      std::optional<ShapeTile> taken = drawn_ == nullptr ? std::nullopt : drawn_->Take(number, pixels);
+      tile.drawn = taken ? *std::move(taken) : Draw(pixels, tile.groups);
       bytes_ += tile.drawn.begin.capacity() * sizeof(std::uint32_t) + tile.drawn.fragments.capacity() * sizeof(ShapeFragment) +
                 tile.drawn.ends.capacity() * sizeof(float);
     });
@@ -101,49 +126,80 @@ class Shapes final : public FrameShapes {
  private:
   struct Tile {
     std::once_flag once;
-    std::vector<PlacedPiece> opaque, translucent;
+    std::vector<std::uint32_t> groups;  // ascending
     ShapeTile drawn;
   };
 
-  void PlacePieces() {
+  void PlaceGroups() {
     for (const SceneShape& shape : scene_.shapes) {
-      std::vector<Placed> placed(shape.view.pieces.size());
-      ParallelForRanges(std::size_t{0}, placed.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) placed[i] = Place(scene_, shape, shape.view.pieces[i], frame_);
+      for (std::size_t first = 0; first < shape.view.pieces.size(); first += PieceGroup::kPieces) groups_.emplace_back(shape, first);
+    }
+    std::vector<PixelBounds> seen(groups_.size());
+    ParallelForRanges(std::size_t{0}, groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) seen[i] = Place(scene_, groups_[i].shape, groups_[i].Whole(), grid_.frame).pixels;
+    });
+    for (std::size_t i = 0; i < groups_.size(); ++i) {
+      if (seen[i].empty()) continue;
+      bounds_ = Union(bounds_, seen[i]);
+      grid_.ForEach(seen[i], [&](std::uint32_t number) { tiles_[number].groups.push_back(std::uint32_t(i)); });
+    }
+    std::size_t bytes = tiles_.size() * sizeof(Tile) + groups_.size() * sizeof(PieceGroup);
+    for (const Tile& tile : tiles_) bytes += tile.groups.capacity() * sizeof(std::uint32_t);
+    bytes_ = bytes;
+  }
+
+  ShapeTile Draw(const PixelBounds& pixels, const std::vector<std::uint32_t>& groups) const {
+    std::vector<PlacedPiece> opaque, translucent;
+    for (const std::uint32_t number : groups) {
+      PieceGroup& group = groups_[number];
+      const std::span<const ShapePiece> pieces = group.pieces();
+      std::call_once(group.once, [&] {
+        for (std::size_t i = 0; i < pieces.size(); ++i) group.placed[i] = Place(scene_, group.shape, pieces[i], grid_.frame);
       });
-      for (std::size_t i = 0; i < placed.size(); ++i) {
-        const PixelBounds& at = placed[i].pixels;
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const PixelBounds at = Intersection(group.placed[i].pixels, pixels);
         if (at.empty()) continue;
-        bounds_ = Union(bounds_, at);
-        for (std::int32_t row = at.y_begin / kShapeTile; row <= (at.y_end - 1) / kShapeTile; ++row) {
-          for (std::int32_t column = at.x_begin / kShapeTile; column <= (at.x_end - 1) / kShapeTile; ++column) {
-            Tile& tile = tiles_[std::size_t(row) * std::size_t(columns_) + std::size_t(column)];
-            const auto in_tile = [](std::int32_t pixel, std::int32_t number) {
-              return std::uint8_t(std::clamp(pixel - number * kShapeTile, 0, kShapeTile));
-            };
-            (shape.translucent ? tile.translucent : tile.opaque)
-                .push_back({shape.first_piece + std::uint32_t(i), placed[i].nearest, in_tile(at.x_begin, column), in_tile(at.y_begin, row),
-                            in_tile(at.x_end, column), in_tile(at.y_end, row)});
-          }
-        }
+        (group.shape.translucent ? translucent : opaque)
+            .push_back({group.shape.first_piece + std::uint32_t(group.first + i), group.placed[i].nearest,
+                        std::uint8_t(at.x_begin - pixels.x_begin), std::uint8_t(at.y_begin - pixels.y_begin),
+                        std::uint8_t(at.x_end - pixels.x_begin), std::uint8_t(at.y_end - pixels.y_begin)});
       }
     }
-    ParallelFor(std::size_t{0}, tiles_.size(), [&](std::size_t i) {
-      std::ranges::sort(tiles_[i].opaque, {}, [](const PlacedPiece& piece) { return std::pair(piece.nearest, piece.number); });
-    });
-    std::size_t bytes = tiles_.size() * sizeof(Tile);
-    for (const Tile& tile : tiles_) bytes += (tile.opaque.capacity() + tile.translucent.capacity()) * sizeof(PlacedPiece);
-    bytes_ = bytes;
+    std::ranges::sort(opaque, {}, [](const PlacedPiece& piece) { return std::pair(piece.nearest, piece.number); });
+    return DrawShapeTile(scene_, pixels, opaque, translucent);
   }
 
   const ShapeScene scene_;
   const std::vector<std::shared_ptr<const VoxelBlock>> kept_;
-  const PixelBounds frame_;
-  const std::int32_t columns_;
+  const std::shared_ptr<DrawnTiles> drawn_;
+  const ShapeGrid grid_;
+  mutable std::deque<PieceGroup> groups_;
   mutable std::vector<Tile> tiles_;
   PixelBounds bounds_;
   mutable std::atomic<std::size_t> bytes_ = 0;
 };
+
+// ViewShape, which reads all of the bytes, once as long as they live.
+Result<ShapeView> ViewOnce(const std::shared_ptr<const VoxelBlock>& block) {
+  struct Viewed {
+    std::weak_ptr<const VoxelBlock> block;
+    ShapeView view;
+  };
+  static std::mutex mutex;
+  static std::vector<Viewed> viewed;
+  const auto same = [&](const Viewed& each) { return !each.block.owner_before(block) && !block.owner_before(each.block); };
+  {
+    const std::lock_guard lock(mutex);
+    std::erase_if(viewed, [](const Viewed& each) { return each.block.expired(); });
+    const auto found = std::ranges::find_if(viewed, same);
+    if (found != viewed.end()) return found->view;
+  }
+  Result<ShapeView> view = ViewShape(block->bytes);
+  if (!view.ok()) return view;
+  const std::lock_guard lock(mutex);
+  if (std::ranges::none_of(viewed, same)) viewed.push_back({block, *view});
+  return view;
+}
 
 }  // namespace
 
@@ -161,7 +217,7 @@ ShapeScene::CapsuleHit ShapeScene::HitOn(const Capsule& capsule, double column, 
 
 Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& setup,
                                                            std::span<const std::shared_ptr<const VoxelBlock>> bytes,
-                                                           std::shared_ptr<const FrameLight> light) {
+                                                           std::shared_ptr<const FrameLight> light, std::shared_ptr<DrawnTiles> drawn) {
   CHECK_EQ(bytes.size(), setup.shapes.size());
   ShapeScene scene{.map = MakeFrameMap(setup), .camera = setup.camera, .shading = setup.shading, .light = std::move(light)};
   scene.samples = setup.sheets.empty() && setup.camera.supersample > 1 ? 1 : 4;
@@ -170,7 +226,7 @@ Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& set
   }
   std::uint64_t pieces = 0;
   for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const Result<ShapeView> view = ViewShape(bytes[i]->bytes);
+    const Result<ShapeView> view = ViewOnce(bytes[i]);
     if (!view.ok()) return view.status();
     SceneShape& shape = scene.shapes.emplace_back(PlaceShape(scene, setup.shapes[i], *view));
     shape.first_piece = std::uint32_t(pieces);
@@ -182,7 +238,7 @@ Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& set
     }
   }
   return std::shared_ptr<const FrameShapes>(
-      std::make_shared<Shapes>(std::move(scene), std::vector(bytes.begin(), bytes.end()), FrameBounds(setup)));
+      std::make_shared<Shapes>(std::move(scene), std::vector(bytes.begin(), bytes.end()), FrameBounds(setup), std::move(drawn)));
 }
 
 }  // namespace slabstream

@@ -18,16 +18,16 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "common/frame/frame_setup.h"
-#include "common/image/pixel_bounds.h"
+#include "common/frame/shape_grid.h"
 #include "worker/light/frame_light.h"
 
 namespace slabstream {
 
-inline constexpr std::int32_t kShapeTile = 64;  // pixels a side
 // Fragments of a pixel. The last one holds all surfaces from there on, at the mean of their depths: what lies among them in the volume is
 // seen before or behind all of them. Their colours and opacities stay exact.
 inline constexpr std::size_t kMostShapeFragments = 64;
@@ -75,10 +75,19 @@ inline const ShapeTile* TileOf(const FrameShapes* shapes, const PixelBounds& pix
   return shapes == nullptr ? nullptr : &shapes->TileAt(pixels.x_begin, pixels.y_begin);
 }
 
+// Tiles of the same frame that others have drawn, by their numbers in ShapeGrid(FrameBounds(setup)).
+class DrawnTiles {
+ public:
+  virtual ~DrawnTiles() = default;
+  // None: it is not there. Any thread.
+  virtual std::optional<ShapeTile> Take(std::uint32_t tile, const PixelBounds& pixels) = 0;
+};
+
 // `bytes`: of each of setup.shapes, as PackShape made them; they stay as long as the result. DataLoss: they are not. `light`: shadows and
-// ambient occlusion on the shapes; null: there are none.
+// ambient occlusion on the shapes; null: there are none. `drawn`: its tiles are taken rather than drawn; null: there are none.
 Result<std::shared_ptr<const FrameShapes>> MakeFrameShapes(const FrameSetup& setup,
                                                            std::span<const std::shared_ptr<const VoxelBlock>> bytes,
-                                                           std::shared_ptr<const FrameLight> light);
+                                                           std::shared_ptr<const FrameLight> light,
+                                                           std::shared_ptr<DrawnTiles> drawn = nullptr);
 
 }  // namespace slabstream

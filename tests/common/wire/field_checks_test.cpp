@@ -125,6 +125,26 @@ TEST(FieldChecks, EachFieldHasALightVolumeIfTheFrameHasLight) {
             "");
 }
 
+TEST(FieldChecks, TilesOfShapes) {
+  const std::vector<GroupAssignment> samples = Samples<GroupAssignment>();
+  const auto with_tiles = std::ranges::find_if(samples, [](const GroupAssignment& m) { return !m.tiles.empty(); });
+  ASSERT_NE(with_tiles, samples.end());
+  const v1::Envelope valid = EnvelopeOf<GroupAssignment>(std::size_t(with_tiles - samples.begin()));
+  const auto error = [&](const std::function<void(v1::GroupAssignment&)>& alter) {
+    v1::Envelope envelope = valid;
+    alter(*envelope.mutable_group_assignment());
+    return ErrorOf(envelope);
+  };
+  using Group = v1::GroupAssignment;
+  EXPECT_THAT(error([](Group& g) { g.mutable_setup()->clear_shapes(); }),
+              testing::HasSubstr("tiles: without shapes, or not with the first"));
+  EXPECT_THAT(error([](Group& g) { g.mutable_key()->set_group(1); }), testing::HasSubstr("tiles: without shapes, or not with the first"));
+  EXPECT_THAT(error([](Group& g) { g.mutable_tiles(0)->set_to(1); }), testing::HasSubstr("tiles[0].to: the sender"));
+  EXPECT_THAT(error([](Group& g) { g.mutable_tiles(0)->set_tiles(2, 5); }), testing::HasSubstr("tiles[0].tiles: not ascending numbers"));
+  EXPECT_THAT(error([](Group& g) { g.mutable_tiles(0)->set_tiles(2, 1U << 20U); }),
+              testing::HasSubstr("tiles[0].tiles: not ascending numbers"));
+}
+
 TEST(FieldChecks, Groups) {
   using E = v1::Envelope;
   const auto group = [](E& e) { return e.mutable_group_assignment(); };
@@ -141,6 +161,8 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { group(e)->clear_peers(); }, "GroupAssignment.peers: worker 4294967295 is missing"},
       {[&](E& e) { group(e)->mutable_peers(0)->set_worker(77); }, "GroupAssignment.peers: worker 1 is missing"},
       {[&](E& e) { *group(e)->add_peers() = group(e)->peers(0); }, "GroupAssignment.peers: a worker appears twice"},
+      {[&](E& e) { group(e)->add_tiles()->set_from(1), group(e)->mutable_tiles(0)->set_to(2); },
+       "GroupAssignment.tiles: without shapes, or not with the first group"},
       {[&](E& e) { setup(e)->set_dataset(0); }, "GroupAssignment.setup.dataset: 0 is not in [1, "},
       {[&](E& e) { setup(e)->set_renderer("teapot"); }, "GroupAssignment.setup: renderer is 'teapot', but must be one of: splat, "},
       {[&](E& e) { setup(e)->add_parameters(1); }, "GroupAssignment.setup.parameters: 2 values, expected 1"},
@@ -285,6 +307,17 @@ TEST(FieldChecks, Images) {
   };
   Check<ImageReceived>({
       {[](auto& e) { e.mutable_image_received()->set_number(0); }, "ImageReceived.number: 0 is not in [1, 18446744073709551615]"},
+  });
+  const auto tiles = [](v1::Envelope& e) { return e.mutable_shape_tiles(); };
+  Check<ShapeTiles>({
+      {[&](auto& e) { tiles(e)->clear_tiles(), tiles(e)->clear_bytes(); }, "ShapeTiles.tiles: none"},
+      {[&](auto& e) { tiles(e)->add_bytes(4); }, "ShapeTiles.bytes: 2 of 1 tiles"},
+      {[&](auto& e) { tiles(e)->add_tiles(0), tiles(e)->add_bytes(4); }, "ShapeTiles.tiles: not ascending"},
+      {[&](auto& e) { tiles(e)->set_bytes(0, 5); }, "ShapeTiles.bytes: no multiple of 4"},
+      {[&](auto& e) { tiles(e)->set_bytes(0, 1U << 31U), tiles(e)->add_tiles(1), tiles(e)->add_bytes(4); },
+       "ShapeTiles.bytes: 2147483652 in all, at most 2147483648"},
+      {[&](auto& e) { tiles(e)->mutable_packed()->set_codec(v1::CODEC_ZSTD), tiles(e)->mutable_packed()->set_bytes(4); },
+       "ShapeTiles.packed.bytes: 4 are not less than the 0 of the tiles"},
   });
   Check<PartialImage>({
       {[&](auto& e) { image(e); }, ""},

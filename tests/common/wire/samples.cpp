@@ -174,6 +174,14 @@ GroupAssignment OfFields() {
   return message;
 }
 
+GroupAssignment WithTiles() {
+  GroupAssignment message = OfFields();
+  message.key.group = message.first_group = 0;
+  message.tiles = {{1, kMax32, {0, 5, 79}}, {kMax32, 2, {1}}};
+  message.others = {{17, kOddEndpoint, kMax64, std::string(40, 'k')}};
+  return message;
+}
+
 GroupAssignment OfLevels() {
   GroupAssignment message = Assignment(3, {}, FindRenderer("raycast"));
   FrameSetup& setup = message.setup;
@@ -276,6 +284,7 @@ std::vector<GroupAssignment> SamplesOf() {
           WithSurfaces(),
           WithLayers(),
           OfFields(),
+          WithTiles(),
           OfLevels()};
 }
 
@@ -430,6 +439,12 @@ std::vector<ImageRefused> SamplesOf() {
 template <>
 std::vector<ImageReceived> SamplesOf() {
   return {{}, {kMax64, kMax32, kMax64}};
+}
+
+template <>
+std::vector<ShapeTiles> SamplesOf() {
+  return {{1, 2, {3, 4, 5}, {0}, {0}, {}},
+          {kMax64, kMax32, {3, 4, 5}, {0, 7, kMax32}, {8, 0, 1U << 30U}, PackedRuns{Codec::kZstd, 1U << 30U, kMax64}}};
 }
 
 template <>
