@@ -1,6 +1,8 @@
 // Tiles of shapes between workers: what a worker sends, and what becomes of tiles that it gets.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "tests/service/worker_and_peer.h"
 #include "tests/worker/shapes/shape_pictures.h"
 #include "worker/service/shared_shapes.h"
@@ -29,10 +31,10 @@ struct Message {
   ShapeTiles header;
   PooledVector<std::byte> payload;
 
-  void Add(std::uint32_t number, const ShapeTile& tile) {
+  void Add(std::uint32_t number, const ShapeTile& tile, bool colors = true) {
     header.tiles.push_back(number);
-    header.bytes.push_back(std::uint32_t(BytesOf(tile)));
-    AppendTile(tile, payload);
+    header.bytes.push_back(std::uint32_t(BytesOf(tile, colors)));
+    AppendTile(tile, colors, payload);
   }
 };
 
@@ -40,6 +42,14 @@ Scene SceneOf(const FrameSetup& setup) {
   Scene scene = {setup};
   scene.Add(SphereMesh({4, 4, 16}, 14, 12));
   return scene;
+}
+
+// But for colours of opaque fragments.
+bool SameForBoxes(const ShapeTile& a, const ShapeTile& b) {
+  const auto same = [](const ShapeFragment& x, const ShapeFragment& y) {
+    return x.depth == y.depth && x.rgba[3] == y.rgba[3] && (x.rgba[3] == 1 || x.rgba == y.rgba);
+  };
+  return a.begin == b.begin && a.ends == b.ends && std::ranges::equal(a.fragments, b.fragments, same);
 }
 
 class DrawnTilesTest : public WorkerAndPeer {
@@ -89,7 +99,7 @@ TEST_F(DrawnTilesTest, AWorkerSendsWhatItDraws) {
   for (std::size_t i = 0; i < sent.tiles.size(); ++i) {
     const PixelBounds pixels = grid().PixelsOf(sent.tiles[i]);
     const ShapeTile tile = ReadTile(payload_.span().subspan(begin, sent.bytes[i]), pixels).value();
-    EXPECT_EQ(tile.fragments, expected->TileAt(pixels.x_begin, pixels.y_begin).fragments) << "tile " << sent.tiles[i];
+    EXPECT_TRUE(SameForBoxes(tile, expected->TileAt(pixels.x_begin, pixels.y_begin))) << "tile " << sent.tiles[i];
     begin += sent.bytes[i];
     seen += tile.fragments.size();
   }
@@ -131,10 +141,10 @@ class SharedShapesTest : public ::testing::Test {
   // As if it had been drawn here.
   void ExpectDrawn(std::uint32_t number) {
     const PixelBounds pixels = grid_.PixelsOf(number);
-    EXPECT_EQ(TileOf(number).fragments, scene_.Draw()->TileAt(pixels.x_begin, pixels.y_begin).fragments) << "tile " << number;
+    EXPECT_TRUE(TileOf(number).fragments == scene_.Draw()->TileAt(pixels.x_begin, pixels.y_begin).fragments) << "tile " << number;
   }
   void ExpectPainted(std::uint32_t number) {
-    EXPECT_EQ(TileOf(number).fragments, Painted(grid_.PixelsOf(number)).fragments) << "tile " << number;
+    EXPECT_TRUE(TileOf(number).fragments == Painted(grid_.PixelsOf(number)).fragments) << "tile " << number;
   }
 
   const Scene scene_;
@@ -155,6 +165,23 @@ TEST_F(SharedShapesTest, TilesOfOthersAreUsedOnce) {
   ExpectDrawn(2);
   shared_.Add({.tiles = {2}, .bytes = {message.header.bytes[0]}}, payload.Part(0, message.header.bytes[0]));
   ExpectDrawn(2);  // it was there already
+}
+
+// As after an attempt that another worker displayed.
+TEST_F(SharedShapesTest, APictureHasTheColorsThatBoxesDidNotNeed) {
+  Message message, later;
+  for (const std::uint32_t tile : {1, 2}) message.Add(tile, Painted(grid_.PixelsOf(tile)), false);
+  shared_.Add(message.header, Bytes(std::move(message.payload)));
+  const auto shapes = shared_.Make(scene_.bytes, nullptr).value();
+  const auto ends = [](const ShapeTile& tile) { return std::pair(tile.colors, tile.ends); };
+  for (const std::uint32_t tile : {1, 2}) {
+    const PixelBounds pixels = grid_.PixelsOf(tile);
+    EXPECT_TRUE(ends(shapes->TileForBoxes(pixels.x_begin, pixels.y_begin)) == std::pair(false, Painted(pixels).ends));
+  }
+  ExpectDrawn(1);
+  later.Add(2, Painted(grid_.PixelsOf(2)));
+  shared_.Add(later.header, Bytes(std::move(later.payload)));
+  ExpectPainted(2);
 }
 
 TEST_F(SharedShapesTest, PackedTilesAreUnpacked) {

@@ -42,6 +42,7 @@ TEST_F(SharedTilesTest, ItsOwnAreDrawnOnceTheShapesAreThere) {
   ASSERT_THAT(draws[0].receivers, SizeIs(1));
   EXPECT_EQ(draws[0].receivers[0].to.worker, kPeer);
   EXPECT_THAT(draws[0].receivers[0].tiles, ElementsAre(0U, 2U));
+  EXPECT_FALSE(draws[0].receivers[0].colors) << "this worker displays the frame";
   EXPECT_THAT(Feed(Tell(WithShape(1))), IsEmpty()) << "the same assignment again changes nothing";
 }
 

@@ -302,12 +302,15 @@ void WorkerMachine::State::AcquireShapes(FrameId id, Frame& frame, const FrameSe
 void WorkerMachine::State::ShareTiles(Frame& frame, const GroupAssignment& assignment, const std::shared_ptr<const FrameSetup>& setup) {
   if (assignment.tiles.empty() || config.images_endpoint.starts_with("inproc://")) return;
   frame.setup = setup;
+  const std::vector<WorkerId> displays = DisplaysOf(assignment.group, assignment.display);
   std::set<WorkerId> awaited;
   DrawTiles draw = {.client = assignment.client, .epoch = epoch, .from = worker, .key = assignment.key, .setup = setup};
   for (const TileOrder& order : assignment.tiles) {
     if (order.to == worker) awaited.insert(order.from);
     const Peer* const to = order.from == worker ? PeerIn(assignment, order.to) : nullptr;
-    if (to != nullptr) draw.receivers.push_back({*to, order.tiles, links.DeliveryTo(*to).bytes_per_second});
+    if (to == nullptr) continue;
+    const bool colors = std::ranges::find(displays, order.to) != displays.end();
+    draw.receivers.push_back({*to, order.tiles, colors, links.DeliveryTo(*to).bytes_per_second});
   }
   if (!draw.receivers.empty()) frame.to_draw = std::move(draw);
   renders.AwaitTiles(assignment.key.frame, std::move(awaited), now + config.tile_patience);

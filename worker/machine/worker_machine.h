@@ -229,6 +229,7 @@ struct DrawTiles {
   struct For {
     Peer to;
     std::vector<std::uint32_t> tiles;  // ascending
+    bool colors = true;                // it displays them; else it only renders
     double bytes_per_second = 0;       // Delivery::bytes_per_second
   };
   ClientId client = 0;

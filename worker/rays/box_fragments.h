@@ -41,7 +41,7 @@ struct BoxFragments {
   void ForEachIn(const PixelBounds& pixels, Visit&& visit) const {
     for (std::int32_t y = pixels.y_begin; y < pixels.y_end; ++y) {
       for (std::int32_t x = pixels.x_begin; x < pixels.x_end; ++x) {
-        const ShapeTile& tile = shapes.TileAt(x, y);
+        const ShapeTile& tile = shapes.TileForBoxes(x, y);
         if (tile.empty()) {
           x = tile.pixels.x_end - 1;
           continue;

@@ -159,11 +159,11 @@ std::pair<ShapeTiles, Bytes> PackTiles(const DrawTiles& draw, const DrawTiles::F
   for (const std::uint32_t number : receiver.tiles) {
     const PixelBounds pixels = grid.PixelsOf(number);
     const ShapeTile& tile = shapes.TileAt(pixels.x_begin, pixels.y_begin);
-    const std::size_t size = BytesOf(tile);
+    const std::size_t size = BytesOf(tile, receiver.colors);
     if (bytes.size() + size > kMostBytes) continue;
     message.tiles.push_back(number);
     message.bytes.push_back(std::uint32_t(size));
-    AppendTile(tile, bytes);
+    AppendTile(tile, receiver.colors, bytes);
   }
   Bytes payload = PackForLink(Bytes(std::move(bytes)), receiver.bytes_per_second, message.packed);
   return {std::move(message), std::move(payload)};

@@ -108,16 +108,18 @@ class Shapes final : public FrameShapes {
   }
 
   const ShapeTile& TileAt(std::int32_t x, std::int32_t y) const override {
+    const ShapeTile& for_boxes = TileForBoxes(x, y);
+    if (for_boxes.colors) return for_boxes;
     const std::uint32_t number = grid_.NumberOf(x, y);
     Tile& tile = tiles_[number];
-    std::call_once(tile.once, [&] {
-      const PixelBounds pixels = grid_.PixelsOf(number);
-      std::optional<ShapeTile> taken = drawn_ == nullptr ? std::nullopt : drawn_->Take(number, pixels);
-      tile.drawn = taken ? *std::move(taken) : Draw(pixels, tile.groups);
-      bytes_ += tile.drawn.begin.capacity() * sizeof(std::uint32_t) + tile.drawn.fragments.capacity() * sizeof(ShapeFragment) +
-                tile.drawn.ends.capacity() * sizeof(float);
-    });
-    return tile.drawn;
+    std::call_once(tile.once_colored, [&] { tile.colored = Make(number, tile.groups, true); });
+    return tile.colored;
+  }
+  const ShapeTile& TileForBoxes(std::int32_t x, std::int32_t y) const override {
+    const std::uint32_t number = grid_.NumberOf(x, y);
+    Tile& tile = tiles_[number];
+    std::call_once(tile.once, [&] { tile.for_boxes = Make(number, tile.groups, false); });
+    return tile.for_boxes;
   }
   PixelBounds bounds() const override { return bounds_; }
   bool translucent() const override { return scene_.translucent; }
@@ -125,9 +127,10 @@ class Shapes final : public FrameShapes {
 
  private:
   struct Tile {
-    std::once_flag once;
+    std::once_flag once, once_colored;
     std::vector<std::uint32_t> groups;  // ascending
-    ShapeTile drawn;
+    ShapeTile for_boxes;
+    ShapeTile colored;  // if that has no colours
   };
 
   void PlaceGroups() {
@@ -146,6 +149,15 @@ class Shapes final : public FrameShapes {
     std::size_t bytes = tiles_.size() * sizeof(Tile) + groups_.size() * sizeof(PieceGroup);
     for (const Tile& tile : tiles_) bytes += tile.groups.capacity() * sizeof(std::uint32_t);
     bytes_ = bytes;
+  }
+
+  ShapeTile Make(std::uint32_t number, const std::vector<std::uint32_t>& groups, bool colors) const {
+    const PixelBounds pixels = grid_.PixelsOf(number);
+    std::optional<ShapeTile> tile = drawn_ == nullptr ? std::nullopt : drawn_->Take(number, pixels);
+    if (!tile || (colors && !tile->colors)) tile = Draw(pixels, groups);
+    bytes_ += tile->begin.capacity() * sizeof(std::uint32_t) + tile->fragments.capacity() * sizeof(ShapeFragment) +
+              tile->ends.capacity() * sizeof(float);
+    return *std::move(tile);
   }
 
   ShapeTile Draw(const PixelBounds& pixels, const std::vector<std::uint32_t>& groups) const {

@@ -46,6 +46,7 @@ struct ShapeTile {
   std::vector<std::uint32_t> begin = {};      // of each pixel, row by row, and one more: numbers of its fragments; empty: there are none
   std::vector<ShapeFragment> fragments = {};  // nearest first; only the last one of a pixel may be opaque
   std::vector<float> ends = {};               // by pixel: the depth of its opaque fragment, or kRayGoesOn; empty as `begin`
+  bool colors = true;                         // false: opaque fragments have none (0, 0, 0, 1)
 
   bool empty() const { return begin.empty(); }
   std::size_t Number(std::int32_t x, std::int32_t y) const {
@@ -65,14 +66,16 @@ class FrameShapes {
   // that they grow away from the eye: k if the traversal ascends, else -k.
   // The tile that holds a pixel of the frame. The first call draws it. Any thread, within its task arena.
   virtual const ShapeTile& TileAt(std::int32_t x, std::int32_t y) const = 0;
+  // As a box needs it: an opaque fragment ends its rays, whatever its colour, so that `colors` may be false.
+  virtual const ShapeTile& TileForBoxes(std::int32_t x, std::int32_t y) const = 0;
   virtual PixelBounds bounds() const = 0;  // all fragments lie there; empty: there are none
   virtual bool translucent() const = 0;    // false: fragments that are not opaque are parts of edges alone
   virtual std::size_t bytes() const = 0;   // memory, of tiles too
 };
 
-// The tile that holds all of `pixels`, which lie in one; null: there are no shapes.
+// For boxes: the tile that holds all of `pixels`, which lie in one; null: there are no shapes.
 inline const ShapeTile* TileOf(const FrameShapes* shapes, const PixelBounds& pixels) {
-  return shapes == nullptr ? nullptr : &shapes->TileAt(pixels.x_begin, pixels.y_begin);
+  return shapes == nullptr ? nullptr : &shapes->TileForBoxes(pixels.x_begin, pixels.y_begin);
 }
 
 // Tiles of the same frame that others have drawn, by their numbers in ShapeGrid(FrameBounds(setup)).

@@ -10,7 +10,10 @@
 namespace slabstream {
 namespace {
 
-static_assert(kMostShapeFragments <= 255 && sizeof(ShapeFragment) == 5 * sizeof(float));
+constexpr std::uint32_t kEnds = 128;
+static_assert(kMostShapeFragments < kEnds && sizeof(ShapeFragment) == 5 * sizeof(float));
+
+bool IsOpaque(const ShapeFragment& fragment) { return fragment.rgba[3] == 1; }
 
 // Without branches: there are as many fragments as pixels, or more.
 bool AreFragments(std::span<const ShapeFragment> fragments) {
@@ -28,18 +31,40 @@ bool AreFragments(std::span<const ShapeFragment> fragments) {
   return all;
 }
 
-}  // namespace
-
-std::size_t BytesOf(const ShapeTile& tile) {
-  return tile.fragments.empty() ? 0 : BytesOfCounts(tile.ends.size()) + tile.fragments.size() * sizeof(ShapeFragment);
+// Fragments whose colours are left out.
+std::size_t WithoutColor(const ShapeTile& tile, bool colors) {
+  return colors ? 0 : std::size_t(std::ranges::count_if(tile.ends, [](float depth) { return depth != kRayGoesOn; }));
 }
 
-void AppendTile(const ShapeTile& tile, PooledVector<std::byte>& bytes) {
+}  // namespace
+
+std::size_t BytesOf(const ShapeTile& tile, bool colors) {
+  if (tile.fragments.empty()) return 0;
+  const std::size_t without = WithoutColor(tile, colors);
+  return BytesOfCounts(tile.ends.size()) + (tile.fragments.size() - without) * sizeof(ShapeFragment) + without * sizeof(float);
+}
+
+void AppendTile(const ShapeTile& tile, bool colors, PooledVector<std::byte>& bytes) {
   if (tile.fragments.empty()) return;
-  const std::size_t begin = bytes.size(), pixel_count = tile.ends.size();
-  bytes.resize(begin + BytesOf(tile));
-  for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) bytes[begin + pixel] = std::byte(tile.begin[pixel + 1] - tile.begin[pixel]);
-  std::memcpy(&bytes[begin + BytesOfCounts(pixel_count)], tile.fragments.data(), tile.fragments.size() * sizeof(ShapeFragment));
+  const std::size_t begin = bytes.size(), pixels = tile.ends.size(), first = begin + BytesOfCounts(pixels);
+  bytes.resize(begin + BytesOf(tile, colors));
+  std::byte* to = &bytes[first];
+  if (colors) {
+    for (std::size_t pixel = 0; pixel < pixels; ++pixel) bytes[begin + pixel] = std::byte(tile.begin[pixel + 1] - tile.begin[pixel]);
+    std::memcpy(to, tile.fragments.data(), tile.fragments.size() * sizeof(ShapeFragment));
+    return;
+  }
+  std::byte* depth = to + (tile.fragments.size() - WithoutColor(tile, colors)) * sizeof(ShapeFragment);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    const bool ends = tile.ends[pixel] != kRayGoesOn;
+    const std::uint32_t count = tile.begin[pixel + 1] - tile.begin[pixel] - (ends ? 1 : 0);
+    bytes[begin + pixel] = std::byte(ends ? count + kEnds : count);
+    if (count > 0) std::memcpy(to, &tile.fragments[tile.begin[pixel]], count * sizeof(ShapeFragment));
+    to += count * sizeof(ShapeFragment);
+    if (!ends) continue;
+    std::memcpy(depth, &tile.ends[pixel], sizeof(float));
+    depth += sizeof(float);
+  }
 }
 
 Result<ShapeTile> ReadTile(std::span<const std::byte> bytes, const PixelBounds& pixels) {
@@ -48,31 +73,48 @@ Result<ShapeTile> ReadTile(std::span<const std::byte> bytes, const PixelBounds& 
   const auto pixel_count = std::size_t(pixels.pixel_count());
   if (bytes.size() < BytesOfCounts(pixel_count)) return Status::DataLoss(fmt::format("{} bytes of {} pixels", bytes.size(), pixel_count));
   tile.begin.resize(pixel_count + 1);
-  std::uint32_t most = 0;
+  std::uint32_t most = 0, ends = 0;
   for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
-    const auto count = std::uint32_t(bytes[pixel]);
+    const auto code = std::uint32_t(bytes[pixel]), end = code / kEnds, count = code % kEnds + end;
     most = std::max(most, count);
+    ends += end;
     tile.begin[pixel + 1] = tile.begin[pixel] + count;
   }
   if (most > kMostShapeFragments) return Status::DataLoss(fmt::format("{} fragments of a pixel, at most {}", most, kMostShapeFragments));
   const std::span<const std::byte> rest = bytes.subspan(BytesOfCounts(pixel_count));
-  const std::size_t count = tile.begin.back();
-  if (rest.size() != count * sizeof(ShapeFragment)) return Status::DataLoss(fmt::format("{} bytes of {} fragments", rest.size(), count));
+  const std::size_t count = tile.begin.back(), colored = count - ends;
+  if (rest.size() != colored * sizeof(ShapeFragment) + ends * sizeof(float)) {
+    return Status::DataLoss(fmt::format("{} bytes of {} fragments, {} of them without colours", rest.size(), count, ends));
+  }
+  tile.colors = ends == 0;
   tile.fragments.resize(count);
-  std::memcpy(tile.fragments.data(), rest.data(), rest.size());
-  if (!AreFragments(tile.fragments)) return Status::DataLoss("a fragment's depth, colour or opacity");
   tile.ends.assign(pixel_count, kRayGoesOn);
+  const std::byte* from = rest.data();
+  const std::byte* depth = from + colored * sizeof(ShapeFragment);
+  if (ends == 0) {
+    std::memcpy(tile.fragments.data(), from, count * sizeof(ShapeFragment));
+  } else {
+    for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
+      const auto code = std::uint32_t(bytes[pixel]), of_pixel = code % kEnds;
+      if (of_pixel > 0) std::memcpy(&tile.fragments[tile.begin[pixel]], from, of_pixel * sizeof(ShapeFragment));
+      from += of_pixel * sizeof(ShapeFragment);
+      if (code < kEnds) continue;
+      ShapeFragment& end = tile.fragments[tile.begin[pixel + 1] - 1];
+      std::memcpy(&end.depth, depth, sizeof(float));
+      end.rgba = {0, 0, 0, 1};
+      depth += sizeof(float);
+    }
+  }
+  if (!AreFragments(tile.fragments)) return Status::DataLoss("a fragment's depth, colour or opacity");
   std::ptrdiff_t opaque = 0;
   for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
     if (tile.begin[pixel] == tile.begin[pixel + 1]) continue;
     const ShapeFragment& last = tile.fragments[tile.begin[pixel + 1] - 1];
-    if (last.rgba[3] != 1) continue;
+    if (!IsOpaque(last)) continue;
     tile.ends[pixel] = last.depth;
     ++opaque;
   }
-  if (std::ranges::count_if(tile.fragments, [](const ShapeFragment& fragment) { return fragment.rgba[3] == 1; }) != opaque) {
-    return Status::DataLoss("an opaque fragment in front of another one");
-  }
+  if (std::ranges::count_if(tile.fragments, IsOpaque) != opaque) return Status::DataLoss("an opaque fragment in front of another one");
   return tile;
 }
 

@@ -24,10 +24,10 @@ Scene Balls() {
   return scene;
 }
 
-PooledVector<std::byte> Coded(const ShapeTile& tile) {
+PooledVector<std::byte> Coded(const ShapeTile& tile, bool colors = true) {
   PooledVector<std::byte> bytes;
-  AppendTile(tile, bytes);
-  EXPECT_EQ(bytes.size(), BytesOf(tile));
+  AppendTile(tile, colors, bytes);
+  EXPECT_EQ(bytes.size(), BytesOf(tile, colors));
   EXPECT_LE(bytes.size(), MostBytesOfTile(tile.pixels));
   return bytes;
 }
@@ -54,9 +54,29 @@ TEST(TileCoding, ATileComesBackAsItWas) {
   EXPECT_GT(grid.count(), empty) << "nothing was seen";
 }
 
+TEST(TileCoding, BoxesGetNoColorsOfOpaqueFragments) {
+  const Scene scene = Balls();
+  const auto shapes = scene.Draw();
+  const ShapeTile& tile = shapes->TileAt(70, 40);
+  const PooledVector<std::byte> bytes = Coded(tile, false);
+  EXPECT_LT(bytes.size(), Coded(tile).size());
+  const ShapeTile read = ReadTile(bytes, tile.pixels).value();
+  EXPECT_FALSE(read.colors);
+  EXPECT_EQ(read.begin, tile.begin);
+  EXPECT_EQ(read.ends, tile.ends);
+  for (std::size_t i = 0; i < tile.fragments.size(); ++i) {
+    ShapeFragment expected = tile.fragments[i];
+    if (expected.rgba[3] == 1) expected.rgba = {0, 0, 0, 1};
+    ASSERT_EQ(read.fragments[i], expected);
+  }
+  for (std::size_t size = 1; size < bytes.size(); size += 97)
+    EXPECT_FALSE(ReadTile(std::span(bytes).first(size), tile.pixels).ok()) << size;
+}
+
 TEST(TileCoding, OtherBytesAreDataLoss) {
   const Scene scene = Balls();
-  const ShapeTile& tile = scene.Draw()->TileAt(70, 40);
+  const auto shapes = scene.Draw();
+  const ShapeTile& tile = shapes->TileAt(70, 40);
   const PooledVector<std::byte> good = Coded(tile);
   const std::size_t pixels = BytesOfCounts(tile.ends.size());
   for (std::size_t size = 1; size < good.size(); size += 97) EXPECT_FALSE(ReadTile(std::span(good).first(size), tile.pixels).ok()) << size;
@@ -84,9 +104,10 @@ TEST(TileCoding, AnyBytesAreReadWithoutACrash) {
   Random random(9);
   SCOPED_TRACE(random.trace());
   const Scene scene = Balls();
-  const ShapeTile& tile = scene.Draw()->TileAt(70, 40);
+  const auto shapes = scene.Draw();
+  const ShapeTile& tile = shapes->TileAt(70, 40);
   for (int i = 0; i < 2000; ++i) {
-    PooledVector<std::byte> bytes = Coded(tile);
+    PooledVector<std::byte> bytes = Coded(tile, random.Chance(0.5));
     bytes.resize(random.Integer<std::size_t>(0, bytes.size()));
     for (int n = 0; n < 5 && !bytes.empty(); ++n)
       bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] = std::byte(random.Integer(0, 255));

@@ -70,7 +70,7 @@ void SplatBand::FindFragments() {
   fragments_.resize(pass_.own.size());
   for (std::int32_t y = y_begin_; y < y_end_; ++y) {
     for (std::int32_t x = pass_.bounds.x_begin; x < pass_.bounds.x_end; ++x) {
-      const ShapeTile& tile = pass_.shapes->TileAt(x, y);
+      const ShapeTile& tile = pass_.shapes->TileForBoxes(x, y);
       if (tile.empty()) {
         x = tile.pixels.x_end - 1;
         continue;
