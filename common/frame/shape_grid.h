@@ -1,4 +1,4 @@
-// ShapeGrid: the tiles of a frame that shapes are drawn in (worker/shapes), numbered row by row.
+// ShapeGrid: the shape tiles of a frame (worker/shapes draws them), numbered row by row.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
-// Which worker draws which tiles of a frame's shapes (ShapeGrid). Each tile is drawn once, by one of the workers that render the frame, and
-// sent to all that need it, to render or to display. Tiles follow a sequence of low discrepancy (R2; Roberts 2018), so that a worker gets
-// tiles from everywhere in the frame.
+// Which worker draws which shape tiles of a frame (ShapeGrid). One of the workers that render the frame draws each tile and sends it to all
+// that need it, to render or to display. A sequence of low discrepancy (R2; Roberts 2018) assigns them, so that each worker draws all over
+// the frame.
 //
-// Nothing depends on it: a worker that does not get a tile draws it, with the same result.
+// No picture depends on this: a worker that lacks a tile draws it, with the same result.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ namespace slabstream {
 struct FramePlan;
 
 struct TileOrder {
-  WorkerId from = 0, to = 0;         // not the same: draws them, and gets them
+  WorkerId from = 0, to = 0;         // `from` draws them for `to`, another one
   std::vector<std::uint32_t> tiles;  // numbers, ascending; not empty
   friend bool operator==(const TileOrder&, const TileOrder&) = default;
 };
 
-// By `from` and `to`. None: the frame has no shapes, or one worker.
+// Sorted by `from`, then `to`. Empty: no shapes, or one worker.
 std::vector<TileOrder> PlanTiles(const FramePlan& plan);
 
 }  // namespace slabstream

@@ -122,13 +122,11 @@ std::uint64_t TileBytes(const FrameSetup& setup) {
 }
 
 std::uint64_t SharedBytes(const FrameSetup& setup) {
-  constexpr std::uint64_t kLatestFrames = 3;  // worker/service/shared_shapes.h
-  std::uint64_t bytes = kLatestFrames * TileBytes(setup);
-  if (!setup.light) return bytes;
+  if (!setup.light) return 0;
   // Of two looks: extinction in two orders, and shares of light for two lights.
   constexpr std::uint64_t kOfVoxel = 24, kOfLight = 8;
   const std::uint64_t lights = std::max<std::size_t>(setup.shading.lights.size(), 1);
-  bytes += CountIn(setup.light->description.geometry.size) * (kOfVoxel + kOfLight * lights);
+  std::uint64_t bytes = CountIn(setup.light->description.geometry.size) * (kOfVoxel + kOfLight * lights);
   // Samples, and of other fields the extinction until it is added to the volume's.
   for (const CoarserLevel* const light : LightVolumesOf(setup)) {
     const std::size_t sample = BytesPerSample(light->description.type) + (light == &*setup.light ? 0 : sizeof(float));
@@ -162,7 +160,7 @@ std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   if (limit == 0) return most;
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
-  const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
+  const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2 + TileBytes(setup);
   const std::uint64_t taken =
       IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + SharedBytes(setup) + ShapeBytes(setup) + images;
   const double boxes = (2 + DerivedShare(setup)) * BytesWithFields(setup);  // of that which is being read nothing is derived yet

@@ -6,8 +6,8 @@
 // An unfinished group takes (GroupImageBytes)
 //   the images of all of its ranks        what a root may hold at a time: its own, and those that wait to be combined
 //   one image of the union of their reach an image that is decoded, encoded or on its way to another worker
-// a frame with shapes takes what they show in its pixels (TileBytes), as far as this worker draws it or gets it from others, and a display
-// worker takes, for each frame (PictureBytes)
+// and for each frame with shapes what they show in its pixels (TileBytes), drawn here or by others. A display worker takes, for each frame
+// (PictureBytes)
 //   an image of the whole frame           accumulated
 //   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
 // Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
@@ -31,8 +31,7 @@ std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement
 std::uint64_t PictureBytes(const FrameSetup& setup);
 // Of each pixel two fragments are counted. 0: the frame has no shapes.
 std::uint64_t TileBytes(const FrameSetup& setup);
-// What the frames of a process share: the light volume, and what shadows and ambient occlusion make of it; and TileBytes of the latest
-// frames. 0: the frame has none of these.
+// What the frames of a process share: the light volume, and what shadows and ambient occlusion make of it. 0: the frame has none of these.
 std::uint64_t SharedBytes(const FrameSetup& setup);
 // `derived_share`: bytes that are derived from a byte of voxels.
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share);

@@ -88,7 +88,7 @@ std::size_t PayloadBytesOf(const PartialImage& message) {
   return message.packed ? message.packed->bytes : PayloadBytes(message.image);
 }
 std::size_t PayloadBytesOf(const ShapeTiles& message) {
-  return message.packed ? message.packed->bytes : std::accumulate(message.bytes.begin(), message.bytes.end(), std::size_t{0});
+  return std::accumulate(message.bytes.begin(), message.bytes.end(), std::size_t{0});
 }
 std::size_t PayloadBytesOf(const Chunk& message) { return message.encoded_bytes; }
 std::size_t PayloadBytesOf(const VolumePart& message) { return message.bytes; }

@@ -1,9 +1,7 @@
 // Counts how often which value occurs together with which slope: a JointHistogram.
 #pragma once
 
-#include <cstdint>
 #include <functional>
-#include <vector>
 
 #include "common/base/status.h"
 #include "common/stats/probe_results.h"

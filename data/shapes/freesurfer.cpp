@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <vector>
 
 #include "data/shapes/parsing.h"
 #include "data/shapes/shape_formats.h"

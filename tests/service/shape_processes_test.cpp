@@ -26,12 +26,12 @@ void WritePly(const Shape& shape, const std::filesystem::path& path) {
 class ShapeProcesses : public MultiProcessTest {
  protected:
   // A ball in a larger one, which is translucent.
-  void StartWithBalls(const std::vector<std::string>& options = {}) {
+  void StartWithBalls() {
     WritePly(testing::SphereMesh({32, 32, 32}, 20, 40), directory_ / "core.ply");
     WritePly(testing::SphereMesh({30, 34, 32}, 30, 60), directory_ / "shell.ply");
     StartCoordinator("tcp://127.0.0.1:*", "tcp://127.0.0.1:*",
                      {"--data", "core=" + (directory_ / "core.ply").string(), "--data", "shell=" + (directory_ / "shell.ply").string()});
-    for (int i = 0; i < 4; ++i) StartWorker(options);
+    for (int i = 0; i < 4; ++i) StartWorker();
     client_.emplace(Connect());
     AwaitWorkers(*client_, 4);
   }
@@ -72,14 +72,6 @@ TEST_F(ShapeProcesses, PicturesDoNotDependOnWhoDrawsForWhom) {
   while (workers_.size() > 1) KillWorker(0);
   AwaitStatus(*client_, [](const StatusReply& status) { return status.workers.size() == 1; });
   for (std::size_t i = 0; i < requests.size(); ++i) ExpectSame(Render(requests[i]), pictures[i]);
-}
-
-TEST_F(ShapeProcesses, PackedTilesShowTheSame) {
-  StartWithBalls({"--compress=on", "--no-shared-memory"});
-  const FrameRequest request = RequestOf(FindRenderer("raycast"), 40, 2);
-  const LocalImage picture = Render(request);
-  while (workers_.size() > 1) KillWorker(0);
-  ExpectSame(Render(request), picture);
 }
 
 TEST_F(ShapeProcesses, KilledWorkersCostNoFrameAndChangeNoPicture) {

@@ -1,6 +1,5 @@
-// EarlyMessages: PartialImages or ShapeTiles that arrived before the assignment that tells what to do with them, or before the Welcome,
-// within a byte limit and for a while: a group or a frame that nobody was told of in this time will be handed out again under another name,
-// or never was.
+// EarlyMessages: PartialImages or ShapeTiles that arrived before the assignment that tells what to do with them, or before the Welcome. It
+// keeps them within a byte limit and for a while: an assignment that does not come in this time comes under another key, or never.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,7 +14,7 @@
 
 namespace slabstream {
 
-// What an assignment is of that brings them, whether two with the same key and epoch are copies, and their bytes in memory.
+// The part of an assignment's key that they await; whether two of one such key and epoch are copies; their bytes in memory.
 inline GroupKey KeyOf(const PartialImage& image) { return image.key; }
 inline bool IsCopy(const PartialImage& a, const PartialImage& b) {
   return a.step == b.step && a.pixels == b.pixels && a.from_worker == b.from_worker;
@@ -59,8 +58,8 @@ class EarlyMessages {
 
   std::size_t size() const { return entries_.size(); }  // keys
 
-  // Those with keys of which the last message came before `limit`.
-  void ForgetSince(Time limit) {
+  // All messages of each key whose last one came before `limit`.
+  void ForgetBefore(Time limit) {
     std::erase_if(entries_, [&](const auto& entry) {
       if (entry.second.last_came >= limit) return false;
       for (const auto& [message, payload] : entry.second.kept) bytes_ -= Cost(message, payload);

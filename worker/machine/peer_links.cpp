@@ -59,20 +59,18 @@ void PeerLinks::Admit(AdmitKeys admit, WorkerActions& actions) const {
   actions.push_back(std::move(admit));
 }
 
-void PeerLinks::Deliver(SendPartial& send, Time now) {
-  send.delivery = DeliveryTo(*send.to);
-  if (send.delivery.timed) send.message.acknowledge = rates_.Ask(send.to->worker, now);
-}
-
 // Links within a host are not timed: a lack of processor time would look like a slow link, and packing would worsen it.
-Delivery PeerLinks::DeliveryTo(const Peer& to) const {
+void PeerLinks::Deliver(SendPartial& send, Time now) {
+  const Peer& to = *send.to;
   const bool on_this_host = config_.memory_scope != 0 && to.memory_scope == config_.memory_scope;
-  if (on_this_host && config_.lends_memory && !takes_frames_only_.contains(to.worker)) return {.lend = true};
-  if (config_.compression == LinkCompression::kOn) return {.bytes_per_second = 0};
-  if (config_.compression == LinkCompression::kAuto && !on_this_host && IsTcp(to.images_endpoint)) {
-    return {.timed = true, .bytes_per_second = rates_.Of(to.worker)};
+  if (on_this_host && config_.lends_memory && !takes_frames_only_.contains(to.worker)) {
+    send.delivery.lend = true;
+  } else if (config_.compression == LinkCompression::kOn) {
+    send.delivery.bytes_per_second = 0;
+  } else if (config_.compression == LinkCompression::kAuto && !on_this_host && IsTcp(to.images_endpoint)) {
+    send.delivery = {.timed = true, .bytes_per_second = rates_.Of(to.worker)};
+    send.message.acknowledge = rates_.Ask(to.worker, now);
   }
-  return {};
 }
 
 void PeerLinks::On(const ImageRefused& refused, WorkerActions& actions) {

@@ -31,7 +31,6 @@ class PeerLinks {
   void Gone(std::span<const WorkerId> workers, WorkerActions& actions);
 
   void Deliver(SendPartial& send, Time now);  // fills in `delivery` and message.acknowledge
-  Delivery DeliveryTo(const Peer& to) const;
   void On(const PartialSent& sent, Time now) { rates_.Sent(sent.to, sent.acknowledge, sent.bytes, now); }
   void On(const ImageReceived& received, Time now) { rates_.Received(received.from_worker, received.number, now); }
   void On(const ImageRefused& refused, WorkerActions& actions);

@@ -310,7 +310,7 @@ void WorkerMachine::State::ShareTiles(Frame& frame, const GroupAssignment& assig
     const Peer* const to = order.from == worker ? PeerIn(assignment, order.to) : nullptr;
     if (to == nullptr) continue;
     const bool colors = std::ranges::find(displays, order.to) != displays.end();
-    draw.receivers.push_back({*to, order.tiles, colors, links.DeliveryTo(*to).bytes_per_second});
+    draw.receivers.push_back({*to, order.tiles, colors});
   }
   if (!draw.receivers.empty()) frame.to_draw = std::move(draw);
   renders.AwaitTiles(assignment.key.frame, std::move(awaited), now + config.tile_patience);
@@ -595,8 +595,8 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 void WorkerMachine::State::Tend() {
   boxes.ExpireRequests(now);
   if (config.memory_bytes != 0) boxes.SetRoom(RoomForVoxels());
-  early_images.ForgetSince(now - config.early_image_patience);
-  early_tiles.ForgetSince(now - config.early_image_patience);
+  early_images.ForgetBefore(now - config.early_image_patience);
+  early_tiles.ForgetBefore(now - config.early_image_patience);
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {

@@ -230,7 +230,6 @@ struct DrawTiles {
     Peer to;
     std::vector<std::uint32_t> tiles;  // ascending
     bool colors = true;                // it displays them; else it only renders
-    double bytes_per_second = 0;       // Delivery::bytes_per_second
   };
   ClientId client = 0;
   Epoch epoch = 0;

@@ -1,7 +1,6 @@
 // PacketShapes: the fragments of shapes on the rays of a packet, as kernels read them: in numbers of samples, lane by lane.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 

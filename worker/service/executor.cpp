@@ -165,8 +165,7 @@ std::pair<ShapeTiles, Bytes> PackTiles(const DrawTiles& draw, const DrawTiles::F
     message.bytes.push_back(std::uint32_t(size));
     AppendTile(tile, receiver.colors, bytes);
   }
-  Bytes payload = PackForLink(Bytes(std::move(bytes)), receiver.bytes_per_second, message.packed);
-  return {std::move(message), std::move(payload)};
+  return {std::move(message), Bytes(std::move(bytes))};
 }
 
 // The picture of an accumulated frame, or of a share of it.

@@ -1,8 +1,7 @@
-// SharedShapes: the shapes of a frame in the whole process. The workers and the boxes of a frame share them, and so do frames that look
-// the same. Tiles that other processes have drawn need not be drawn here.
+// SharedShapes: the shapes of a frame in the whole process. The workers and the boxes of a frame share them, and so do frames of equal
+// setups. Tiles that came from other workers are not drawn again.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,29 +9,27 @@
 
 #include "common/memory/bytes.h"
 #include "common/wire/image_messages.h"
-#include "worker/shapes/frame_shapes.h"
+#include "worker/shapes/drawn_tiles.h"
 
 namespace slabstream {
 
-// Any thread, of all members.
+// All members: any thread.
 class SharedShapes {
  public:
-  // Those of this frame. They live as long as anybody holds them; some latest ones live longer.
+  // The one of this setup. It lives as long as anybody holds it.
   static std::shared_ptr<SharedShapes> Of(const FrameSetup& setup);
 
-  explicit SharedShapes(const FrameSetup& setup);
+  explicit SharedShapes(const FrameSetup& setup) : setup_(setup) {}
 
-  // As MakeFrameShapes. The first call makes them, and others wait.
+  // As MakeFrameShapes. Later calls wait for the first one, and return its result.
   Result<std::shared_ptr<const FrameShapes>> Make(std::span<const std::shared_ptr<const VoxelBlock>> bytes,
                                                   const std::shared_ptr<const FrameLight>& light);
-  // Tiles of another worker, before they are first asked for. One that cannot be read is drawn here. A tile that is there already stays.
+  // Tiles of another worker. A tile that is already drawn here stays.
   void Add(const ShapeTiles& message, const Bytes& payload);
 
  private:
-  class Arrived;
-
   const FrameSetup setup_;
-  const std::shared_ptr<Arrived> arrived_;
+  const std::shared_ptr<DrawnTiles> tiles_ = std::make_shared<DrawnTiles>();
   std::mutex mutex_;  // guards what follows
   std::optional<Result<std::shared_ptr<const FrameShapes>>> shapes_;
 };

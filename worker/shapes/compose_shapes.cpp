@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 
 #include "common/image/resolve.h"
 #include "common/kernels/combine.h"

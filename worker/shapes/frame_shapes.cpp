@@ -9,9 +9,11 @@
 #include <deque>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "common/parallel/parallel.h"
+#include "worker/shapes/drawn_tiles.h"
 #include "worker/shapes/shape_scene.h"
 
 namespace slabstream {

@@ -18,7 +18,6 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -78,13 +77,7 @@ inline const ShapeTile* TileOf(const FrameShapes* shapes, const PixelBounds& pix
   return shapes == nullptr ? nullptr : &shapes->TileForBoxes(pixels.x_begin, pixels.y_begin);
 }
 
-// Tiles of the same frame that others have drawn, by their numbers in ShapeGrid(FrameBounds(setup)).
-class DrawnTiles {
- public:
-  virtual ~DrawnTiles() = default;
-  // None: it is not there. Any thread.
-  virtual std::optional<ShapeTile> Take(std::uint32_t tile, const PixelBounds& pixels) = 0;
-};
+class DrawnTiles;
 
 // `bytes`: of each of setup.shapes, as PackShape made them; they stay as long as the result. DataLoss: they are not. `light`: shadows and
 // ambient occlusion on the shapes; null: there are none. `drawn`: its tiles are taken rather than drawn; null: there are none.

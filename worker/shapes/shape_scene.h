@@ -1,7 +1,6 @@
 // ShapeScene: the shapes of a frame as tiles draw them: where their vertices fall in the frame, and which pieces may be seen where.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>

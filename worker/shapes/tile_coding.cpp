@@ -7,6 +7,9 @@
 #include <cstring>
 #include <limits>
 
+#include "common/base/log.h"
+#include "worker/shapes/drawn_tiles.h"
+
 namespace slabstream {
 namespace {
 
@@ -41,12 +44,12 @@ std::size_t WithoutColor(const ShapeTile& tile, bool colors) {
 std::size_t BytesOf(const ShapeTile& tile, bool colors) {
   if (tile.fragments.empty()) return 0;
   const std::size_t without = WithoutColor(tile, colors);
-  return BytesOfCounts(tile.ends.size()) + (tile.fragments.size() - without) * sizeof(ShapeFragment) + without * sizeof(float);
+  return tile.ends.size() + (tile.fragments.size() - without) * sizeof(ShapeFragment) + without * sizeof(float);
 }
 
 void AppendTile(const ShapeTile& tile, bool colors, PooledVector<std::byte>& bytes) {
   if (tile.fragments.empty()) return;
-  const std::size_t begin = bytes.size(), pixels = tile.ends.size(), first = begin + BytesOfCounts(pixels);
+  const std::size_t begin = bytes.size(), pixels = tile.ends.size(), first = begin + pixels;
   bytes.resize(begin + BytesOf(tile, colors));
   std::byte* to = &bytes[first];
   if (colors) {
@@ -71,7 +74,7 @@ Result<ShapeTile> ReadTile(std::span<const std::byte> bytes, const PixelBounds& 
   ShapeTile tile{.pixels = pixels};
   if (bytes.empty()) return tile;
   const auto pixel_count = std::size_t(pixels.pixel_count());
-  if (bytes.size() < BytesOfCounts(pixel_count)) return Status::DataLoss(fmt::format("{} bytes of {} pixels", bytes.size(), pixel_count));
+  if (bytes.size() < pixel_count) return Status::DataLoss(fmt::format("{} bytes of {} pixels", bytes.size(), pixel_count));
   tile.begin.resize(pixel_count + 1);
   std::uint32_t most = 0, ends = 0;
   for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
@@ -81,7 +84,7 @@ Result<ShapeTile> ReadTile(std::span<const std::byte> bytes, const PixelBounds& 
     tile.begin[pixel + 1] = tile.begin[pixel] + count;
   }
   if (most > kMostShapeFragments) return Status::DataLoss(fmt::format("{} fragments of a pixel, at most {}", most, kMostShapeFragments));
-  const std::span<const std::byte> rest = bytes.subspan(BytesOfCounts(pixel_count));
+  const std::span<const std::byte> rest = bytes.subspan(pixel_count);
   const std::size_t count = tile.begin.back(), colored = count - ends;
   if (rest.size() != colored * sizeof(ShapeFragment) + ends * sizeof(float)) {
     return Status::DataLoss(fmt::format("{} bytes of {} fragments, {} of them without colours", rest.size(), count, ends));
@@ -116,6 +119,17 @@ Result<ShapeTile> ReadTile(std::span<const std::byte> bytes, const PixelBounds& 
   }
   if (std::ranges::count_if(tile.fragments, IsOpaque) != opaque) return Status::DataLoss("an opaque fragment in front of another one");
   return tile;
+}
+
+std::optional<ShapeTile> DrawnTiles::Take(std::uint32_t tile, const PixelBounds& pixels) {
+  std::unique_lock lock(mutex_);
+  const auto taken = tiles_.extract(tile);
+  lock.unlock();
+  if (taken.empty()) return std::nullopt;
+  Result<ShapeTile> read = ReadTile(taken.mapped().span(), pixels);
+  if (read.ok()) return *std::move(read);
+  LogWarning(fmt::format("shapes: tile {} of another worker is drawn here: {}", tile, read.status().message()));
+  return std::nullopt;
 }
 
 }  // namespace slabstream

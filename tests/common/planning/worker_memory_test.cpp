@@ -47,6 +47,17 @@ TEST(WorkerMemory, BricksOfOneValueTakeNothing) {
       << "those of the bricks that it touches";
 }
 
+TEST(WorkerMemory, EachFrameWithShapesTakesTheirFragments) {
+  const VolumeSummary summary = FullSummary({64, 64, 64});
+  FramePlan plan = PlanOf(1024, 2, summary);
+  EXPECT_EQ(TileBytes(plan.setup), 0U);
+  const std::vector<WorkerLimit> limits = {{1, 1 << 30}, {2, 1 << 30}};
+  const int without = FramesThatFit(plan, summary, limits).value();
+  plan.setup.shapes.resize(1);
+  EXPECT_EQ(TileBytes(plan.setup), 48U * 1024 * 1024);
+  EXPECT_LT(FramesThatFit(plan, summary, limits).value(), without);
+}
+
 TEST(WorkerMemory, LightOfOtherFieldsTakesSamplesAndTheirExtinction) {
   FrameSetup setup = PlanOf(64, 1, FullSummary({64, 64, 64})).setup;
   EXPECT_EQ(SharedBytes(setup), 0U);
