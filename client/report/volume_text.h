@@ -29,8 +29,8 @@ Json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 // {"at", "inside", "voxel", "value", "label": {"value", "name"} if there are labels, "fields": [{"name", "value"}, ...], "interpolated"}.
 // Null: there is none. Outside the volume: the first four.
 Json SampleJson(const VolumeSample& sample);
-// What a pixel of the picture of `frame` shows: a SampleJson with "hit" and "depth". If it is a shape or a plane, also "shape" (its name,
-// or "plane"), "shape_number" and "shape_value". If it is nothing: {"hit": false}.
+// What a pixel of a picture shows, which `frame` asked for: the members of SampleJson, "hit" and "depth". A shape or a plane adds "shape"
+// (its name, or "plane"), "shape_number" and "shape_value". A pixel that shows nothing: {"hit": false}.
 Json PickJson(const PickReply& picked, const FrameRequest& frame);
 
 // {"from", "to", "length", "values"}: what samples along a line hold, at least two of them. Null: nothing, or no finite value.

@@ -125,14 +125,14 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
   AddOnce(out.workers, plan_.display);
   for (const WorkerId worker : out.workers) out.assignment.peers.push_back({.worker = worker});
   if (hidden_by_ <= number) out.assignment.hidden = hidden_;
-  if (number > 0 || attempt() > 1) return out;
-  out.assignment.tiles = plan_.tiles;
-  for (const TileOrder& order : plan_.tiles) {
-    for (const WorkerId worker : {order.from, order.to}) {
-      if (std::ranges::find(out.workers, worker) != out.workers.end()) continue;
-      out.workers.push_back(worker);
-      out.assignment.others.push_back({.worker = worker});
+  if (number == 0 && attempt() == 1) {
+    out.assignment.tiles = plan_.tiles;
+    const std::size_t peers = out.workers.size();
+    for (const TileOrder& order : plan_.tiles) {
+      AddOnce(out.workers, order.from);
+      AddOnce(out.workers, order.to);
     }
+    for (std::size_t i = peers; i < out.workers.size(); ++i) out.assignment.others.push_back({.worker = out.workers[i]});
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 namespace slabstream {
+
 std::shared_ptr<SharedShapes> SharedShapes::Of(const FrameSetup& setup) {
   static std::mutex mutex;
   static std::vector<std::weak_ptr<SharedShapes>> all;

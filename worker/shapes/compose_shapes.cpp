@@ -34,14 +34,15 @@ void ForEachPixel(LocalImage& image, PixelRange pixels, std::int32_t frame_width
   ParallelForRanges(part.y_begin, part.y_end, kRows, [&](std::int32_t begin, std::int32_t end) {
     for (std::int32_t y = begin; y < end; ++y) {
       const std::uint64_t row = std::uint64_t(y) * std::uint64_t(frame_width);
+      const ShapeTile* tile = nullptr;
       for (std::int32_t x = part.x_begin; x < part.x_end; ++x) {
         if (row + std::uint64_t(x) < pixels.begin || row + std::uint64_t(x) >= pixels.end) continue;
-        const ShapeTile& tile = shapes.TileAt(x, y);
-        if (tile.empty()) {
-          x = tile.pixels.x_end - 1;
+        if (tile == nullptr || x >= tile->pixels.x_end) tile = &shapes.TileAt(x, y);
+        if (tile->empty()) {
+          x = tile->pixels.x_end - 1;
           continue;
         }
-        const std::span<const ShapeFragment> fragments = tile.At(x, y);
+        const std::span<const ShapeFragment> fragments = tile->At(x, y);
         if (fragments.empty()) continue;
         use(fragments, std::size_t(y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(x - image.bounds.x_begin), x,
             y);

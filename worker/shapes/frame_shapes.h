@@ -65,7 +65,7 @@ class FrameShapes {
   // that they grow away from the eye: k if the traversal ascends, else -k.
   // The tile that holds a pixel of the frame. The first call draws it. Any thread, within its task arena.
   virtual const ShapeTile& TileAt(std::int32_t x, std::int32_t y) const = 0;
-  // As a box needs it: an opaque fragment ends its rays, whatever its colour, so that `colors` may be false.
+  // The same for a box. An opaque fragment ends the box's rays whatever its colour is, so `colors` may be false.
   virtual const ShapeTile& TileForBoxes(std::int32_t x, std::int32_t y) const = 0;
   virtual PixelBounds bounds() const = 0;  // all fragments lie there; empty: there are none
   virtual bool translucent() const = 0;    // false: fragments that are not opaque are parts of edges alone
