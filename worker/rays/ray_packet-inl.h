@@ -307,12 +307,15 @@ HWY_INLINE RayPacket AmongVoxels(const RayPacket& packet, const FieldMap& map) {
   return among;
 }
 
+// Where samples lie between voxels.
+struct CellPlace {
+  Floats fraction[3];  // position - floor
+};
 // The position of sample k of each ray in the box. `packet`: AmongVoxels. If the box does not own a ray's sample, the ray's indices are
 // arbitrary.
-struct SamplePlace {
+struct SamplePlace : CellPlace {
   Floats position[3];
-  Floats fraction[3];  // position - floor
-  Ints voxel[3];       // floor - box.origin
+  Ints voxel[3];  // floor - box.origin
 };
 HWY_INLINE SamplePlace PlaceSample(const RayPacket& packet, const RayBox& box, Floats k) {
   SamplePlace place;
@@ -461,7 +464,7 @@ HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& pl
 
 // Along x of the four rows, then along y, then along z.
 template <class T>
-HWY_INLINE Floats Interpolate(const Neighbours<T>& n, const SamplePlace& place) {
+HWY_INLINE Floats Interpolate(const Neighbours<T>& n, const CellPlace& place) {
   const auto along_x = [&](const InnerPair& pair) HWY_ATTR { return Lerp(place.fraction[0], pair.a, pair.b); };
   const auto low = Lerp(place.fraction[1], along_x(n.inner[0][0]), along_x(n.inner[0][1]));
   const auto high = Lerp(place.fraction[1], along_x(n.inner[1][0]), along_x(n.inner[1][1]));

@@ -41,7 +41,7 @@ struct Unscaled {
 };
 // `scale` turns a difference over two voxels along an axis, round the lower (0) or upper (1) voxel beside the sample, to one of data space.
 template <class T, class Scale = Unscaled>
-HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const SamplePlace& place, const Scale& scale = {}) {
+HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const CellPlace& place, const Scale& scale = {}) {
   const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
   // Row y, z of 0 ... 3, interpolated along x.
   const auto inner = [&](int y, int z) SLABSTREAM_INLINED { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
@@ -119,27 +119,34 @@ HWY_INLINE Floats Shine(const RayLook& look, Floats fraction) {
   return power;
 }
 
+// 1 / sqrt(v) to 2^-21, of normal numbers.
+HWY_INLINE Floats InverseRoot(Floats v) {
+  const auto root = hn::ApproximateReciprocalSqrt(v);
+  return hn::Mul(root, hn::NegMulAdd(hn::Mul(hn::Mul(v, Set(0.5F)), root), root, Set(1.5F)));  // a step of Newton's method
+}
+
 // `open`: share of what surfaces scatter. reached(number of a light): the share of its light.
 template <class Reached>
 HWY_INLINE Light LightFrom(const RayLook& look, const Gradient& g, Floats open, Reached&& reached) {
   const FloatTag df;
   const auto dot = [&](const Float3& v)
-                       HWY_ATTR { return hn::Add(hn::Add(hn::Mul(g.x, Set(v[0])), hn::Mul(g.y, Set(v[1]))), hn::Mul(g.z, Set(v[2]))); };
+                       HWY_ATTR { return hn::MulAdd(g.x, Set(v[0]), hn::MulAdd(g.y, Set(v[1]), hn::Mul(g.z, Set(v[2])))); };
   const auto nx = hn::Mul(g.x, Set(look.inverse_spacing[0])), ny = hn::Mul(g.y, Set(look.inverse_spacing[1])),
              nz = hn::Mul(g.z, Set(look.inverse_spacing[2]));
-  const auto square = hn::Add(hn::Add(hn::Mul(nx, nx), hn::Mul(ny, ny)), hn::Mul(nz, nz));
-  const auto has_gradient = hn::And(hn::Gt(square, hn::Zero(df)), hn::Le(square, Set(std::numeric_limits<float>::max())));
-  const auto per_length = hn::Div(Set(1), hn::Sqrt(hn::IfThenElse(has_gradient, square, Set(1))));
+  const auto square = hn::MulAdd(nx, nx, hn::MulAdd(ny, ny, hn::Mul(nz, nz)));
+  const auto has_gradient =
+      hn::And(hn::Ge(square, Set(std::numeric_limits<float>::min())), hn::Le(square, Set(std::numeric_limits<float>::max())));
+  const auto per_length = InverseRoot(hn::IfThenElse(has_gradient, square, Set(1)));
   const auto n_v = hn::Mul(dot(look.viewer), per_length);
   auto lit = hn::Zero(df), lit_without = hn::Zero(df), shine = hn::Zero(df);
   for (std::size_t i = 0; i < look.lights.size(); ++i) {
     const RayLook::Light& light = look.lights[i];
     const auto share = reached(int(i));
     const auto n_l = hn::Mul(dot(light.direction), per_length);
-    lit = hn::Add(lit, hn::Mul(share, hn::Abs(n_l)));
+    lit = hn::MulAdd(share, hn::Abs(n_l), lit);
     lit_without = hn::Add(lit_without, share);
-    const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(light.to_viewer));
-    shine = hn::Add(shine, hn::Mul(share, Shine(look, hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)))));
+    const auto r_v = hn::MulSub(hn::Add(n_l, n_l), n_v, Set(light.to_viewer));
+    shine = hn::MulAdd(share, Shine(look, hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1))), shine);
   }
   const auto facing = hn::IfThenElse(has_gradient, lit, hn::Mul(lit_without, Set(0.5F)));
   return {hn::Mul(open, hn::MulAdd(facing, Set(look.diffuse), Set(look.ambient))),

@@ -105,8 +105,20 @@ HWY_INLINE SamplePlace Shifted(const RayField& field, SamplePlace place) {
   return place;
 }
 
-// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it is on the volume's grid. kLit: by bricks.
-template <class T, bool kLit>
+// Calls with(a sample) for the type of a field's bricks. False: it has none.
+template <class With>
+HWY_INLINE bool WithBricks(const RayField& field, With&& with) {
+  if (field.voxels.type == ScalarType::kUint8) {
+    with(std::uint8_t());
+  } else if (field.voxels.type == ScalarType::kUint16) {
+    with(std::uint16_t());
+  } else {
+    return false;
+  }
+  return true;
+}
+
+// Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it is on the volume's grid.
 HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
                            Mixture& mixture) {
   const FloatTag df;
@@ -114,41 +126,22 @@ HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sam
   sampled = WithinField(field, place, sampled);
   if (hn::AllFalse(df, sampled)) return;
   LaneNumbers entry;
-  if constexpr (kLit) {
+  const bool has_bricks = WithBricks(field, [&](auto type) HWY_ATTR {
+    using Type = decltype(type);
     BrickPlace found;
-    FindInBricks<T>(field.voxels, place, sampled, bricks, found, found);
-    const LitSample sample = InterpolateCorners<T>(bricks.corners(), found.corner, WeightsAt(place));
+    FindInBricks<Type>(field.voxels, place, sampled, bricks, found, found);
+    const LitSample sample = InterpolateCorners<Type>(bricks.corners(), found.corner, WeightsAt(place));
     entry.Set(EntryOf(*field.look, sample.value));
     MixSamples(
         field, at, sampled, entry, [&]() HWY_ATTR { return sample.gradient; }, mixture);
-  } else {
-    const Neighbours<T> neighbours = LoadNeighbours<T>(field.voxels, place, sampled);
-    const auto value = Interpolate(neighbours, place);
-    if constexpr (std::is_same_v<T, float>) {
-      const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-      entry.Set(EntryOf(*field.look, value, finite));
-      sampled = hn::And(sampled, finite);
-    } else {
-      entry.Set(EntryOf(*field.look, value));
-    }
-    MixSamples(
-        field, at, sampled, entry, [&]() HWY_ATTR { return GradientAt(neighbours, place); }, mixture);
-  }
-}
-
-// Whether samples of a field are read from bricks.
-HWY_INLINE bool HasBricks(const RayField& field) { return field.look->phong && field.voxels.type != ScalarType::kFloat32; }
-
-// MixField, by the field's type.
-HWY_INLINE void MixAny(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
-                       Mixture& mixture) {
-  const auto mix = [&](auto value, auto lit) HWY_ATTR { MixField<decltype(value), lit()>(field, at, sampled, among, bricks, mixture); };
-  const bool lit = HasBricks(field);
-  switch (field.voxels.type) {
-    case ScalarType::kUint8: lit ? mix(std::uint8_t(), std::true_type()) : mix(std::uint8_t(), std::false_type()); break;
-    case ScalarType::kUint16: lit ? mix(std::uint16_t(), std::true_type()) : mix(std::uint16_t(), std::false_type()); break;
-    default: mix(float(), std::false_type()); break;
-  }
+  });
+  if (has_bricks) return;
+  const Neighbours<float> neighbours = LoadNeighbours<float>(field.voxels, place, sampled);
+  const auto value = Interpolate(neighbours, place);
+  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+  entry.Set(EntryOf(*field.look, value, finite));
+  MixSamples(
+      field, at, hn::And(sampled, finite), entry, [&]() HWY_ATTR { return GradientAt(neighbours, place); }, mixture);
 }
 
 // RayFields::shown at samples; 0 where not `sampled`.
@@ -168,7 +161,7 @@ HWY_NOINLINE void MixFields(const RayFields& fields, const FieldPlace& at, Ints 
                             Mixture& mixture) {
   for (std::size_t i = 1; i < fields.fields.size(); ++i) {
     const Mask sampled = ShowsField(shown, i);
-    if (!hn::AllFalse(FloatTag(), sampled)) MixAny(fields.fields[i], at, sampled, among[i], bricks[i], mixture);
+    if (!hn::AllFalse(FloatTag(), sampled)) MixField(fields.fields[i], at, sampled, among[i], bricks[i], mixture);
   }
 }
 
@@ -186,7 +179,7 @@ struct FieldSamples {
     for (BrickPlace& of : found.of) of.number = hn::Zero(IntTag());
     return found;
   }
-  static HWY_INLINE bool Ahead(const RayField& field) { return field.on_same_grid && HasBricks(field); }
+  static HWY_INLINE bool Ahead(const RayField& field) { return field.on_same_grid && field.voxels.type != ScalarType::kFloat32; }
 
   static HWY_INLINE void Find(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, Found& found,
                               Found& before) {
@@ -196,20 +189,19 @@ struct FieldSamples {
       const Mask sampled = ShowsField(shown, i);
       if (hn::AllFalse(FloatTag(), sampled) || !Ahead(field)) continue;
       const Mask within = WithinField(field, place, sampled);
-      if (field.voxels.type == ScalarType::kUint8) {
-        FindInBricks<std::uint8_t>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
-      } else {
-        FindInBricks<std::uint16_t>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
-      }
+      WithBricks(field, [&](auto type) SLABSTREAM_INLINED {
+        FindInBricks<decltype(type)>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
+      });
     }
   }
-  HWY_INLINE void Read(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, const Found& found) {
+  HWY_INLINE void Read(const RayFields& fields, const CellPlace& place, Ints shown, GradientBricks* bricks, const Found& found) {
     const CornerWeights weights = WeightsAt(place);
     for (std::size_t i = 0; i < fields.fields.size(); ++i) {
       const RayField& field = fields.fields[i];
       if (hn::AllFalse(FloatTag(), ShowsField(shown, i)) || !Ahead(field)) continue;
-      of[i] = field.voxels.type == ScalarType::kUint8 ? InterpolateCorners<std::uint8_t>(bricks[i].corners(), found.of[i].corner, weights)
-                                                      : InterpolateCorners<std::uint16_t>(bricks[i].corners(), found.of[i].corner, weights);
+      WithBricks(field, [&](auto type) SLABSTREAM_INLINED {
+        of[i] = InterpolateCorners<decltype(type)>(bricks[i].corners(), found.of[i].corner, weights);
+      });
       entry[i].Set(EntryOf(*field.look, of[i].value));
     }
   }
@@ -224,7 +216,7 @@ struct FieldSamples {
             field, at, WithinField(field, at.of_volume, sampled), entry[i], [&]() HWY_ATTR { return of[i].gradient; }, mixture);
       } else {
         Mixture so_far = mixture;  // a call that takes its address would keep `mixture` out of registers
-        MixAny(field, at, sampled, among[i], bricks[i], so_far);
+        MixField(field, at, sampled, among[i], bricks[i], so_far);
         mixture = so_far;
       }
     }

@@ -207,20 +207,25 @@ HWY_INLINE void FindInBricks(const RayBox& box, const SamplePlace& place, Mask i
 struct CornerWeights {
   Ints pairs[2][2];  // [z][y]
 };
-HWY_INLINE CornerWeights WeightsAt(const SamplePlace& place) {
-  const FloatTag df;
-  const auto one = Set(1 << 14);
-  const auto rounded = [&](Floats v) HWY_ATTR { return hn::ConvertTo(df, Nearest(v)); };
+HWY_INLINE CornerWeights WeightsAt(const CellPlace& place) {
+  const IntTag di;
+  const hn::RepartitionToNarrow<IntTag> ds;
+  const auto in_both_halves = [&](Ints lower, Ints upper) HWY_ATTR { return hn::BitCast(ds, hn::Or(lower, hn::ShiftLeft<16>(upper))); };
+  // The share of the upper corner along an axis, in 2^-15.
+  const auto share = [&](std::size_t axis) HWY_ATTR {
+    const auto once = Nearest(hn::Mul(place.fraction[axis], Set(32767)));
+    return in_both_halves(once, once);
+  };
+  const auto second = Nearest(hn::Mul(place.fraction[0], Set(1 << 14)));
+  const auto along_x = in_both_halves(hn::Sub(SetInt(1 << 14), second), second);
+  const auto upper_y = hn::MulFixedPoint15(along_x, share(1)), lower_y = hn::Sub(along_x, upper_y);
+  const auto z = share(2);
   CornerWeights weights;
-  const auto z1 = rounded(hn::Mul(place.fraction[2], one)), z0 = hn::Sub(one, z1);
-  for (int z = 0; z < 2; ++z) {
-    const auto both = z == 0 ? z0 : z1;
-    const auto y1 = rounded(hn::Mul(place.fraction[1], both)), y0 = hn::Sub(both, y1);
-    for (int y = 0; y < 2; ++y) {
-      const auto pair = y == 0 ? y0 : y1;
-      const auto x1 = Nearest(hn::Mul(place.fraction[0], pair));
-      weights.pairs[z][y] = hn::Add(hn::Sub(Nearest(pair), x1), hn::ShiftLeft<16>(x1));
-    }
+  for (int y = 0; y < 2; ++y) {
+    const auto both = y == 0 ? lower_y : upper_y;
+    const auto upper_z = hn::MulFixedPoint15(both, z);
+    weights.pairs[0][y] = hn::BitCast(di, hn::Sub(both, upper_z));
+    weights.pairs[1][y] = hn::BitCast(di, upper_z);
   }
   return weights;
 }

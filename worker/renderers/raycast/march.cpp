@@ -19,8 +19,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
-HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, const SamplePlace& place) {
-  return LightOn(*work.look, work.light, gradient, place);
+// place_of(): where the samples are.
+template <class PlaceOf>
+HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, PlaceOf&& place_of) {
+  return work.light != nullptr ? LightAt(*work.look, gradient, *work.light, place_of()) : LightOf(*work.look, gradient);
 }
 HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.light != nullptr; }
 
@@ -31,7 +33,7 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
   const FloatTag df;
   const SamplePlace place = crossing.Place();
   Light light = {Set(1), hn::Zero(df)};
-  if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place), place);
+  if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place), [&]() HWY_ATTR { return place; });
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
   const float* const colors = work.look->surface_looks.data();
   const auto opacity = hn::GatherIndex(df, colors + 3, entry);
@@ -57,15 +59,16 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Floats before, Sur
 }
 
 // The light on samples with labels. `gradient`: of the volume, or a face's normal if `on_face`.
-HWY_INLINE Light LightOfLabels(const MarchWork& work, const SamplePlace& place, const LabelledSample& sample, Mask visible,
-                               Gradient gradient, Mask on_face) {
+template <class PlaceOf>
+HWY_INLINE Light LightOfLabels(const MarchWork& work, PlaceOf&& place_of, const LabelledSample& sample, Mask visible, Gradient gradient,
+                               Mask on_face) {
   const FloatTag df;
-  if (work.labels == nullptr) return LightOn(work, gradient, place);
+  if (work.labels == nullptr) return LightOn(work, gradient, place_of);
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
     gradient = Choose(matter, NormalAt(*work.labels, sample.place, sample.label), gradient);
   }
-  return LightOn(work, gradient, place);
+  return LightOn(work, gradient, place_of);
 }
 
 // The colours of samples with labels.
@@ -101,13 +104,12 @@ HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints 
           hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
 }
 
-// Samples, from the stored voxels alone. A gradient is computed where it is asked for.
-template <class T>
+// Samples, from stored voxels. A gradient is computed where it is asked for.
 struct StoredSamples {
   struct Found {
     Ints at;
   };
-  Neighbours<T> neighbours;
+  Neighbours<float> neighbours;
   Floats value;
 
   static HWY_INLINE Found Nowhere() { return {hn::Zero(IntTag())}; }
@@ -115,15 +117,15 @@ struct StoredSamples {
                               Found& /*before*/) {
     found.at = IndexBefore(*work.box, place, inside);
   }
-  HWY_INLINE void Read(const MarchWork& work, const SamplePlace& place, const Found& found, GradientBricks* /*bricks*/) {
-    neighbours = NeighboursAt<T>(*work.box, reinterpret_cast<const T*>(work.box->samples), found.at);
+  HWY_INLINE void Read(const MarchWork& work, const CellPlace& place, const Found& found, GradientBricks* /*bricks*/) {
+    neighbours = NeighboursAt(*work.box, reinterpret_cast<const float*>(work.box->samples), found.at);
     value = Interpolate(neighbours, place);
   }
-  HWY_INLINE Gradient GradientOf(const SamplePlace& place) const { return GradientAt(neighbours, place); }
+  HWY_INLINE Gradient GradientOf(const CellPlace& place) const { return GradientAt(neighbours, place); }
 };
 // Samples, from bricks that have the gradients, too.
 template <class T>
-struct LitSamples {
+struct BrickSamples {
   using Found = BrickPlace;
   Floats value;
   Gradient gradient;
@@ -133,12 +135,12 @@ struct LitSamples {
                               Found& before) {
     FindInBricks<T>(*work.box, place, inside, *bricks, found, before);
   }
-  HWY_INLINE void Read(const MarchWork& /*work*/, const SamplePlace& place, const Found& found, GradientBricks* bricks) {
+  HWY_INLINE void Read(const MarchWork& /*work*/, const CellPlace& place, const Found& found, GradientBricks* bricks) {
     const LitSample sample = InterpolateCorners<T>(bricks->corners(), found.corner, WeightsAt(place));
     value = sample.value;
     gradient = sample.gradient;
   }
-  HWY_INLINE const Gradient& GradientOf(const SamplePlace& /*place*/) const { return gradient; }
+  HWY_INLINE const Gradient& GradientOf(const CellPlace& /*place*/) const { return gradient; }
 };
 
 // The samples at which the rays of a packet are.
@@ -147,7 +149,7 @@ struct Step {
   bool any;  // there are some
   Mask sampled;
   Floats k;
-  SamplePlace place;
+  CellPlace cell;                // all else of the place, which few frames need, is computed anew from k: stores take longer
   typename Voxels::Found found;  // where the voxels are
   Voxels voxels;
   LaneNumbers entry;  // EntryOf
@@ -171,11 +173,10 @@ struct Classified {
   Gradient gradient;  // if opacities depend on it
   std::conditional_t<kSamples == Samples::kMixed, LabelledSample, std::monostate> labelled;
 };
-template <class T, Samples kSamples, class Voxels>
-HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Classified<kSamples>& of) {
+template <class T, Samples kSamples, class Voxels, class PlaceOf>
+HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, PlaceOf&& place_of, Classified<kSamples>& of) {
   const FloatTag df;
   const RayLook& look = *work.look;
-  const SamplePlace& place = step.place;
   const Voxels& voxels = step.voxels;
   const auto zero = hn::Zero(df);
   const auto finite = FiniteOf<T>(voxels.value);
@@ -184,7 +185,7 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
   of.visible = hn::And(hn::And(step.sampled, finite), hn::Gt(of.opacity, zero));
   of.gradient = {zero, zero, zero};
   if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
-    of.gradient = voxels.GradientOf(place);
+    of.gradient = voxels.GradientOf(step.cell);
     if (look.regions != nullptr) {
       LaneNumbers region;
       region.Set(RegionOf(look, hn::IfThenElseZero(finite, voxels.value), of.gradient));
@@ -197,7 +198,7 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
   }
   if constexpr (kSamples == Samples::kMixed) {
     if (work.labels != nullptr) {
-      of.labelled = WithLabels(*work.labels, *work.box, place, step.sampled, hn::IfThenElseZero(finite, of.opacity));
+      of.labelled = WithLabels(*work.labels, *work.box, place_of(), step.sampled, hn::IfThenElseZero(finite, of.opacity));
       of.opacity = of.labelled.opacity;
       of.visible = hn::And(step.sampled, hn::Gt(of.opacity, zero));
     }
@@ -215,24 +216,23 @@ HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, 
 }
 
 // Lights samples and adds those that are visible to Sums or to a Mixture: add(mask, opacity, color(channel)).
-template <Samples kSamples, class Voxels, class Add>
-HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, const PacketPart* part, const Classified<kSamples>& samples,
-                           Floats opacity, Add&& add) {
+template <Samples kSamples, class Voxels, class PlaceOf, class Add>
+HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, PlaceOf&& place_of, const PacketPart* part,
+                           const Classified<kSamples>& samples, Floats opacity, Add&& add) {
   const RayLook& look = *work.look;
-  const SamplePlace& place = step.place;
   Light light = {Set(1), hn::Zero(FloatTag())};
   if (IsLit(work)) {
     const bool has_gradient = kSamples != Samples::kPlain && look.by_gradient();
-    Gradient gradient = has_gradient ? samples.gradient : step.voxels.GradientOf(place);
+    Gradient gradient = has_gradient ? samples.gradient : step.voxels.GradientOf(step.cell);
     [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
     if constexpr (kSamples != Samples::kPlain) {
       on_face = hn::Lt(step.k, part->face_end);
       gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
     }
     if constexpr (kSamples == Samples::kMixed) {
-      light = LightOfLabels(work, place, samples.labelled, samples.visible, gradient, on_face);
+      light = LightOfLabels(work, place_of, samples.labelled, samples.visible, gradient, on_face);
     } else {
-      light = LightOn(work, gradient, place);
+      light = LightOn(work, gradient, place_of);
     }
   }
   if constexpr (kSamples == Samples::kMixed) {
@@ -286,17 +286,18 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   const Ints octant_start = OctantStart(*work.to_samples, packet.among);
   bool in_matter = false;  // most of the last samples were visible
   // The next samples: where they are. Rays leap until some ray has one.
-  const auto place = [&](Step<Voxels>& step, Step<Voxels>& before) SLABSTREAM_INLINED {
+  const auto find = [&](Step<Voxels>& step, Step<Voxels>& before) SLABSTREAM_INLINED {
     step.any = false;
     while (!hn::AllFalse(df, alive)) {
-      step.place = PlaceSample(packet.among, *work.box, k);
+      const SamplePlace place = PlaceSample(packet.among, *work.box, k);
+      step.cell = place;
       Stride stride = {inside, one};
       bool may_leap = !in_matter;
       if constexpr (kFields) {  // a cell is empty where no field may show
-        step.shown = ShownAt(*fields, *work.box, step.place, inside);
+        step.shown = ShownAt(*fields, *work.box, place, inside);
         may_leap = !hn::AllFalse(df, hn::And(inside, hn::RebindMask(df, hn::Eq(step.shown, hn::Zero(IntTag())))));
       }
-      if (may_leap) stride = LeapFrom(work, packet.leaps, octant_start, step.place, inside);
+      if (may_leap) stride = LeapFrom(work, packet.leaps, octant_start, place, inside);
       step.k = k;
       step.sampled = hn::And(alive, stride.sampled);
       k = hn::Add(k, stride.steps);
@@ -306,18 +307,18 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       step.any = true;
       if constexpr (kFields) {
         step.shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), step.sampled), step.shown);
-        Voxels::Find(*fields, step.place, step.shown, packet.bricks, step.found, before.found);
+        Voxels::Find(*fields, place, step.shown, packet.bricks, step.found, before.found);
       } else {
         auto read = stride.sampled;
         if constexpr (kSamples == Samples::kMixed) {
           step.shows_volume = true;
           if (fields != nullptr) {
-            step.shown = ShownAt(*fields, *work.box, step.place, step.sampled);
+            step.shown = ShownAt(*fields, *work.box, place, step.sampled);
             read = ShowsVolume(step.shown);
             step.shows_volume = !hn::AllFalse(df, read);
           }
         }
-        Voxels::Find(work, step.place, read, packet.bricks, step.found, before.found);
+        Voxels::Find(work, place, read, packet.bricks, step.found, before.found);
       }
       return;
     }
@@ -325,10 +326,10 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   // Their values.
   const auto read = [&](Step<Voxels>& step) SLABSTREAM_INLINED {
     if constexpr (kFields) {
-      step.voxels.Read(*fields, step.place, step.shown, packet.bricks, step.found);
+      step.voxels.Read(*fields, step.cell, step.shown, packet.bricks, step.found);
     } else {
       if (kSamples == Samples::kMixed && !step.shows_volume) return;
-      step.voxels.Read(work, step.place, step.found, packet.bricks);
+      step.voxels.Read(work, step.cell, step.found, packet.bricks);
       if constexpr (std::is_same_v<T, float>) {
         step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
       } else {
@@ -338,11 +339,12 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   };
   // Their looks.
   const auto add = [&](const Step<Voxels>& step) SLABSTREAM_INLINED {
+    const auto place_of = [&]() SLABSTREAM_INLINED { return PlaceSample(packet.among, *work.box, step.k); };
     Classified<kSamples> samples;
     samples.visible = hn::Lt(one, zero);
     const auto transparent = hn::Lt(sums.alpha, opaque);
     if constexpr (!kFields) {
-      if (kSamples != Samples::kMixed || step.shows_volume) ClassifySamples<T, kSamples>(work, step, samples);
+      if (kSamples != Samples::kMixed || step.shows_volume) ClassifySamples<T, kSamples>(work, step, place_of, samples);
       samples.visible = hn::And(samples.visible, transparent);
     }
     [[maybe_unused]] Mixture mixture;
@@ -352,12 +354,13 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
         if constexpr (!kFields) {
           samples.visible = hn::And(samples.visible, ShowsVolume(step.shown));
           if (!hn::AllFalse(df, samples.visible)) {
-            AddSamples<kSamples>(work, step, part, samples, samples.opacity,
+            AddSamples<kSamples>(work, step, place_of, part, samples, samples.opacity,
                                  [&](Mask visible, Floats opacity, auto&& color) HWY_ATTR { mixture.Add(visible, opacity, color); });
           }
         }
         const auto shown = hn::IfThenElseZero(hn::RebindMask(IntTag(), transparent), step.shown);
-        const FieldPlace there = {step.k, step.place, work.light, hn::Lt(step.k, part->face_end), part->face};
+        const SamplePlace of_volume = place_of();
+        const FieldPlace there = {step.k, of_volume, work.light, hn::Lt(step.k, part->face_end), part->face};
         if constexpr (kFields) {
           step.voxels.Mix(*fields, there, shown, packet.among_fields, packet.bricks, mixture);
         } else {
@@ -382,10 +385,10 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
         add_to_sums(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return hn::Mul(mixture.color[channel], straight); });
         if (fields->flat) sums.LimitColors();
       } else if constexpr (!kFields) {
-        AddSamples<kSamples>(work, step, part, samples, opacity, add_to_sums);
+        AddSamples<kSamples>(work, step, place_of, part, samples, opacity, add_to_sums);
       }
     } else {
-      AddSamples<kSamples>(work, step, part, samples, opacity, add_to_sums);
+      AddSamples<kSamples>(work, step, place_of, part, samples, opacity, add_to_sums);
     }
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   };
@@ -397,7 +400,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   }
   Step<Voxels>*next = &steps[0], *found = &steps[1], *known = &steps[2];
   do {
-    place(*next, *found);
+    find(*next, *found);
     if (found->any) read(*found);
     if (known->any) add(*known);
     std::swap(known, found);
@@ -485,28 +488,22 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
 }
 
 template <class T>
-std::uint64_t March(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* HWY_RESTRICT rgba,
-                    std::size_t floats_a_row) {
-  if (work.fields != nullptr) {
-    const std::span<const RayField> fields = work.fields->fields;
-    for (std::size_t i = 0; i < fields.size(); ++i) {
-      if (HasBricks(fields[i])) bricks[i].Enter(fields[i].voxels);
-    }
-  }
-  if constexpr (!std::is_same_v<T, float>) {
-    if (work.look->phong || work.look->by_gradient()) {
-      bricks[0].Enter(*work.box);
-      return MarchPackets<T, LitSamples<T>>(work, tile, bricks.data(), rgba, floats_a_row);
-    }
-  }
-  return MarchPackets<T, StoredSamples<T>>(work, tile, bricks.data(), rgba, floats_a_row);
+std::uint64_t MarchInBricks(const MarchWork& work, const PixelBounds& tile, GradientBricks* bricks, float* rgba, std::size_t floats_a_row) {
+  bricks->Enter(*work.box);
+  return MarchPackets<T, BrickSamples<T>>(work, tile, bricks, rgba, floats_a_row);
 }
 
 std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
                        std::size_t floats_a_row) {
-  if (work.box->type == ScalarType::kUint8) return March<std::uint8_t>(work, tile, bricks, rgba, floats_a_row);
-  if (work.box->type == ScalarType::kUint16) return March<std::uint16_t>(work, tile, bricks, rgba, floats_a_row);
-  return March<float>(work, tile, bricks, rgba, floats_a_row);
+  if (work.fields != nullptr) {
+    const std::span<const RayField> fields = work.fields->fields;
+    for (std::size_t i = 1; i < fields.size(); ++i) bricks[i].Enter(fields[i].voxels);
+  }
+  switch (work.box->type) {
+    case ScalarType::kUint8: return MarchInBricks<std::uint8_t>(work, tile, bricks.data(), rgba, floats_a_row);
+    case ScalarType::kUint16: return MarchInBricks<std::uint16_t>(work, tile, bricks.data(), rgba, floats_a_row);
+    default: return MarchPackets<float, StoredSamples>(work, tile, bricks.data(), rgba, floats_a_row);
+  }
 }
 
 }  // namespace slabstream::HWY_NAMESPACE

@@ -379,25 +379,26 @@ class ReferenceMarch {
             Interpolated(of, p, {0, 0, 1}) - Interpolated(of, p, {0, 0, -1})};
   }
 
-  // Of whole numbers that are lit: eight weights in 2^-14, which sum to 1.
+  // Of whole numbers: eight weights in 2^-14, which sum to 1.
   struct ValueAndGradient {
     float value;
     Float3 gradient;
   };
   ValueAndGradient SampleAt(const Float3& p) const {
-    const bool has_whole_weights = !std::is_same_v<T, float> && (look_.phong || !look_.gradient_factors.empty());
-    return has_whole_weights ? AtWholeWeights(p) : ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)};
+    return std::is_same_v<T, float> ? ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)} : AtWholeWeights(p);
   }
   ValueAndGradient AtWholeWeights(const Float3& p) const {
     const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
-    const auto split = [&](float weight, std::size_t axis, int side) {
-      const float second = std::nearbyint((p[axis] - floor[axis]) * weight);
-      return side == 1 ? second : weight - second;
+    // The part of a weight that is for one of two sides. Shares are whole numbers of 2^-15, but along x of 2^-14.
+    const auto split = [&](int weight, std::size_t axis, int side) {
+      const int upper = (weight * int(std::nearbyint((p[axis] - floor[axis]) * 32767.0F)) + 16384) >> 15;
+      return side == 1 ? upper : weight - upper;
     };
+    const int second = int(std::nearbyint((p[0] - floor[0]) * 16384.0F));
     double sums[4] = {};
     for (int corner = 0; corner < 8; ++corner) {
       const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
-      const auto weight = double(split(split(split(16384, 2, dz), 1, dy), 0, dx));
+      const double weight = split(split(dx == 1 ? second : 16384 - second, 1, dy), 2, dz);
       const std::array<double, 4> voxel =
           VoxelAndGradient(std::int32_t(floor[0]) + dx, std::int32_t(floor[1]) + dy, std::int32_t(floor[2]) + dz);
       for (std::size_t i = 0; i < 4; ++i) sums[i] += weight / 16384 * voxel[i];
