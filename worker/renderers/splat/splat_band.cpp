@@ -219,9 +219,10 @@ void SplatBand::FindNeeded(const SliceSamples& slice) {
     SegmentWord* needed = &needed_[BeamWord(beam)];
     SegmentWord any = 0;
     for (std::int32_t word = 0; word < words_; ++word) {
+      const SegmentWord owned = owned_[std::size_t(word)];
       SegmentWord open = 0;
-      for (std::int32_t row = reached.begin; row < reached.end; ++row) open |= Open(row)[word];
-      any |= needed[word] = open & owned_[std::size_t(word)];
+      for (std::int32_t row = reached.begin; row < reached.end && open != owned; ++row) open |= Open(row)[word] & owned;
+      any |= needed[word] = open;
     }
     if (any != 0) FindOctets(beam);
   }

@@ -16,7 +16,10 @@ namespace {
 constexpr std::int32_t kBandRows = 64;
 
 void RenderBand(const SplatPass& pass, std::int32_t y_begin, const RenderControl& control, LocalImage& image, RankReport& report) {
-  SplatBand band(pass, y_begin, std::min(y_begin + kBandRows, pass.bounds.y_end), image, report);
+  const std::int32_t y_end = std::min(y_begin + kBandRows, pass.bounds.y_end);
+  const auto pixel = [&](std::int32_t y) { return std::size_t(y - pass.bounds.y_begin) * std::size_t(pass.bounds.width()); };
+  MakeEmpty(image, pixel(y_begin), pixel(y_end));
+  SplatBand band(pass, y_begin, y_end, image, report);
   const Axis c = pass.cells.axes.c;
   const std::int32_t first = pass.cells.occupied.begin[c], last = pass.cells.occupied.end[c];
   const std::int32_t begin = pass.shapes == nullptr ? first : pass.box.begin[c], end = pass.shapes == nullptr ? last : pass.box.end[c];
@@ -46,7 +49,7 @@ class SplattingRenderer : public Renderer {
     LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
     if (!cells.occupied.empty() || data.shapes() != nullptr) {
       const SplatPass pass(cells, table, setup, box, hidden, data.light(), data.shapes());
-      if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
+      if (!hidden.HidesAll(pass.bounds)) image = MakeUnwrittenImage(PixelFormat::kRgba, pass.bounds);  // bands write it
       clock.Charge(Stage::kTransform);
       const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;
       std::vector<RankReport> parts(static_cast<std::size_t>(bands));
