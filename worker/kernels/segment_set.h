@@ -48,10 +48,11 @@ struct SegmentSpan {
   std::uint32_t word = 0;
   SegmentWord first = 0, second = 0;
 };
+// Of segments [begin, end), begin < end.
 constexpr SegmentSpan MakeSpan(std::int32_t begin, std::int32_t end) {
-  const std::int32_t word = begin / kWordSegments, origin = word * kWordSegments;
-  return {std::uint32_t(word), WordBits(begin - origin, std::min(end - origin, kWordSegments)),
-          end - origin > kWordSegments ? WordBits(0, end - origin - kWordSegments) : 0};
+  const auto shift = std::uint32_t(begin) % std::uint32_t{kWordSegments};
+  const SegmentWord bits = ~SegmentWord{0} >> (kWordSegments - (end - begin));
+  return {std::uint32_t(begin) / std::uint32_t{kWordSegments}, bits << shift, bits >> 1 >> (kWordSegments - 1 - shift)};
 }
 
 // `set` has one word more than the row.

@@ -120,6 +120,17 @@ std::vector<SegmentWord> RandomSegments(std::int32_t words, std::mt19937& random
 }
 bool Holds(const std::vector<SegmentWord>& set, std::int32_t segment) { return AnyOf(set.data(), segment, segment + 1); }
 
+TEST(SegmentSpan, IsTheSetOfItsSegments) {
+  for (std::int32_t begin = 0; begin < 2 * kWordSegments; ++begin) {
+    for (std::int32_t end = begin + 1; end <= begin + kWordSegments; ++end) {
+      std::vector<SegmentWord> expected(4), got(4);
+      Insert(expected.data(), begin, end);
+      Insert(got.data(), MakeSpan(begin, end));
+      ASSERT_EQ(got, expected) << begin << " ... " << end;
+    }
+  }
+}
+
 constexpr std::int32_t kWords = 3, kRowPixels = kWords * kWordSegments * kSegment;
 
 TEST(FilterBeam, AgreesWithTheReference) {

@@ -236,7 +236,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
   // Cells of the occupied box: there is nothing before them.
   const std::uint32_t* masks = cells.Masks(number) + (pass_.first_octet / kCellOctets - cells.first_cell);
   const VoxelRecord* record = &cells.records[cells.first_record[number]];
-  const SegmentSpan* reached = pass_.Reached(slice_);
+  const OctetReach* const reached = pass_.Reached(slice_);
   const SegmentWord* needed = &needed_[BeamWord(beam)];
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
@@ -249,9 +249,11 @@ void SplatBand::FindOctets(std::int32_t beam) {
       const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & ((1U << kOctet) - 1);
       const VoxelRecord* records = record;
       record += kOctetCount[occupied];
-      if (!AnyOf(needed, reached[octet])) continue;
+      if (!AnyOf(needed, reached[octet].whole)) continue;
+      const SegmentSpan span = reached[octet].Of(occupied);
+      if (!AnyOf(needed, span)) continue;
       __builtin_prefetch(records);  // used for shading only after the slice's other octets
-      Insert(filled, reached[octet]);
+      Insert(filled, span);
       octets_.push_back(
           {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
       if (clipped_ || pass_.light) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});

@@ -32,19 +32,24 @@ SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const Classification
 
   first_octet = occupied.begin[u] / kCellVoxels * kCellOctets;
   octet_count = ((occupied.end[u] - 1) / kCellVoxels + 1) * kCellOctets - first_octet;
+  static_assert(kMaxGridSide / kSegment <= UINT16_MAX);
   reached.resize(slices.size() * std::size_t(octet_count));
-  SegmentSpan* span = reached.data();
-  constexpr std::int64_t kOctetStride = std::int64_t{kOctet} << 32;
+  OctetReach* reach = reached.data();
+  constexpr std::int64_t kPairStride = std::int64_t{2} << 32;
   for (const SliceSamples& slice : slices) {
     const PixelBounds& owned = slice.owned;
-    // For each octet: the first pixel with a tap in it, and the first one beyond it.
-    FirstSamples first(slice.columns, std::int64_t{first_octet * kOctet - slice.along_u->taps + 1} << 32, kOctetStride);
-    FirstSamples last(slice.columns, std::int64_t{(first_octet + 1) * kOctet} << 32, kOctetStride);
-    for (std::int32_t octet = 0; octet < octet_count; ++octet, ++span, first.Next(), last.Next()) {
+    // For each pair of voxels: the first pixel with a tap in it, and the first one beyond it.
+    FirstSamples first(slice.columns, std::int64_t{first_octet * kOctet - slice.along_u->taps + 1} << 32, kPairStride);
+    FirstSamples last(slice.columns, std::int64_t{first_octet * kOctet + 2} << 32, kPairStride);
+    for (std::int32_t octet = 0; octet < octet_count; ++octet, ++reach) {
       if (owned.empty()) continue;
-      const std::int32_t begin = first.In(owned.x_begin, owned.x_end) - bounds.x_begin;
-      const std::int32_t end = last.In(owned.x_begin, owned.x_end) - bounds.x_begin;
-      if (begin < end) *span = MakeSpan(begin / kSegment, (end + kSegment - 1) / kSegment);
+      for (std::size_t pair = 0; pair < reach->begin.size(); ++pair, first.Next(), last.Next()) {
+        const std::int32_t begin = first.In(owned.x_begin, owned.x_end), end = last.In(owned.x_begin, owned.x_end);
+        // A pair beside the owned pixels ends where it begins, also within a segment that others share.
+        reach->begin[pair] = std::uint16_t((begin - bounds.x_begin + (begin < owned.x_end ? 0 : kSegment - 1)) / kSegment);
+        reach->end[pair] = std::uint16_t((end - bounds.x_begin + (end > owned.x_begin ? kSegment - 1 : 0)) / kSegment);
+      }
+      reach->whole = reach->Of(0xFF);
     }
   }
 }

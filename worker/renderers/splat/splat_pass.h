@@ -2,6 +2,8 @@
 // bounds.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -17,14 +19,27 @@
 
 namespace slabstream {
 
+// The segments that an octet of a beam reaches and the box owns, counted from the image's left border.
+struct OctetReach {
+  SegmentSpan whole;  // if all of its voxels are occupied; empty: none
+  // By pair of its voxels. Those of a part of the octet: from `begin` of its first pair to `end` of its last one.
+  std::array<std::uint16_t, std::size_t{kOctet / 2}> begin{}, end{};
+
+  // `occupied`: bit i: voxel i; not 0.
+  SegmentSpan Of(std::uint32_t occupied) const {
+    const std::int32_t from = begin[std::size_t(std::countr_zero(occupied) / 2)], to = end[std::size_t((std::bit_width(occupied) - 1) / 2)];
+    return from < to ? MakeSpan(from, to) : SegmentSpan{};
+  }
+};
+
 struct SplatPass {
   // `frame_light`, `frame_shapes`: null: there are none.
   SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& own_box,
             const OcclusionMask& hidden_tiles, const FrameLight* frame_light = nullptr, const FrameShapes* frame_shapes = nullptr);
 
   const SliceSamples& Slice(std::int32_t k) const { return slices[std::size_t(k - cells.occupied.begin[cells.axes.c])]; }
-  // By octet of a beam, from first_octet on: the segments that its voxels reach and the box owns, counted from the image's left border.
-  const SegmentSpan* Reached(std::int32_t k) const {
+  // By octet of a beam, from first_octet on.
+  const OctetReach* Reached(std::int32_t k) const {
     return &reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count)];
   }
 
@@ -42,7 +57,7 @@ struct SplatPass {
   std::vector<SliceSamples> slices;               // the samples of the occupied slices
   PixelBounds bounds;                             // the image's pixels, in whole segments; empty if nothing shows
   std::int32_t first_octet = 0, octet_count = 0;  // octets of whole cells
-  std::vector<SegmentSpan> reached;               // [slice][octet]
+  std::vector<OctetReach> reached;                // [slice][octet]
 };
 
 }  // namespace slabstream
