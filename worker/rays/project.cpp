@@ -211,40 +211,99 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
   return true;
 }
 
+// Sums of 24-bit values, byte by byte.
+struct ByteSums {
+  Ints high, middle, low, count;
+
+  HWY_INLINE void Add(Ints fixed, Ints samples) {
+    const auto byte = SetInt(0xFF);
+    high = hn::Add(high, hn::Mul(hn::ShiftRight<16>(fixed), samples));
+    middle = hn::Add(middle, hn::Mul(hn::And(hn::ShiftRight<8>(fixed), byte), samples));
+    low = hn::Add(low, hn::Mul(hn::And(fixed, byte), samples));
+    count = hn::Add(count, samples);
+  }
+};
+HWY_INLINE Ints FixedOf(const ProjectWork& work, Floats samples) {
+  return hn::Min(hn::ConvertTo(IntTag(), hn::Mul(ValueOf(work, samples), Set(0x1p24F))), SetInt(0xFFFFFF));
+}
+
+// The value of all samples of a cell or block, where they have the same.
+struct CommonValue {
+  Ints fixed;
+  Mask common;
+};
+HWY_INLINE CommonValue CommonValueOf(const ProjectWork& work, const std::vector<float>& bounds, const std::vector<float>& opposite,
+                                     Ints cell) {
+  const FloatTag df;
+  const auto fixed = FixedOf(work, hn::Mul(Set(work.sign), hn::GatherIndex(df, bounds.data(), cell)));
+  const auto other = FixedOf(work, hn::Mul(Set(-work.sign), hn::GatherIndex(df, opposite.data(), cell)));
+  return {fixed, hn::RebindMask(df, hn::Eq(fixed, other))};
+}
+
+// Rays of a packet go on together: over whole blocks and cells where the samples of each have one value, or by one sample.
 template <class T, bool kNearest, bool kStretched>
-HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, Floats ray_ends, float* HWY_RESTRICT pixels) {
+HWY_INLINE void SumSamples(const ProjectWork& work, const RayPacket& among, const SampleInterval& owned, ByteSums& sums) {
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
-  const auto [among, whole] = RaysAmongVoxels(work, packet, ray_ends);
-  Ints high = hn::Zero(di), middle = high, low = high, count = high;
-  const auto byte = SetInt(0xFF), one = SetInt(1);
-  const auto sum = [&](const SampleInterval& owned) HWY_ATTR {
-    const auto some = hn::Lt(owned.begin, owned.end);
-    const float begin = hn::GetLane(hn::MinOfLanes(df, hn::IfThenElse(some, owned.begin, Set(kRayEnd))));
-    const float end = hn::GetLane(hn::MaxOfLanes(df, hn::IfThenElse(some, owned.end, Set(-kRayEnd))));
-    for (float k = begin; k < end; k += 1) {
-      const auto sample = Set(k);
-      const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceAt<kStretched>(among, box, sample), active);
-      const auto valid = hn::RebindMask(di, samples.valid);
-      const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
-      const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));
-      high = hn::Add(high, hn::ShiftRight<16>(fixed));
-      middle = hn::Add(middle, hn::And(hn::ShiftRight<8>(fixed), byte));
-      low = hn::Add(low, hn::And(fixed, byte));
-      count = hn::Add(count, hn::IfThenElseZero(valid, one));
+  const SampleBounds &bounds = *work.bounds, &opposite = *work.opposite;
+  const LeapScales leaps = LeapScalesOf(among);
+  const auto some = hn::Lt(owned.begin, owned.end);
+  const float end = hn::GetLane(hn::MaxOfLanes(df, hn::IfThenElse(some, owned.end, Set(-kRayEnd))));
+  float k = hn::GetLane(hn::MinOfLanes(df, hn::IfThenElse(some, owned.begin, Set(kRayEnd))));
+  for (int blind = 0; k < end;) {
+    const auto sample = Set(k);
+    const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
+    const SamplePlace place = PlaceAt<kStretched>(among, box, sample);
+    // `steps`: to leave the cell. Rays that begin later wait until they do.
+    const auto leap = [&](const CommonValue& value, Floats steps) HWY_ATTR {
+      const auto later = hn::And(some, hn::Lt(sample, owned.begin));
+      const auto limited = hn::IfThenElse(active, steps, hn::IfThenElse(later, hn::Sub(owned.begin, sample), Set(kRayEnd)));
+      const float next = k + hn::GetLane(hn::MinOfLanes(df, limited));
+      const auto samples = hn::IfThenElseZero(active, hn::Sub(hn::Min(owned.end, Set(next)), sample));
+      sums.Add(value.fixed, hn::ConvertTo(di, samples));
+      k = next;
+    };
+    const auto leaps_over = [&](const CommonValue& value) HWY_ATTR { return hn::AllTrue(df, hn::Or(hn::Not(active), value.common)); };
+    // What is interpolated between voxels that are not finite is not within bounds.
+    if (std::is_integral_v<T> && blind-- <= 0) {
+      const auto block = CommonValueOf(work, bounds.blocks, opposite.blocks, CellOf<kBlockShift>(place, bounds.block_counts, active));
+      if (leaps_over(block)) {
+        leap(block, StepsToLeave<kStretched, kBlockShift>(box, leaps, place));
+        continue;
+      }
+      const auto cell = CommonValueOf(work, bounds.cells, opposite.cells, CellOf<kCellShift>(place, box.cells, active));
+      if (leaps_over(cell)) {
+        leap(cell, StepsToLeave<kStretched, kCellShift>(box, leaps, place));
+        continue;
+      }
+      blind = 3;
     }
-  };
+    const ProjectedSamples samples = SamplesAt<T, kNearest>(box, place, active);
+    const auto valid = hn::RebindMask(di, samples.valid);
+    sums.Add(FixedOf(work, samples.values), hn::IfThenElseZero(valid, SetInt(1)));
+    k += 1;
+  }
+}
+
+// Not inlined: the loop of extremes beside it would be slower.
+template <class T, bool kNearest, bool kStretched>
+HWY_NOINLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, Floats ray_ends, float* HWY_RESTRICT pixels) {
+  const FloatTag df;
+  const IntTag di;
+  const auto [among, whole] = RaysAmongVoxels(work, packet, ray_ends);
+  const auto zero = hn::Zero(di);
+  ByteSums sums = {zero, zero, zero, zero};
   if (work.rays->clip.empty()) {
-    sum(whole);
+    SumSamples<T, kNearest, kStretched>(work, among, whole, sums);
   } else {
     PacketPart parts[2];
     PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) sum(part.Of(whole));
+    for (const PacketPart& part : parts) SumSamples<T, kNearest, kStretched>(work, among, part.Of(whole), sums);
   }
-  if (hn::AllTrue(di, hn::Eq(count, hn::Zero(di)))) return false;
-  hn::StoreInterleaved4(hn::ConvertTo(df, high), hn::ConvertTo(df, middle), hn::ConvertTo(df, low), hn::ConvertTo(df, count), df, pixels);
+  if (hn::AllTrue(di, hn::Eq(sums.count, zero))) return false;
+  hn::StoreInterleaved4(hn::ConvertTo(df, sums.high), hn::ConvertTo(df, sums.middle), hn::ConvertTo(df, sums.low),
+                        hn::ConvertTo(df, sums.count), df, pixels);
   return true;
 }
 
@@ -259,8 +318,8 @@ HWY_INLINE void ProjectPackets(const ProjectWork& work, const PixelBounds& tile,
                   if (has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes)) {
                     ends = hn::Load(FloatTag(), shapes.ends.data());
                   }
-                  return work.bounds != nullptr ? ExtremeOfPacket<T, kNearest, kStretched>(work, packet, ends, hint, result)
-                                                : SumOfPacket<T, kNearest, kStretched>(work, packet, ends, result);
+                  return work.opposite == nullptr ? ExtremeOfPacket<T, kNearest, kStretched>(work, packet, ends, hint, result)
+                                                  : SumOfPacket<T, kNearest, kStretched>(work, packet, ends, result);
                 });
 }
 

@@ -47,18 +47,19 @@ struct ProjectWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
   const FieldMap* field = nullptr;       // the box's voxels are those of another field of the frame, which lies so; null: the volume's
-  const SampleBounds* bounds = nullptr;  // for the same sign; null for a sum
+  const SampleBounds* bounds = nullptr;  // for the same sign
   float sign = 1;                        // 1: the largest sample; -1: the least
   ValueScale values;
-  bool complement = false;               // store 1 - value, which is largest for the least value
-  bool nearest = false;                  // samples are those of the nearest voxel, not interpolated
-  const ShapeTile* shapes = nullptr;     // that holds the tile's pixels: rays end where it is opaque; null: nowhere
-  const FragmentOrder* order = nullptr;  // of the frame, if there are shapes
+  bool complement = false;                 // store 1 - value, which is largest for the least value
+  bool nearest = false;                    // samples are those of the nearest voxel, not interpolated
+  const ShapeTile* shapes = nullptr;       // that holds the tile's pixels: rays end where it is opaque; null: nowhere
+  const FragmentOrder* order = nullptr;    // of the frame, if there are shapes
+  const SampleBounds* opposite = nullptr;  // bounds for the other sign: the sum is wanted; null: the extreme
 };
 
 // Four floats a pixel of `tile`; `pixels` points to the first pixel's. Pixels without a sample may stay unwritten: they must be 0 before.
-//   bounds given: (value of the extreme sample, or 1 - value, 0, 0, 1)
-//   null:         the sums over all samples of the bytes of floor(value * 2^24), at most 2^24 - 1, highest first, and their number
+//   the extreme: (value of the extreme sample, or 1 - value, 0, 0, 1)
+//   the sum:     the sums over all samples of the bytes of floor(value * 2^24), at most 2^24 - 1, highest first, and their number
 void ProjectTile(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row);
 
 }  // namespace slabstream

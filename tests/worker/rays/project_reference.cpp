@@ -79,7 +79,7 @@ std::array<float, 4> Pixel(const ProjectWork& work, std::int32_t x, std::int32_t
     sums[3] += 1;
   }
   if (!found) return {};
-  if (work.bounds == nullptr) return sums;
+  if (work.opposite != nullptr) return sums;
   const float value = value_of(work.sign * best);
   return {work.complement ? 1 - value : value, 0, 0, 1};
 }

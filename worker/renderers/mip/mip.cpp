@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <vector>
 
 #include "common/renderers/mip/projection_mode.h"
+#include "worker/rays/bounds_cache.h"
 #include "worker/rays/project.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/rays/stretch_tables.h"
@@ -16,33 +16,11 @@
 namespace slabstream::mip {
 namespace {
 
-// Bounds of a padded box's cells, by piece.
-class BoundsCache : public BoxCache {
- public:
-  const std::vector<SampleBounds>& Of(const std::vector<RayPiece>& pieces, float sign) {
-    std::vector<SampleBounds>& bounds = by_sign_[sign > 0 ? 1 : 0];
-    if (bounds.empty()) {
-      for (const RayPiece& piece : pieces) bounds.push_back(BoundSamples(piece.cells, sign));
-    }
-    return bounds;
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = 0;
-    for (const auto& bounds : by_sign_) {
-      for (const SampleBounds& piece : bounds) total += piece.bytes();
-    }
-    return total;
-  }
-
- private:
-  std::array<std::vector<SampleBounds>, 2> by_sign_;
-};
-
 // A field as it is projected: the volume, or another field.
 struct Projected {
   const std::vector<RayPiece>* pieces = nullptr;
-  const std::vector<SampleBounds>* bounds = nullptr;  // null: of the mean
+  const std::vector<SampleBounds>* bounds = nullptr;
+  const std::vector<SampleBounds>* opposite = nullptr;  // of the mean alone
   float sign = 1;
   ValueScale values;
   std::optional<FieldMap> map = {};  // of another field
@@ -55,7 +33,8 @@ Projected ProjectedFrom(BoxData& data, const TransferFunction& transfer, const V
   Projected field = {.pieces = &data.CacheOf<RayVolume>().PiecesOf(data),
                      .sign = largest ? 1.0F : -1.0F,
                      .values = MakeValueScale(least, largest_value, mapping)};
-  if (mode != ProjectionMode::kMean) field.bounds = &data.CacheOf<BoundsCache>().Of(*field.pieces, field.sign);
+  field.bounds = &data.CacheOf<BoundsCache>().Of(*field.pieces, field.sign);
+  if (mode == ProjectionMode::kMean) field.opposite = &data.CacheOf<BoundsCache>().Of(*field.pieces, -field.sign);
   return field;
 }
 
@@ -78,13 +57,14 @@ class MipRenderer : public Renderer {
       return ProjectWork{.rays = &rays,
                          .box = &box,
                          .field = field.map ? &*field.map : nullptr,
-                         .bounds = field.bounds == nullptr ? nullptr : &(*field.bounds)[piece],
+                         .bounds = &(*field.bounds)[piece],
                          .sign = field.sign,
                          .values = field.values,
                          .complement = mode == ProjectionMode::kMinimum,
                          .nearest = TakesNearestVoxel(setup),
                          .shapes = TileOf(data.shapes(), tile),
-                         .order = &order};
+                         .order = &order,
+                         .opposite = field.opposite == nullptr ? nullptr : &(*field.opposite)[piece]};
     };
     LocalImage image = RenderPieces(
         *volume.pieces, {at, setup, rays, hidden, control, report, stretch ? &*stretch : nullptr},

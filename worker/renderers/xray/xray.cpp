@@ -1,6 +1,7 @@
 // The pixel half of radiographs: sums of attenuation along each ray, as shares of that of the volume's largest value. docs/rendering.md
 // defines them.
 #include "common/renderers/xray/attenuation.h"
+#include "worker/rays/bounds_cache.h"
 #include "worker/rays/project.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/renderers/renderer.h"
@@ -15,6 +16,8 @@ class XrayRenderer : public Renderer {
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
+    BoundsCache& bounds = data.CacheOf<BoundsCache>();
+    const std::vector<SampleBounds>&most = bounds.Of(pieces, 1), &least = bounds.Of(pieces, -1);
     clock.Charge(Stage::kPrepare);
 
     const VolumeDescription& volume = setup.description;
@@ -23,10 +26,17 @@ class XrayRenderer : public Renderer {
     const FragmentOrder order(setup);
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
-        [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
+        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
             std::size_t floats_a_row) {
           const ShapeTile* const shapes = TileOf(data.shapes(), tile);
-          ProjectTile({.rays = &rays, .box = &ray_box, .values = values, .shapes = shapes, .order = &order}, tile, pixels, floats_a_row);
+          ProjectTile({.rays = &rays,
+                       .box = &ray_box,
+                       .bounds = &most[piece],
+                       .values = values,
+                       .shapes = shapes,
+                       .order = &order,
+                       .opposite = &least[piece]},
+                      tile, pixels, floats_a_row);
         });
     return clock.Finish(std::move(image), control);
   }

@@ -1,7 +1,9 @@
 // The kernel of intensity projections: bit for bit its definition on every instruction set, and the same for every partition.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
+#include <utility>
 
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"
@@ -23,9 +25,10 @@ struct Scene {
         padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
         cells(FindMacrocellRanges(padded)),
         ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)),
-        bounds(BoundSamples(cells, mode == Mode::kMinimum ? -1 : 1)) {
-    work = {.rays = &rays, .box = &ray_box, .values = {10, 1.0F / 180}};
-    if (mode != Mode::kMean) work.bounds = &bounds;
+        bounds(BoundSamples(cells, mode == Mode::kMinimum ? -1 : 1)),
+        opposite(BoundSamples(cells, mode == Mode::kMinimum ? 1 : -1)) {
+    work = {.rays = &rays, .box = &ray_box, .bounds = &bounds, .values = {10, 1.0F / 180}};
+    if (mode == Mode::kMean) work.opposite = &opposite;
     if (mode == Mode::kMinimum) work.sign = -1, work.complement = true;
   }
 
@@ -41,7 +44,7 @@ struct Scene {
   PaddedVoxels padded;
   MacrocellRanges cells;
   RayBox ray_box;
-  SampleBounds bounds;
+  SampleBounds bounds, opposite;
   ProjectWork work;
 };
 
@@ -91,6 +94,30 @@ TEST(ProjectTile, BoxesCombineToTheImageOfTheWholeBitForBit) {
       }
       EXPECT_TRUE(combined.rgba == whole.rgba) << "case " << i << " mode " << int(mode);
     }
+  }
+}
+
+// Sums leap over blocks and cells of one value, be it black, white or between, and stop at what lies beside them.
+TEST(ProjectTile, SumsAcrossUniformPartsAreTheReferenceBitForBit) {
+  const unsigned seed = 93;
+  std::mt19937 random(seed);
+  for (int i = 0; i < 8; ++i) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed << " case " << i);
+    const Index3 size = {70, 52, 61};
+    const std::array<double, 4> parts = {5, 195, 100, -1};  // by half of x and of y; -1: noise
+    const Volume volume = MakeVolume({size, {1, 1, 1.3}}, i / 2 % 2 == 0 ? ScalarType::kUint8 : ScalarType::kUint16, [&](const Index3& v) {
+      const double part = parts[std::size_t(v.x >= 37) + 2 * std::size_t(v.y >= 20)];
+      return part >= 0 ? part : double(random() % 200);
+    });
+    const ViewParameters view = RandomView(i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, random);
+    const Camera camera = MakeCamera(view, {51, 46}, volume.description.geometry);
+    Scene scene(volume, volume.block.box, camera, i < 4 ? 1 : 2.5, Mode::kMean);
+    if (i % 4 >= 2) {  // as where data values fall as stored samples rise
+      scene.work.sign = -1;
+      std::swap(scene.work.bounds, scene.work.opposite);
+    }
+    const LocalImage expected = scene.Projected(true);
+    ForEachTarget([&] { EXPECT_TRUE(scene.Projected().rgba == expected.rgba); });
   }
 }
 
