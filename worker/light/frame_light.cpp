@@ -1,6 +1,7 @@
 #include "worker/light/frame_light.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <mutex>
 #include <optional>
@@ -12,13 +13,12 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
 #include "worker/light/occlusion.h"
+#include "worker/light/pack_shares.h"
 #include "worker/light/shape_extinction.h"
 #include "worker/light/transmittance.h"
 
 namespace slabstream {
 namespace {
-
-using Bytes255 = UnwrittenVector<std::uint8_t>;
 
 // What an Extinction is made from.
 struct MatterKey {
@@ -86,12 +86,15 @@ class Matter {
     FindOpen(shading);
     Bytes255 reached(shading.shadows > 0 ? extinction_->each.size() : 0);
     for (std::size_t i = 0; i < lit.lights.size(); ++i) {
+      int fast = light->fast;  // of `reached`
       if (shading.shadows > 0) {
         const Vec3& to_light = lit.lights[i];
-        if (SweepsAlongX(*extinction_, to_light) && turned_.each.empty()) turned_ = Turned(*extinction_);
-        FindTransmittance(*extinction_, turned_, to_light, shading.shadows, reached.data());
+        fast = SweepsAlongX(*extinction_, to_light) ? 1 : 0;
+        std::optional<LightRows>& rows = rows_[std::size_t(fast)];
+        if (!rows) rows = fast == 1 ? RowsAlongY(*extinction_) : RowsAlongX(*extinction_);
+        FindTransmittance(*extinction_, *rows, to_light, shading.shadows, reached.data());
       }
-      Pack(reached, i, *light);
+      PackShares(OpenAlong(light->fast), reached, fast, i, *light);
     }
     made_.Put(lit, light);
     made_.DropBeyond(kMostMade);
@@ -106,6 +109,7 @@ class Matter {
     const std::pair wanted(shading.ambient_occlusion, shading.occlusion_radius);
     if (open_of_ == wanted) return;
     open_.clear();
+    open_along_y_.clear();
     open_of_ = wanted;
     if (!(shading.ambient_occlusion > 0)) return;
     const Vec3 sides = ToVec3(extinction_->size) * extinction_->spacing;
@@ -114,46 +118,23 @@ class Matter {
     FindOpenness(*extinction_, shading.occlusion_radius * std::max({sides.x, sides.y, sides.z}),
                  [&](std::size_t first, std::span<const float> row) {
                    std::ranges::transform(row, open_.begin() + std::ptrdiff_t(first), [strength](float open) {
-                     return std::uint8_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F);
+                     return std::uint8_t(std::int32_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F));
                    });
                  });
   }
 
-  // `reached`: empty: all of the light.
-  void Pack(const Bytes255& reached, std::size_t number, FrameLight& light) const {
-    const Index3& size = light.size;
-    const Bytes255 all(std::size_t(size.x), 255);
-    const auto row_of = [&](const Bytes255& shares, std::size_t voxel) { return shares.empty() ? all.data() : shares.data() + voxel; };
-    ParallelFor(0, size.z + 1, [&](std::int32_t z) {
-      std::uint8_t* const slice = light.shares.data() + number * std::size_t(light.light) + std::ptrdiff_t{z} * light.stride[2];
-      for (std::int32_t y = 0; y <= size.y; ++y) {
-        const std::size_t row = NumberIn(size, {0, std::min(y, size.y - 1), std::min(z, size.z - 1)});
-        const std::uint8_t *const open = row_of(open_, row), *const through = row_of(reached, row);
-        std::uint8_t* out = slice + std::ptrdiff_t{y} * light.stride[1];
-        if (light.fast == 0) {
-          for (std::int32_t x = 0; x < size.x; ++x) {
-            out[2 * x] = open[x];
-            out[2 * x + 1] = through[x];
-          }
-          out += 2 * size.x;
-        } else {
-          for (std::int32_t x = 0; x < size.x; ++x, out += light.stride[0]) {
-            out[0] = open[x];
-            out[1] = through[x];
-          }
-        }
-        out[0] = open[size.x - 1];
-        out[1] = through[size.x - 1];
-      }
-    });
+  const Bytes255& OpenAlong(int fast) {
+    if (fast == 0 || open_.empty()) return open_;
+    if (open_along_y_.empty()) open_along_y_ = TurnedBytes(open_, extinction_->size);
+    return open_along_y_;
   }
 
   const MatterKey key_;
   std::mutex mutex_;
   std::optional<Extinction> extinction_;
-  TurnedExtinction turned_;
+  std::array<std::optional<LightRows>, 2> rows_;  // along x and y
   std::optional<std::pair<float, float>> open_of_;
-  Bytes255 open_;  // empty: all is open
+  Bytes255 open_, open_along_y_;  // the latter as it is asked for; empty: all is open
   LruMap<Lit, std::shared_ptr<const FrameLight>> made_;
 };
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
@@ -21,7 +22,8 @@ namespace slabstream {
 // Rays are numbered (a, b) in the first plane, where ray (a, b) meets voxel (a, b) of the plane's axes u and v. In plane k, from the light
 // on, it is at (a + k * shift_u, b + k * shift_v).
 struct Sweep {
-  const float* each = nullptr;  // extinction
+  const float* each = nullptr;          // extinction
+  const MatterRange* matter = nullptr;  // LightRows
   std::int32_t nu = 0, nv = 0, planes = 0;
   std::ptrdiff_t row = 0, plane = 0;  // voxels from one to the next along v, and away from the light
   std::ptrdiff_t first = 0;           // voxel (0, 0) of the plane nearest to the light
@@ -29,12 +31,23 @@ struct Sweep {
   float step = 1;  // length of a ray between two planes
   float strength = 1;
   std::uint8_t* out = nullptr;  // laid out like `each`
+
+  std::ptrdiff_t RowAt(std::int32_t plane_number, std::int32_t v) const { return first + plane_number * plane + v * row; }
+  MatterRange MatterOf(std::int32_t plane_number, std::int32_t v) const {
+    return v < 0 || v >= nv ? MatterRange{} : matter[RowAt(plane_number, v) / nu];
+  }
 };
 
 inline constexpr std::int32_t kBandRays = 16;  // rows of rays that a task follows: their transmittances stay in the cache
 inline constexpr std::int32_t kMargin = 16;    // floats beside a row, which whole registers may touch
 
 inline std::int32_t Floor(double x) { return std::int32_t(std::floor(x)); }
+
+inline MatterRange Hull(const MatterRange& a, const MatterRange& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  return {std::min(a.begin, b.begin), std::max(a.end, b.end)};
+}
 
 }  // namespace slabstream
 #endif
@@ -55,16 +68,22 @@ void FollowBand(const Sweep& s, std::int32_t b_begin, std::int32_t b_end) {
   const std::ptrdiff_t ray_row = (a_end - a_begin + 2 * kMargin + 15) / 16 * 16;
   AlignedVector<float> rays(std::size_t(ray_row) * std::size_t(b_end - b_begin + 1), 1.0F);
   const auto ray = [&](std::int32_t b) { return rays.data() + std::ptrdiff_t(b - b_begin) * ray_row + kMargin - a_begin; };
+  // Of each row of rays, those that have met matter: the others transmit exactly 1.
+  std::vector<MatterRange> shaded(std::size_t(b_end - b_begin + 1));
   // What a step through two neighbouring rows of voxels transmits; 1 beside the volume.
   const std::ptrdiff_t voxel_row = (s.nu + 2 * kMargin + 15) / 16 * 16;
   AlignedVector<float> matter(2 * std::size_t(voxel_row), 1.0F);
   const auto load_row = [&](std::int32_t k, std::int32_t j, float* row) HWY_ATTR {
-    if (j < 0 || j >= s.nv) return std::fill_n(row, s.nu, 1.0F), void();
-    const float* each = s.each + s.first + k * s.plane + j * s.row;
-    std::ptrdiff_t i = 0;
+    std::fill_n(row, s.nu, 1.0F);
+    const MatterRange range = s.MatterOf(k, j);
+    if (range.empty()) return;
+    const float* each = s.each + s.RowAt(k, j);
+    std::ptrdiff_t i = range.begin / lanes * lanes;
     const auto length = set(s.step);
-    for (; i + lanes <= s.nu; i += lanes) hn::StoreU(ExpOfMinus(hn::Mul(hn::LoadU(d, each + i), length)), d, row + i);
-    if (i < s.nu) {
+    for (; i < range.end && i + lanes <= s.nu; i += lanes) {
+      hn::StoreU(ExpOfMinus(hn::Mul(hn::LoadU(d, each + i), length)), d, row + i);
+    }
+    if (i < range.end) {
       HWY_ALIGN float rest[16] = {};
       std::copy_n(each + i, s.nu - i, rest);
       hn::Store(ExpOfMinus(hn::Mul(hn::Load(d, rest), length)), d, rest);
@@ -81,7 +100,8 @@ void FollowBand(const Sweep& s, std::int32_t b_begin, std::int32_t b_end) {
     std::int32_t held = -2;  // the row in `above`
     for (std::int32_t b = b_begin; b <= b_end; ++b) {
       const std::int32_t j = b + floor_v;
-      if (j < -1 || j >= s.nv) continue;
+      const MatterRange range = Hull(s.MatterOf(k, j), s.MatterOf(k, j + 1));
+      if (range.empty()) continue;
       if (held == j) {
         std::swap(below, above);
       } else {
@@ -90,32 +110,43 @@ void FollowBand(const Sweep& s, std::int32_t b_begin, std::int32_t b_end) {
       load_row(k, j + 1, above);
       held = j + 1;
       float* to = ray(b) - floor_u;  // by voxel
-      for (std::ptrdiff_t i = -1; i < s.nu; i += lanes) {
+      for (std::ptrdiff_t i = range.begin / lanes * lanes - 1; i < range.end; i += lanes) {
         const auto first = lerp(t_v, hn::LoadU(d, below + i), hn::LoadU(d, above + i));
         const auto next = lerp(t_v, hn::LoadU(d, below + i + 1), hn::LoadU(d, above + i + 1));
         hn::StoreU(hn::Mul(hn::LoadU(d, to + i), lerp(t_u, first, next)), d, to + i);
       }
+      MatterRange& shaded_rays = shaded[std::size_t(b - b_begin)];
+      shaded_rays = Hull(shaded_rays, {range.begin - 1 - floor_u, range.end - floor_u});
     }
   };
   // Writes the band's voxels of plane k.
   const auto write_plane = [&](std::int32_t k) HWY_ATTR {
+    const hn::Rebind<std::int32_t, decltype(d)> di;
+    const hn::Rebind<std::uint8_t, decltype(d)> db;
     const double at_u = -k * s.shift_u, at_v = -k * s.shift_v;
     const std::int32_t floor_u = Floor(at_u), floor_v = Floor(at_v);
     const auto t_u = float(at_u - floor_u), t_v = float(at_v - floor_v);
     const std::int32_t j_begin = std::max(0, b_begin - floor_v), j_end = std::min(s.nv, b_end - floor_v);
     for (std::int32_t j = j_begin; j < j_end; ++j) {
-      const float *below = ray(j + floor_v) + floor_u, *above = below + ray_row;
-      std::uint8_t* out = s.out + s.first + k * s.plane + j * s.row;
-      for (std::ptrdiff_t i = 0; i < s.nu; i += lanes) {
+      const std::int32_t b = j + floor_v;
+      const float *below = ray(b) + floor_u, *above = below + ray_row;
+      std::uint8_t* const out = s.out + s.RowAt(k, j);
+      std::fill_n(out, s.nu, std::uint8_t{255});
+      const MatterRange rays_here = Hull(shaded[std::size_t(b - b_begin)], shaded[std::size_t(b + 1 - b_begin)]);
+      if (rays_here.empty()) continue;
+      const std::ptrdiff_t end = std::min(s.nu, rays_here.end - floor_u);
+      for (std::ptrdiff_t i = std::max(0, rays_here.begin - floor_u - 1) / lanes * lanes; i < end; i += lanes) {
         const auto first = lerp(t_v, hn::LoadU(d, below + i), hn::LoadU(d, above + i));
         const auto next = lerp(t_v, hn::LoadU(d, below + i + 1), hn::LoadU(d, above + i + 1));
         const auto lit = hn::Sub(set(1), hn::Mul(set(s.strength), hn::Sub(set(1), lerp(t_u, first, next))));
-        const hn::Rebind<std::int32_t, decltype(d)> di;
-        const auto bytes =
-            hn::DemoteTo(hn::Rebind<std::uint8_t, decltype(d)>(), hn::ConvertTo(di, hn::Add(hn::Mul(lit, set(255)), set(0.5F))));
-        HWY_ALIGN std::uint8_t eight[16];
-        hn::StoreU(bytes, hn::Rebind<std::uint8_t, decltype(d)>(), eight);
-        std::copy_n(eight, std::min<std::ptrdiff_t>(lanes, s.nu - i), out + i);
+        const auto bytes = hn::DemoteTo(db, hn::ConvertTo(di, hn::Add(hn::Mul(lit, set(255)), set(0.5F))));
+        if (i + lanes <= s.nu) {
+          hn::StoreU(bytes, db, out + i);
+          continue;
+        }
+        HWY_ALIGN std::uint8_t rest[16];
+        hn::StoreU(bytes, db, rest);
+        std::copy_n(rest, s.nu - i, out + i);
       }
     }
   };
@@ -145,66 +176,68 @@ void Run(const Sweep& sweep) {
   });
 }
 
-// out[z][y][x] = turned[x][z][y], square by square.
-void TurnBack(const UnwrittenVector<std::uint8_t>& turned, const Index3& size, std::uint8_t* out) {
-  constexpr std::int32_t kSquare = 32;
-  const std::ptrdiff_t from_x = std::ptrdiff_t{size.y} * size.z;
-  ParallelFor(0, size.z, [&](std::int32_t z) {
-    const std::uint8_t* const from = turned.data() + std::ptrdiff_t{z} * size.y;
-    std::uint8_t* const to = out + std::ptrdiff_t{z} * size.y * size.x;
-    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
-      const std::int32_t y_end = std::min(y_begin + kSquare, size.y);
-      for (std::int32_t x_begin = 0; x_begin < size.x; x_begin += kSquare) {
-        const std::int32_t x_end = std::min(x_begin + kSquare, size.x);
-        for (std::int32_t x = x_begin; x < x_end; ++x) {
-          const std::uint8_t* const column = from + x * from_x;
-          std::uint8_t* const to_x = to + x;
-          for (std::int32_t y = y_begin; y < y_end; ++y) to_x[std::ptrdiff_t{y} * size.x] = column[y];
-        }
-      }
-    }
-  });
-}
-
 int SweepAxis(const Extinction& extinction, const Vec3& to_light) {
   const Vec3 steps = Absolute(to_light / extinction.spacing);
   return steps.x > std::max(steps.y, steps.z) ? 0 : steps.y > steps.z ? 1 : 2;
+}
+
+// `length`: voxels in a row.
+void FindMatter(std::int32_t length, std::int64_t count, LightRows& rows) {
+  rows.matter.resize(std::size_t(count));
+  ParallelForRanges(std::int64_t{0}, count, 256, [&](std::int64_t begin, std::int64_t end) {
+    for (std::int64_t row = begin; row < end; ++row) {
+      const float* const each = rows.each + row * length;
+      const auto takes_light = [](float extinction) { return extinction > 0; };
+      const float* const first = std::find_if(each, each + length, takes_light);
+      if (first == each + length) continue;
+      const float* last = each + length - 1;
+      while (!takes_light(*last)) --last;
+      rows.matter[std::size_t(row)] = {std::int32_t(first - each), std::int32_t(last + 1 - each)};
+    }
+  });
 }
 
 }  // namespace
 
 bool SweepsAlongX(const Extinction& extinction, const Vec3& to_light) { return SweepAxis(extinction, to_light) == 0; }
 
-TurnedExtinction Turned(const Extinction& extinction) {
+LightRows RowsAlongX(const Extinction& extinction) {
+  LightRows rows{.each = extinction.each.data(), .turned = {}, .matter = {}};
+  FindMatter(extinction.size.x, std::int64_t{extinction.size.y} * extinction.size.z, rows);
+  return rows;
+}
+
+LightRows RowsAlongY(const Extinction& extinction) {
   const Index3& size = extinction.size;
-  TurnedExtinction turned{.axes = {1, 2, 0}, .each = UnwrittenVector<float>(extinction.each.size())};
+  LightRows rows{.each = nullptr, .turned = UnwrittenVector<float>(extinction.each.size()), .matter = {}};
   ParallelFor(0, size.z, [&](std::int32_t z) {
     constexpr std::int32_t kSquare = 16;
     for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
       for (std::int32_t x = 0; x < size.x; ++x) {
         for (std::int32_t y = y_begin; y < std::min(y_begin + kSquare, size.y); ++y) {
-          turned.each[NumberIn({size.y, size.z, size.x}, {y, z, x})] = extinction.each[NumberIn(size, {x, y, z})];
+          rows.turned[NumberIn({size.y, size.z, size.x}, {y, z, x})] = extinction.each[NumberIn(size, {x, y, z})];
         }
       }
     }
   });
-  return turned;
+  rows.each = rows.turned.data();
+  FindMatter(size.y, std::int64_t{size.z} * size.x, rows);
+  return rows;
 }
 
-void FindTransmittance(const Extinction& extinction, const TurnedExtinction& turned, const Vec3& to_light, double strength,
-                       std::uint8_t* out) {
+void FindTransmittance(const Extinction& extinction, const LightRows& rows, const Vec3& to_light, double strength, std::uint8_t* out) {
   const Index3& size = extinction.size;
   const int c = SweepAxis(extinction, to_light);
   const int u = c == 0 ? 1 : 0, v = c == 2 ? 1 : 2;
   // The layout's steps from voxel to voxel.
   Vector3<std::ptrdiff_t> stride = {1, size.x, std::ptrdiff_t{size.x} * size.y};
   if (c == 0) stride = {std::ptrdiff_t{size.y} * size.z, 1, size.y};
-  UnwrittenVector<std::uint8_t> turned_out(c == 0 ? CountIn(size) : 0);
 
   const Vec3 steps = to_light / extinction.spacing;  // towards the light, in voxels
   const double per_plane = std::abs(steps[c]);
   const bool from_above = steps[c] > 0;  // the light is on the side of the last plane
-  Sweep sweep{.each = c == 0 ? turned.each.data() : extinction.each.data(),
+  Sweep sweep{.each = rows.each,
+              .matter = rows.matter.data(),
               .nu = size[u],
               .nv = size[v],
               .planes = size[c],
@@ -215,9 +248,8 @@ void FindTransmittance(const Extinction& extinction, const TurnedExtinction& tur
               .shift_v = -steps[v] / per_plane,
               .step = float(1 / per_plane),
               .strength = float(strength),
-              .out = c == 0 ? turned_out.data() : out};
+              .out = out};
   Run(sweep);
-  if (c == 0) TurnBack(turned_out, size, out);
 }
 
 }  // namespace slabstream

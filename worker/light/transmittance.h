@@ -5,8 +5,8 @@
 // the matter's transmittance is interpolated at the rays, and at the end the rays' transmittance at the voxels, each once.
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "worker/light/extinction.h"
 
@@ -16,19 +16,26 @@ namespace slabstream {
 // surface does not shade itself, though it is blurred over two voxels here.
 inline constexpr double kShadowOffset = 1.5;
 
-// An Extinction with its axes in another order, for rows along another axis than x.
-struct TurnedExtinction {
-  std::array<int, 3> axes = {0, 1, 2};  // the fastest axis first
-  UnwrittenVector<float> each;
+// Voxels [begin, end) of a row.
+struct MatterRange {
+  std::int32_t begin = 0, end = 0;
+  bool empty() const { return begin == end; }
 };
-// The fastest axis becomes y, the slowest one x.
-TurnedExtinction Turned(const Extinction& extinction);
 
-// `to_light`: unit, along the voxels' axes, in the unit of the world. `turned`: Turned(extinction), if the light is nearest to x
-// (SweepsAlongX); else it is not read. `strength`: [0, 1]. Sets out[NumberIn(size, voxel)] = 255 (1 - strength (1 - transmittance)),
-// rounded: x fastest. Parallel; the result is the same for any number of threads and any instruction set.
-void FindTransmittance(const Extinction& extinction, const TurnedExtinction& turned, const Vec3& to_light, double strength,
-                       std::uint8_t* out);
+// An Extinction in rows that light meets side by side: along x (then y, then z), or along y (then z, then x).
+struct LightRows {
+  const float* each = nullptr;
+  UnwrittenVector<float> turned;    // `each`, of rows along y
+  std::vector<MatterRange> matter;  // by row: voxels outside of these take no light
+};
+LightRows RowsAlongX(const Extinction& extinction);  // which must live as long
+LightRows RowsAlongY(const Extinction& extinction);
+// Whether light from there, which is nearest to x, is followed through rows along y.
 bool SweepsAlongX(const Extinction& extinction, const Vec3& to_light);
+
+// `to_light`: unit, along the voxels' axes, in the unit of the world. `rows`: along y if SweepsAlongX, else along x. `strength`: [0, 1].
+// Sets out[voxel] = 255 (1 - strength (1 - transmittance)), rounded, in the order of the rows. Parallel; the result is the same for any
+// number of threads and any instruction set.
+void FindTransmittance(const Extinction& extinction, const LightRows& rows, const Vec3& to_light, double strength, std::uint8_t* out);
 
 }  // namespace slabstream

@@ -2,16 +2,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <span>
+#include <string>
 
+#include "common/volume/indices.h"
 #include "common/volume/light_volume.h"
 #include "tests/support/simd_targets.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/light/extinction.h"
 #include "worker/light/occlusion.h"
+#include "worker/light/pack_shares.h"
 #include "worker/light/transmittance.h"
 
 namespace slabstream {
@@ -34,8 +38,15 @@ Extinction ExtinctionIn(const Volume& volume, const FrameSetup& setup) {
 }
 
 std::vector<std::uint8_t> Transmitted(const Extinction& extinction, const Vec3& to_light) {
-  std::vector<std::uint8_t> out(extinction.each.size());
-  FindTransmittance(extinction, Turned(extinction), Normalized(to_light), 1, out.data());
+  const Index3& size = extinction.size;
+  const Vec3 direction = Normalized(to_light);
+  const bool along_y = SweepsAlongX(extinction, direction);
+  std::vector<std::uint8_t> found(extinction.each.size()), out(found.size());
+  FindTransmittance(extinction, along_y ? RowsAlongY(extinction) : RowsAlongX(extinction), direction, 1, found.data());
+  if (!along_y) return found;
+  for (const Index3& v : IndicesIn(Box{{0, 0, 0}, size})) {
+    out[NumberIn(size, v)] = found[NumberIn({size.y, size.z, size.x}, {v.y, v.z, v.x})];
+  }
   return out;
 }
 
@@ -250,6 +261,43 @@ TEST(Transmittance, IsTheSameOnEveryInstructionSet) {
       EXPECT_EQ(Transmitted(extinction, to_light), expected);
       EXPECT_EQ(OpennessIn(extinction, 5), open);
     });
+  }
+}
+
+// Of voxels in either order, each of which the shares may have, and one voxel more along each axis.
+TEST(PackShares, PutsTheSharesOfEachVoxelWhereItsLightIsRead) {
+  const unsigned seed = 23;
+  std::mt19937 random(seed);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  for (const Index3& size : {Index3{37, 70, 33}, Index3{1, 5, 64}, Index3{64, 1, 3}}) {
+    Bytes255 along_x(CountIn(size)), reached_along_x(CountIn(size));
+    for (Bytes255* const bytes : {&along_x, &reached_along_x}) {
+      for (std::uint8_t& byte : *bytes) byte = std::uint8_t(random());
+    }
+    const Bytes255 along_y = TurnedBytes(along_x, size), reached_along_y = TurnedBytes(reached_along_x, size), none;
+    const Index3 whole = size + Uniform(1);
+    for (int order = 0; order < 8; ++order) {
+      const int fast = order & 1, reached_fast = order >> 1 & 1;
+      const bool has_open = order < 4;
+      FrameLight light{.size = size, .lights = 2, .fast = fast};
+      light.stride = fast == 0 ? std::array{2, 2 * whole.x, 2 * whole.x * whole.y} : std::array{2 * whole.y * whole.z, 2, 2 * whole.y};
+      light.light = 2 * whole.x * whole.y * whole.z;
+      light.shares.resize(2 * std::size_t(light.light) + FrameLight::kSharesPadding);
+      PackShares(!has_open   ? none
+                 : fast == 0 ? along_x
+                             : along_y,
+                 reached_fast == 0 ? reached_along_x : reached_along_y, reached_fast, 1, light);
+      PackShares(!has_open ? none : fast == 0 ? along_x : along_y, none, 0, 0, light);
+      for (const Index3& voxel : IndicesIn(Box{{0, 0, 0}, whole})) {
+        const std::size_t nearest = NumberIn(size, Min(voxel, size - Uniform(1)));
+        const auto at = std::size_t(voxel.x * light.stride[0] + voxel.y * light.stride[1] + voxel.z * light.stride[2]);
+        for (std::size_t number = 0; number < 2; ++number) {
+          const std::uint8_t* const shares = &light.shares[number * std::size_t(light.light) + at];
+          ASSERT_EQ(shares[0], has_open ? along_x[nearest] : 255) << order;
+          ASSERT_EQ(shares[1], number == 1 ? reached_along_x[nearest] : 255) << order;
+        }
+      }
+    }
   }
 }
 
