@@ -32,14 +32,9 @@ TransferFunction FloorAndSlab(double slab_opacity) {
 class Shadows : public ::testing::TestWithParam<const RendererKind*> {};
 
 // Seen from below the slab: the eye looks at the floor at a small angle, and the ray passes only the floor.
-TEST_P(Shadows, OfASlabDarkenAFloorByItsTransmittance) {
-  if (GetParam()->name() == "zbuffer" || GetParam()->Can(Ability::kCells)) return;  // draws no clear matter; has no floor of voxels
-  const Volume volume = FloorBelowSlab();
-  SetupOptions options;
-  options.renderer = GetParam();
+void ExpectShadowOnFloor(const Volume& volume, SetupOptions options) {
   options.view = {.elevation_degrees = 20, .zoom = 1};
   options.size = {160, 160};
-  options.transfer = FloorAndSlab(kSlabOpacity);
   options.shading = {.lights = {{0, 0, 1}}, .ambient = 0, .diffuse = 1, .specular = 0};
   const LocalImage lit = RenderPicture(volume, MakeSetup(volume, options));
   options.shading.shadows = 1;
@@ -56,6 +51,23 @@ TEST_P(Shadows, OfASlabDarkenAFloorByItsTransmittance) {
   EXPECT_NEAR(ratio_at({24, 20, kFloorTop - 0.5}), expected, 0.02);
   EXPECT_NEAR(ratio_at({36, 24, kFloorTop - 0.5}), expected, 0.02);
   EXPECT_NEAR(ratio_at({72, 20, kFloorTop - 0.5}), 1, 0.01) << "beside the slab";
+}
+
+TEST_P(Shadows, OfASlabDarkenAFloorByItsTransmittance) {
+  if (GetParam()->name() == "zbuffer" || GetParam()->Can(Ability::kCells)) return;  // draws no clear matter; has no floor of voxels
+  SetupOptions options;
+  options.renderer = GetParam();
+  options.transfer = FloorAndSlab(kSlabOpacity);
+  ExpectShadowOnFloor(FloorBelowSlab(), options);
+}
+
+TEST_P(Shadows, OfASlabDarkenAnIsosurfaceByItsTransmittance) {
+  if (GetParam()->name() == "zbuffer" || !GetParam()->Can(Ability::kIsosurfaces)) return;  // draws no clear matter
+  SetupOptions options;
+  options.renderer = GetParam();
+  options.transfer = {.colors = {{0, {0, 0, 0}}}, .opacities = {{0, 0}, {50, 0}, {51, kSlabOpacity}, {120, kSlabOpacity}, {121, 0}}};
+  options.transfer.isosurfaces = {{150, {1, 1, 1}, 1}};
+  ExpectShadowOnFloor(FloorBelowSlab(), options);
 }
 
 TEST_P(Shadows, DoNotDependOnThePartition) {

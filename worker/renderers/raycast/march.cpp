@@ -31,7 +31,7 @@ HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.l
 template <class T>
 HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& crossing, Sums& sums) {
   const FloatTag df;
-  const SamplePlace place = crossing.Place();
+  const SamplePlace place = crossing.Place(work.box->origin);
   Light light = {Set(1), hn::Zero(df)};
   if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place), [&]() HWY_ATTR { return place; });
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));

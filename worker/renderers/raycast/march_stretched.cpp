@@ -122,7 +122,7 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, const StretchedSte
   const RayLook& look = *work.look;
   return AddCrossingsUpTo(before, 16 * steps.most, work.termination, walk, sums, [&](Mask rays, const Crossing& crossing) HWY_ATTR {
     const FloatTag df;
-    const SamplePlace place = crossing.Place();
+    const SamplePlace place = crossing.Place(work.box->origin);
     Light light = {Set(1), hn::Zero(df)};
     if (look.phong) {
       light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place, DifferencesAt(*work.box, place)));

@@ -98,12 +98,13 @@ struct Crossing {
       fraction[i] = hn::IfThenElse(rays, other.fraction[i], fraction[i]);
     }
   }
-  HWY_INLINE SamplePlace Place() const {
+  // `origin`: RayBox::origin. Positions count voxels.
+  HWY_INLINE SamplePlace Place(const Index3& origin) const {
     SamplePlace place;
     for (std::size_t i = 0; i < 3; ++i) {
       place.voxel[i] = voxel[i];
       place.fraction[i] = fraction[i];
-      place.position[i] = hn::Zero(FloatTag());
+      place.position[i] = hn::Add(hn::ConvertTo(FloatTag(), hn::Add(voxel[i], SetInt(origin[int(i)]))), fraction[i]);
     }
     return place;
   }
