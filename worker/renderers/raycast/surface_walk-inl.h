@@ -3,7 +3,7 @@
 //
 // Between eight neighbouring voxel centres (here a cell) the trilinear interpolant along a ray is a cubic polynomial (Parker et al. 1998).
 // Its extrema divide the ray's way through the cell into stretches where it is monotonic. A stretch holds one crossing if its ends lie on
-// either side of the isovalue, and bisection finds it (Marmitt et al. 2004). So no crossing is missed, however close two of them are.
+// either side of the isovalue (Marmitt et al. 2004), and Newton's method finds it. So no crossing is missed, however close two of them are.
 //
 // A crossing depends on its ray and on its cell's voxels alone, and belongs to the box that owns its position: boxes agree on crossings.
 // Two cells agree on the value at the face between them, bit for bit, so that a surface has no holes there.
@@ -16,6 +16,7 @@
 
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "worker/rays/stretched_place-inl.h"
@@ -48,24 +49,15 @@ HWY_INLINE Ints DistanceAt(const EmptyDistances& distances, Ints octant_start, I
   return hn::And(four, SetInt(0xFF));
 }
 
-// f(x) along a ray, x from 0 where it enters a cell to 3 where it leaves.
+// f(x) along a ray, x from 0 where it enters a cell to 1 where it leaves.
 struct Cubic {
   Floats c0, c1, c2, c3;
 
   HWY_INLINE Floats At(Floats x) const { return hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Add(hn::Mul(c3, x), c2), x), c1), x), c0); }
+  HWY_INLINE Floats SlopeAt(Floats x) const { return hn::Add(hn::Mul(hn::Add(hn::Mul(hn::Mul(Set(3), c3), x), hn::Add(c2, c2)), x), c1); }
 };
 
-// The one through the values at x = 0, 1, 2 and 3 (Newton's forward differences).
-HWY_INLINE Cubic CubicThrough(const Floats (&f)[4]) {
-  const auto first = hn::Sub(f[1], f[0]);
-  const auto second = hn::Add(hn::Sub(f[2], hn::Add(f[1], f[1])), f[0]);
-  const auto third = hn::Sub(hn::Sub(f[3], f[0]), hn::Mul(Set(3), hn::Sub(f[2], f[1])));
-  const auto half = Set(0.5F);
-  return {f[0], hn::Add(hn::Sub(first, hn::Mul(second, half)), hn::Mul(third, Set(1.0F / 3))), hn::Mul(hn::Sub(second, third), half),
-          hn::Mul(third, Set(1.0F / 6))};
-}
-
-// Ascending points of [0, 3] between which the polynomial is monotonic; 0 or 3 if there are fewer than two.
+// Ascending points of [0, 1] between which the polynomial is monotonic; 0 or 1 if there are fewer than two.
 struct Extrema {
   Floats first, second;
 };
@@ -77,10 +69,35 @@ HWY_INLINE Extrema ExtremaOf(const Cubic& f) {
   const auto q = hn::Neg(hn::Add(f.c2, hn::CopySign(root, f.c2)));
   const auto limited = [&](Floats numerator, Floats divisor) HWY_ATTR {
     const auto x = hn::Div(numerator, hn::IfThenElse(hn::Eq(divisor, zero), Set(1), divisor));
-    return hn::IfThenElseZero(hn::And(hn::Gt(square, zero), hn::Ne(divisor, zero)), hn::Min(hn::Max(x, zero), Set(3)));
+    return hn::IfThenElseZero(hn::And(hn::Gt(square, zero), hn::Ne(divisor, zero)), hn::Min(hn::Max(x, zero), Set(1)));
   };
   const auto a = limited(q, hn::Mul(Set(3), f.c3)), b = limited(f.c1, q);
   return {hn::Min(a, b), hn::Max(a, b)};
+}
+
+// Where f changes its sign between `low` and `high`, of rays on which it does so once there; `low_side`: f(low) >= 0. Newton's method,
+// which halves the interval instead where it would leave it. Each ray ends by itself: what it finds does not depend on the others.
+HWY_INLINE Floats RootBetween(const Cubic& f, Mask rays, Mask low_side, Floats low, Floats high) {
+  constexpr int kMostSteps = 24;
+  constexpr float kNear = 1e-5F;
+  const FloatTag df;
+  const auto at_low = f.At(low);
+  const auto middle = [&]() HWY_ATTR { return hn::Mul(Set(0.5F), hn::Add(low, high)); };
+  auto x = hn::Sub(low, hn::Div(hn::Mul(at_low, hn::Sub(high, low)), hn::Sub(f.At(high), at_low)));  // the chord's
+  x = hn::IfThenElse(hn::And(hn::Ge(x, low), hn::Le(x, high)), x, middle());
+  for (int step = 0; step < kMostSteps; ++step) {
+    const auto value = f.At(x);
+    const auto behind = hn::Xor(hn::Ge(value, hn::Zero(df)), low_side);
+    low = hn::IfThenElse(behind, low, x);
+    high = hn::IfThenElse(behind, x, high);
+    auto next = hn::Sub(x, hn::Div(value, f.SlopeAt(x)));
+    next = hn::IfThenElse(hn::And(hn::Ge(next, low), hn::Le(next, high)), next, middle());
+    const auto far = hn::And(rays, hn::Gt(hn::Abs(hn::Sub(next, x)), Set(kNear)));
+    x = hn::IfThenElse(rays, next, x);
+    rays = far;
+    if (hn::AllFalse(df, rays)) break;
+  }
+  return x;
 }
 
 // Crossings of rays with isosurfaces.
@@ -190,15 +207,13 @@ class SurfaceWalk {
   }
 
  private:
-  // The way of the rays through their cells, x from 0 where they enter to 3 where they leave.
+  // The way of the rays through their cells, x from 0 where they enter to 1 where they leave.
   struct Way {
     Floats enter, leave;         // samples
-    Floats begin[3], change[3];  // fractions at x = 0, and to x = 3
+    Floats begin[3], change[3];  // fractions at x = 0, and to x = 1
     Floats end[3];
 
-    HWY_INLINE Floats FractionAt(std::size_t axis, Floats x) const {
-      return hn::Add(begin[axis], hn::Mul(hn::Mul(x, Set(1.0F / 3)), change[axis]));
-    }
+    HWY_INLINE Floats FractionAt(std::size_t axis, Floats x) const { return hn::Add(begin[axis], hn::Mul(x, change[axis])); }
   };
   // Rays enter and leave exactly on a face of the cell.
   HWY_INLINE Way WayThroughCells() const {
@@ -225,38 +240,34 @@ class SurfaceWalk {
     return way;
   }
 
-  // The interpolant at x = 0, 1, 2 and 3 of a way.
-  static HWY_INLINE void InterpolateAlong(const Way& way, const Neighbours<T>& voxels, Floats (&values)[4]) {
-    // Exact at both ends of t, unlike Lerp.
-    const auto mix = [&](Floats t, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(hn::Sub(Set(1), t), a), hn::Mul(t, b)); };
-    const auto value_at = [&](Floats u, Floats v, Floats w) HWY_ATTR {
-      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(u, pair.a, pair.b); };
-      return mix(w, mix(v, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(v, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
+  // The interpolant where rays enter and leave their cells: two cells agree on it.
+  struct Ends {
+    Floats first, last;
+  };
+  static HWY_INLINE Ends InterpolateEnds(const Way& way, const Neighbours<T>& voxels) {
+    const auto value_at = [&](const Floats(&at)[3]) HWY_ATTR {
+      const Floats rest[3] = {hn::Sub(Set(1), at[0]), hn::Sub(Set(1), at[1]), hn::Sub(Set(1), at[2])};
+      // Exact at both ends of t, unlike Lerp.
+      const auto mix = [&](std::size_t i, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(rest[i], a), hn::Mul(at[i], b)); };
+      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(0, pair.a, pair.b); };
+      return mix(2, mix(1, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(1, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
     };
-    values[0] = value_at(way.begin[0], way.begin[1], way.begin[2]);
-    for (int i = 1; i < 3; ++i) {
-      const auto x = Set(float(i));
-      values[i] = value_at(way.FractionAt(0, x), way.FractionAt(1, x), way.FractionAt(2, x));
-    }
-    values[3] = value_at(way.end[0], way.end[1], way.end[2]);
+    return {value_at(way.begin), value_at(way.end)};
   }
-
-  // A place between low and high, where `above` changes its sign; `low_side`: its side at low. Two halvings at a time, whose polynomials
-  // are evaluated side by side.
-  static HWY_INLINE Floats Bisect(const Cubic& above, Mask low_side, Floats low, Floats high) {
-    constexpr int kQuarterings = 8;  // quarters an interval of at most 1.8 voxels
-    const auto middle = [&](Floats a, Floats b) HWY_ATTR { return hn::Mul(Set(0.5F), hn::Add(a, b)); };
-    const auto is_behind = [&](Floats x) HWY_ATTR { return hn::Xor(hn::Ge(above.At(x), hn::Zero(FloatTag())), low_side); };
-    for (int i = 0; i < kQuarterings; ++i) {
-      const auto half = middle(low, high), quarter = middle(low, half), three_quarters = middle(half, high);
-      const auto half_behind = is_behind(half), quarter_behind = is_behind(quarter), three_quarters_behind = is_behind(three_quarters);
-      const auto new_low = hn::IfThenElse(half_behind, hn::IfThenElse(quarter_behind, low, quarter),
-                                          hn::IfThenElse(three_quarters_behind, half, three_quarters));
-      high = hn::IfThenElse(half_behind, hn::IfThenElse(quarter_behind, quarter, half),
-                            hn::IfThenElse(three_quarters_behind, three_quarters, high));
-      low = new_low;
-    }
-    return high;
+  // The interpolant along the way: the product of its slopes along the axes, and its ends.
+  static HWY_INLINE Cubic CubicAlong(const Way& way, const Neighbours<T>& voxels, const Ends& ends) {
+    const auto& rows = voxels.inner;
+    const auto along_x = [&](const InnerPair& row) HWY_ATTR { return hn::Sub(row.b, row.a); };
+    const auto lowest = along_x(rows[0][0]);
+    const auto xy = hn::Sub(along_x(rows[0][1]), lowest), xz = hn::Sub(along_x(rows[1][0]), lowest);
+    const auto xyz = hn::Sub(hn::Sub(along_x(rows[1][1]), along_x(rows[1][0])), xy);
+    const auto yz = hn::Sub(hn::Sub(rows[1][1].a, rows[1][0].a), hn::Sub(rows[0][1].a, rows[0][0].a));
+    const auto [u, v, w] = way.change;
+    const auto of = [&](Floats a, Floats b, Floats product, std::size_t other)
+                        HWY_ATTR { return hn::Mul(hn::Mul(a, b), hn::Add(product, hn::Mul(xyz, way.begin[other]))); };
+    const auto c3 = hn::Mul(hn::Mul(xyz, u), hn::Mul(v, w));
+    const auto c2 = hn::Add(hn::Add(of(u, v, xy, 2), of(u, w, xz, 1)), of(v, w, yz, 0));
+    return {ends.first, hn::Sub(hn::Sub(hn::Sub(ends.last, ends.first), c2), c3), c2, c3};
   }
 
   // The nearest crossing so far in the cells, and how many changes of sides there are.
@@ -277,29 +288,45 @@ class SurfaceWalk {
   }
 
   // Looks for crossings of `rays` with a surface, stretch by stretch between the extrema of their cubic.
-  HWY_INLINE void CrossSurface(const Way& way, const Cubic& cubic, const Extrema& extrema, const Floats (&values)[4], std::size_t surface,
-                               Mask rays, Nearest& nearest) const {
+  HWY_INLINE void CrossSurface(const Way& way, const Cubic& cubic, const Ends& values, std::size_t surface, Mask rays,
+                               Nearest& nearest) const {
     const FloatTag df;
-    const auto zero = hn::Zero(df), value = Set(work_.look->isovalues[surface]);
-    const Floats ends[4] = {zero, extrema.first, extrema.second, Set(3)};
+    const auto zero = hn::Zero(df), one = Set(1), value = Set(work_.look->isovalues[surface]);
     Cubic above = cubic;
     above.c0 = hn::Sub(cubic.c0, value);
-    const auto enters_above = hn::Ge(values[0], value), leaves_above = hn::Ge(values[3], value);
-    const auto is_above = [&](Floats x) HWY_ATTR {
-      const auto at_end = hn::Ge(x, ends[3]);
-      return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
-    };
-    const Mask sides[4] = {enters_above, is_above(ends[1]), is_above(ends[2]), leaves_above};
-    // Each ray takes the first stretch that is left. Most rays have one.
+    const auto enters_above = hn::Ge(values.first, value), leaves_above = hn::Ge(values.last, value);
+    // Bezier's points between the ends. There are at most as many crossings as changes of sides among all four (Descartes).
+    const auto third = Set(1.0F / 3);
+    const auto first = hn::Add(above.c0, hn::Mul(above.c1, third)), second = hn::Add(first, hn::Mul(hn::Add(above.c1, above.c2), third));
+    const auto first_above = hn::Ge(first, zero), second_above = hn::Ge(second, zero);
+    const auto a = hn::Xor(enters_above, first_above), b = hn::Xor(first_above, second_above), c = hn::Xor(second_above, leaves_above);
+    rays = hn::And(rays, hn::Or(hn::Or(a, b), c));
+    if (hn::AllFalse(df, rays)) return;
+    // Most rays have one change, in one stretch.
+    const auto several = hn::And(rays, hn::Or(hn::And(a, hn::Or(b, c)), hn::And(b, c)));
+    Floats ends[4] = {zero, one, one, one};
+    Mask sides[4] = {enters_above, leaves_above, leaves_above, leaves_above};
+    if (!hn::AllFalse(df, several)) {
+      const Extrema extrema = ExtremaOf(cubic);
+      const auto is_above = [&](Floats x) HWY_ATTR {
+        const auto at_end = hn::Ge(x, one);
+        return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
+      };
+      ends[1] = hn::IfThenElse(several, extrema.first, one);
+      ends[2] = hn::IfThenElse(several, extrema.second, one);
+      sides[1] = is_above(ends[1]);
+      sides[2] = is_above(ends[2]);
+    }
+    // Each ray takes the first stretch that is left.
     Mask left[3];
     for (std::size_t i = 0; i < 3; ++i) {
       left[i] = hn::And(rays, hn::Xor(sides[i], sides[i + 1]));
-      nearest.changes = hn::Add(nearest.changes, hn::IfThenElseZero(left[i], Set(1)));
+      nearest.changes = hn::Add(nearest.changes, hn::IfThenElseZero(left[i], one));
     }
     for (;;) {
       const auto any = hn::Or(left[0], hn::Or(left[1], left[2]));
       if (hn::AllFalse(df, any)) return;
-      auto rest = any, low_side = hn::Lt(Set(1), zero);
+      auto rest = any, low_side = hn::Lt(one, zero);
       auto low = zero, high = zero;
       for (std::size_t i = 0; i < 3; ++i) {
         const auto taken = hn::And(rest, left[i]);
@@ -309,8 +336,8 @@ class SurfaceWalk {
         left[i] = hn::AndNot(taken, left[i]);
         rest = hn::AndNot(taken, rest);
       }
-      const auto x = Bisect(above, low_side, low, high);
-      const auto at = hn::Add(way.enter, hn::Mul(hn::Mul(x, Set(1.0F / 3)), hn::Sub(way.leave, way.enter)));
+      const auto x = RootBetween(above, any, low_side, low, high);
+      const auto at = hn::Add(way.enter, hn::Mul(x, hn::Sub(way.leave, way.enter)));
       const auto number = Set(float(surface));
       const auto counts = hn::And(hn::And(any, hn::Lt(at, nearest.at)), Counts(way, at, x, number));
       nearest.at = hn::IfThenElse(counts, at, nearest.at);
@@ -351,22 +378,20 @@ class SurfaceWalk {
       for (const InnerPair& row : slice) {
         least = hn::Min(least, hn::Min(row.a, row.b));
         greatest = hn::Max(greatest, hn::Max(row.a, row.b));
-        magnitude = hn::Add(magnitude, hn::Add(hn::Abs(row.a), hn::Abs(row.b)));
+        if constexpr (std::is_same_v<T, float>) magnitude = hn::Add(magnitude, hn::Add(hn::Abs(row.a), hn::Abs(row.b)));
       }
     }
     const Way way = WayThroughCells();
     const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
     const auto valid = hn::And(hn::And(rays, finite), hn::Le(way.enter, way.leave));
-    Floats values[4];
-    InterpolateAlong(way, voxels, values);
-    const Cubic cubic = CubicThrough(values);
-    const Extrema extrema = ExtremaOf(cubic);
+    const Ends ends = InterpolateEnds(way, voxels);
+    const Cubic cubic = CubicAlong(way, voxels, ends);
     Nearest nearest = {Set(kRayEnd), zero, zero, zero};
     const std::vector<float>& isovalues = work_.look->isovalues;
     for (std::size_t surface = 0; surface < isovalues.size(); ++surface) {
       const auto value = Set(isovalues[surface]);
       const auto crossed = hn::And(valid, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
-      if (!hn::AllFalse(df, crossed)) CrossSurface(way, cubic, extrema, values, surface, crossed, nearest);
+      if (!hn::AllFalse(df, crossed)) CrossSurface(way, cubic, ends, surface, crossed, nearest);
     }
     const auto found = hn::Lt(nearest.at, Set(kRayEnd));
     last_ = hn::IfThenElse(found, nearest.at, last_);
