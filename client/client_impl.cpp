@@ -191,7 +191,7 @@ void Client::Impl::Handle(DirectPictures::Reply complete) {
   FrameReply& reply = complete.message;
   const auto found = open.find(reply.request);
   if (found == open.end()) return;
-  Result<Picture> picture = Guarded("the picture", [&] { return DecodePicture(reply, complete.runs, found->second.message.frame.size); });
+  Result<Picture> picture = Guarded("the picture", [&] { return DecodePicture(reply, complete.runs, found->second.message.frame); });
   if (!picture.ok()) {
     End(reply.request, picture.status());
     return;

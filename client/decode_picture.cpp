@@ -23,8 +23,8 @@ PixelBounds BoundsOf(const std::vector<RunsOfShare>& shares) {
 }
 
 // Errors of ReadRuns.
-Result<PictureImage> PutCodesTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame) {
-  StraightImage picture = MakeStraightImage(BoundsOf(shares));
+Result<PictureImage> PutCodesTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame, const std::optional<Rgb>& over) {
+  StraightImage picture = MakeStraightImage(BoundsOf(shares), over ? Premultiplied{over->r, over->g, over->b, 1} : Premultiplied{});
   for (const auto& [header, runs] : shares) {
     if (Status status = ReadCodesInto(*header, runs.span(), frame, picture); !status.ok()) return status;
   }
@@ -32,9 +32,9 @@ Result<PictureImage> PutCodesTogether(const std::vector<RunsOfShare>& shares, co
 }
 
 // Errors of ReadRuns.
-Result<PictureImage> PutTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame) {
+Result<PictureImage> PutTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame, const std::optional<Rgb>& over) {
   const auto is_code = [](const RunsOfShare& share) { return share.header->color == ColorCoding::kStraight8; };
-  if (std::ranges::all_of(shares, is_code)) return PutCodesTogether(shares, frame);
+  if (std::ranges::all_of(shares, is_code)) return PutCodesTogether(shares, frame, over);
   const auto read = [&](const RunsOfShare& share) { return ReadRuns(*share.header, share.runs.span(), frame); };
   if (shares.size() == 1) {
     Result<LocalImage> picture = read(shares.front());
@@ -52,7 +52,8 @@ Result<PictureImage> PutTogether(const std::vector<RunsOfShare>& shares, const P
 
 }  // namespace
 
-Result<Picture> DecodePicture(FrameReply& reply, const std::vector<Bytes>& runs, ImageSize expected) {
+Result<Picture> DecodePicture(FrameReply& reply, const std::vector<Bytes>& runs, const FrameRequest& asked) {
+  const ImageSize expected = asked.size;
   if (reply.size != expected) {
     return Status::DataLoss("FrameReply.size is " + std::to_string(reply.size.width) + "x" + std::to_string(reply.size.height) +
                             ", asked for was " + std::to_string(expected.width) + "x" + std::to_string(expected.height));
@@ -66,7 +67,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const std::vector<Bytes>& runs,
     if (Status status = ValidateRunHeader(header, frame); !status.ok()) return Status::DataLoss(status.message());
     shares.push_back({&header, *std::move(unpacked)});
   }
-  Result<PictureImage> image = PutTogether(shares, frame);
+  Result<PictureImage> image = PutTogether(shares, frame, asked.straight8_over);
   if (!image.ok()) return Status::DataLoss(image.status().message());
   Picture picture;
   picture.image = *std::move(image);

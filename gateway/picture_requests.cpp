@@ -25,6 +25,7 @@ void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> f
                                ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
   for (FrameRequest& frame : frames) {
     frame.straight8 = type == PictureFileType::kPng && HoldsStraight8(format);
+    frame.straight8_over = OpaqueBackground(format);
     frame.key = format.annotations.needs_key();
   }
   if (const Status status = CheckCanDraw(format.annotations); !status.ok()) return reply(Failure(status));

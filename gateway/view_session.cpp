@@ -195,6 +195,7 @@ void ViewSession::Render(const ViewAction& action) {
   if (auto& letters = job->format.annotations.font_size) letters = *letters * scale;
   for (FrameRequest& frame : job->frames) {
     frame.straight8 = HoldsStraight8(job->format);
+    frame.straight8_over = OpaqueBackground(job->format);
     frame.key = job->format.annotations.needs_key();
     if (action.plain) frame.shading.shadows = frame.shading.ambient_occlusion = 0;
     frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};

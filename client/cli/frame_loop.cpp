@@ -65,7 +65,8 @@ class FrameLoop {
     const std::size_t limit = std::size_t(options_.in_flight);
     while (next_ < jobs_.size() && open_.size() < limit && waiting_.size() + tasks_.size() < limit) {
       FrameRequest request = jobs_[next_].request;
-      request.straight8 = options_.pictures != nullptr && options_.pictures->TakesStraight8(jobs_[next_]);
+      request.straight8 = false;
+      if (options_.pictures != nullptr) options_.pictures->ChooseCodes(jobs_[next_], request);
       open_[client_.Submit(request)] = next_;
       ++next_;
     }

@@ -33,7 +33,7 @@ class Movie : public PictureSink {
   static Result<std::unique_ptr<Movie>> Start(const MovieOptions& options);
 
   bool in_order() const override { return true; }
-  bool TakesStraight8(const FrameJob&) const override { return false; }
+  void ChooseCodes(const FrameJob&, FrameRequest& request) const override { request.straight8 = false; }
   Status Put(const Picture& picture, const FrameJob& job) override;
   Status Skip(const FrameJob& job) override;  // shows the frame before it in its place
   Status Finish() override;

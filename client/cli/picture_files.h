@@ -16,7 +16,10 @@ class PictureFiles : public PictureSink {
       : format_(format), record_(record), layers_(std::move(layers)) {}
 
   bool in_order() const override { return false; }
-  bool TakesStraight8(const FrameJob& job) const override { return FileHoldsStraight8(job.output, format_); }
+  void ChooseCodes(const FrameJob& job, FrameRequest& request) const override {
+    request.straight8 = FileHoldsStraight8(job.output, format_);
+    request.straight8_over = OpaqueBackground(format_);
+  }
   Status Put(const Picture& picture, const FrameJob& job) override;
   Status Skip(const FrameJob&) override { return Status::Ok(); }
   Status Finish() override { return Status::Ok(); }

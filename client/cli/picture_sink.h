@@ -23,8 +23,8 @@ class PictureSink {
 
   // Whether pictures come one after the other, in the order of their jobs. Else several may come at a time, in any order, and previews too.
   virtual bool in_order() const = 0;
-  // Whether the picture of this job may come as FrameRequest::straight8 says. Any thread.
-  virtual bool TakesStraight8(const FrameJob& job) const = 0;
+  // Sets FrameRequest::straight8 and straight8_over as they suit the picture of this job. Any thread.
+  virtual void ChooseCodes(const FrameJob& job, FrameRequest& request) const = 0;
   virtual Status Put(const Picture& picture, const FrameJob& job) = 0;
   // Instead of Put: this frame has failed. Never the first one in order.
   virtual Status Skip(const FrameJob& job) = 0;

@@ -24,6 +24,7 @@ Status RunSlice(const SliceOptions& options) {
   slice.frame.dataset = connection->dataset();
   slice.frame.key = slice.format.annotations.needs_key();
   slice.frame.straight8 = FileHoldsStraight8(options.output, slice.format);
+  slice.frame.straight8_over = OpaqueBackground(slice.format);
   const Result<std::vector<FrameRequest>> frames = FramesOf(slice);
   if (!frames.ok()) return frames.status();
   if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;

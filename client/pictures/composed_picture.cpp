@@ -1,6 +1,7 @@
 #include "client/pictures/composed_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "common/base/check.h"
@@ -27,14 +28,16 @@ Result<ComposedPicture> ComposedPicture::WithMarks(const PictureImage& image, Im
 
 ComposedPicture::ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers under,
                                  AnnotationLayers over)
-    : image_(&image), size_(size), background_(background), under_(std::move(under)), over_(std::move(over)) {
+    : image_(&image),
+      size_(size),
+      background_{background.r * background.a, background.g * background.a, background.b * background.a, background.a},
+      under_(std::move(under)),
+      over_(std::move(over)) {
   CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds())));
 }
 
 void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) const {
-  const float alpha = background_.a;
-  const float behind[4] = {background_.r * alpha, background_.g * alpha, background_.b * alpha, alpha};
-  for (std::size_t i = 0; i < rgba.size(); i += 4) std::copy_n(behind, 4, &rgba[i]);
+  for (std::size_t i = 0; i < rgba.size(); i += 4) std::ranges::copy(background_, &rgba[i]);
   under_.PutOver(y, rgba);
   std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
   const PixelBounds& b = image_->bounds();
@@ -56,12 +59,22 @@ void ComposedPicture::CodeRow(int y, std::span<Code> codes) const {
   StraightCodes(rgba.data(), codes.size() / 4, codes.data());
 }
 
-void ComposedPicture::StraightRow(int y, std::span<std::uint8_t> codes) const {
+const StraightImage* ComposedPicture::Codes() const {
   const StraightImage* const image = image_->codes();
-  if (image == nullptr || !IsImageAlone()) return CodeRow(y, codes);
-  std::ranges::fill(codes, std::uint8_t{0});
+  return image != nullptr && image->behind == background_ && under_.empty() && over_.empty() ? image : nullptr;
+}
+
+void ComposedPicture::StraightRow(int y, std::span<std::uint8_t> codes) const {
+  const StraightImage* const image = Codes();
+  if (image == nullptr) return CodeRow(y, codes);
   const PixelBounds& b = image->bounds;
-  if (b.empty() || y < b.y_begin || y >= b.y_end) return;
+  const bool inside = !b.empty() && y >= b.y_begin && y < b.y_end;
+  if (!inside || b.width() < size_.width) {
+    std::array<std::uint8_t, 4> beside;
+    StraightCodes(background_.data(), 1, beside.data());
+    for (std::size_t i = 0; i < codes.size(); i += beside.size()) std::ranges::copy(beside, &codes[i]);
+  }
+  if (!inside) return;
   const std::size_t row = 4 * std::size_t(b.width());
   std::copy_n(image->codes.data() + std::size_t(y - b.y_begin) * row, row, codes.data() + 4 * std::size_t(b.x_begin));
 }
@@ -69,6 +82,7 @@ void ComposedPicture::StraightRow(int y, std::span<std::uint8_t> codes) const {
 void ComposedPicture::StraightRow(int y, std::span<std::uint16_t> codes) const { CodeRow(y, codes); }
 
 void ComposedPicture::OpaqueRow(int y, std::span<std::uint8_t> codes) const {
+  if (Codes() != nullptr && background_[3] == 1) return StraightRow(y, codes);
   std::vector<float> rgba(codes.size());
   Row(y, rgba, {});
   SampleCodes(rgba.data(), rgba.size(), codes.data());

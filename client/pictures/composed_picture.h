@@ -48,11 +48,12 @@ class ComposedPicture {
 
   template <class Code>
   void CodeRow(int y, std::span<Code> codes) const;
-  bool IsImageAlone() const { return background_.a == 0 && under_.empty() && over_.empty(); }
+  // The image, if its codes are those of the picture; else null.
+  const StraightImage* Codes() const;
 
   const PictureImage* image_;
   ImageSize size_;
-  StraightColor background_;
+  Premultiplied background_;
   AnnotationLayers under_, over_;  // the picture
 };
 

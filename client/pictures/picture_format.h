@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "common/classification/rgb.h"
+
 namespace slabstream {
 
 struct StraightColor {
@@ -47,9 +49,16 @@ struct PictureFormat {
   std::optional<int> dots_per_inch;
 };
 
-// Whether PNGs of this format hold the codes of the picture itself, so that a picture in these codes (FrameRequest::straight8) is enough.
+// The background, if nothing shows through it.
+inline std::optional<Rgb> OpaqueBackground(const PictureFormat& format) {
+  const StraightColor& b = format.background;
+  return b.a == 1 ? std::optional(Rgb{b.r, b.g, b.b}) : std::nullopt;
+}
+
+// Whether PNGs of this format hold the codes of the picture itself or of it over OpaqueBackground, so that a picture in these codes
+// (FrameRequest::straight8) is enough.
 inline bool HoldsStraight8(const PictureFormat& format) {
-  return format.png_bits == 8 && format.background.a == 0 && !format.annotations.any();
+  return format.png_bits == 8 && (format.background.a == 0 || OpaqueBackground(format)) && !format.annotations.any();
 }
 
 // For files without transparency: behind whatever the background lets through lies black.

@@ -189,7 +189,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
                        const LayerFiles& layers, const std::vector<LevelUse>& levels) {
   Json made = Json::Parse(RequestToJson(request)).value();
   // The source says the dataset. How a picture travels is not what it shows.
-  for (const char* field : {"dataset", "straight8", "key"}) made.erase(field);
+  for (const char* field : {"dataset", "straight8", "straight8_over", "key"}) made.erase(field);
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
                {"source", ShownSource(source)},
                {"request", std::move(made)},

@@ -133,7 +133,8 @@ struct FrameRequest {
   bool previews = false;  // a picture after each group
   // Pictures may come without depths, and in the codes that a PNG of 8 bits has (ColorCoding::kStraight8): a quarter of the bytes.
   bool straight8 = false;
-  bool key = false;  // pictures come with what their colours mean (PictureKey)
+  std::optional<Rgb> straight8_over = {};  // these codes are those of the picture over this colour; none: of the picture alone
+  bool key = false;                        // pictures come with what their colours mean (PictureKey)
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
 

@@ -42,6 +42,6 @@ std::optional<RunImageHeader> DenseHeader(const ImageView& view);
 
 // Encodes the pixels of `view`; the header has its bounds. They are coded as `color` if that MayCode the format and all colours (ToCodes),
 // else as floats.
-RunImage EncodeRuns(const ImageView& view, ColorCoding color = ColorCoding::kFloat32);
+RunImage EncodeRuns(const ImageView& view, ColorCoding color = ColorCoding::kFloat32, const Premultiplied& behind = {});
 
 }  // namespace slabstream

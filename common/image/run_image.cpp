@@ -30,8 +30,9 @@ struct Band {
 // Writes the payload of a run image: the counterpart of RunPayload.
 class PayloadWriter {
  public:
-  // `payload` has room for PayloadBytes(header); the header must outlive this.
-  PayloadWriter(const RunImageHeader& header, std::byte* payload) : header_(header), layout_(header), payload_(payload) {}
+  // `payload` has room for PayloadBytes(header); the header must outlive this. `behind`: kStraight8.
+  PayloadWriter(const RunImageHeader& header, const Premultiplied& behind, std::byte* payload)
+      : header_(header), behind_(behind), layout_(header), payload_(payload) {}
 
   // Run number `index`, whose pixels are those of `view` from `source` on and come after `first` others. False: a colour cannot be coded.
   bool Write(std::size_t index, const Run& run, std::size_t first, const ImageView& view, std::size_t source) const {
@@ -47,7 +48,7 @@ class PayloadWriter {
       return true;
     }
     if (header_.color == ColorCoding::kStraight8) {
-      StraightCodes(view.rgba + 4 * source, count, reinterpret_cast<std::uint8_t*>(color));
+      StraightCodes(view.rgba + 4 * source, count, reinterpret_cast<std::uint8_t*>(color), behind_);
       return true;
     }
     return ToCodes(header_.color, view.rgba + 4 * source, reinterpret_cast<std::uint16_t*>(color), 4 * count);
@@ -55,6 +56,7 @@ class PayloadWriter {
 
  private:
   const RunImageHeader& header_;
+  const Premultiplied behind_;
   const PayloadLayout layout_;
   std::byte* const payload_;
 };
@@ -200,7 +202,7 @@ Status WriteRuns(const RunImageHeader& header, const RunPayload& runs, LocalImag
 
 std::size_t PayloadBytes(const RunImageHeader& header) { return PayloadLayout(header).end; }
 
-RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
+RunImage EncodeRuns(const ImageView& view, ColorCoding color, const Premultiplied& behind) {
   RunImage result;
   result.header.format = view.format;
   result.header.bounds = view.bounds;
@@ -233,7 +235,7 @@ RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
   if (MayCode(view.format, color)) result.header.color = color;
 
   result.payload.resize(PayloadBytes(result.header));
-  const PayloadWriter writer(result.header, result.payload.data());
+  const PayloadWriter writer(result.header, behind, result.payload.data());
   std::atomic<bool> coded = true;
   ParallelFor(0, bands.size(), [&](std::size_t i) {
     std::size_t index = bands[i].first_run, pixel = bands[i].first_pixel;
@@ -250,11 +252,11 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
   return EncodeRuns(ViewOf(image, range, frame_width));
 }
 
-RunImage EncodePicture(const LocalImage& image, ColorCoding color) {
+RunImage EncodePicture(const LocalImage& image, ColorCoding color, const Premultiplied& behind) {
   ImageView view = ViewOf(image);
   if (HasVoxel(view.format)) view.format = PixelFormat::kRgbaDepth;
   if (color == ColorCoding::kStraight8) view.format = PixelFormat::kRgba;
-  RunImage runs = EncodeRuns(view, color);
+  RunImage runs = EncodeRuns(view, color, behind);
   CutBounds(runs);
   return runs;
 }

@@ -31,8 +31,8 @@ struct RunImage {
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
 
 // All pixels of a finished picture, for a client: without the voxel plane, and with bounds no larger than they must be. `color`: kFloat32,
-// or kStraight8, which leaves the depths out, too.
-RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding::kFloat32);
+// or kStraight8, which leaves the depths out, too, and codes the pixels over `behind`.
+RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding::kFloat32, const Premultiplied& behind = {});
 
 // Checks an image from outside and makes its dense form, in one pass over the payload. InvalidArgument unless header and payload agree,
 // runs ascend without touching, stay inside the bounds, and every colour and depth is finite. `frame` is the frame's whole rectangle. Rows
@@ -40,7 +40,7 @@ RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding:
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
 // Checks an image in the coding kStraight8 alike, and copies its codes into `image`, whose bounds contain the header's; its other pixels
-// stay.
+// stay. The codes are those over image.behind.
 Status ReadCodesInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, StraightImage& image);
 
 // The part of these checks that needs only the header: the image fits its frame, and so how much memory it may take.

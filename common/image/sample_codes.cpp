@@ -39,21 +39,25 @@ void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) {
 }
 
 template <class Code>
-HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
+HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes, const Premultiplied& behind) {
   constexpr float max = std::numeric_limits<Code>::max();
   const std::size_t count = 4 * pixels;
   std::size_t i = 0;
   const FloatTag d;
   const hn::RebindToUnsigned<FloatTag> du;
   const auto is_alpha = hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(du, 0), hn::Set(du, 3)), hn::Set(du, 3)));
+  const auto back = hn::LoadDup128(d, behind.data());
   for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
-    const auto color = hn::LoadU(d, rgba + i), alpha = hn::Broadcast<3>(color);  // within each 128-bit block: one pixel
+    const auto front = hn::LoadU(d, rgba + i);
+    const auto color = hn::Add(front, hn::Mul(hn::Sub(hn::Set(d, 1.0F), hn::Broadcast<3>(front)), back));
+    const auto alpha = hn::Broadcast<3>(color);  // within each 128-bit block: one pixel
     const auto straight = hn::Div(color, hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), alpha));
     const auto shows = hn::Ge(hn::Mul(hn::Set(d, max), alpha), hn::Set(d, 0.5F));
     StoreCodes(d, hn::IfThenElseZero(shows, straight), codes + i);
   }
+  const auto over = [&](std::size_t at) { return rgba[at] + (1 - rgba[at | 3]) * behind[at % 4]; };
   for (; i < count; ++i) {
-    const float alpha = rgba[i | 3], sample = i % 4 == 3 ? alpha : max * alpha >= 0.5F ? rgba[i] / alpha : 0;
+    const float alpha = over(i | 3), sample = i % 4 == 3 ? alpha : max * alpha >= 0.5F ? over(i) / alpha : 0;
     StoreCodes(OneTag(), hn::Set(OneTag(), sample), codes + i);
   }
 }
@@ -74,8 +78,12 @@ void FromStraight8(const std::uint8_t* codes, std::size_t pixels, float* rgba) {
   for (; i < count; ++i) rgba[i] = float(codes[i]) / kMax8 * (i % 4 == 3 ? 1 : float(codes[i | 3]) / kMax8);
 }
 
-void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { Straight(rgba, pixels, codes); }
-void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes) { Straight(rgba, pixels, codes); }
+void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes, const Premultiplied& behind) {
+  Straight(rgba, pixels, codes, behind);
+}
+void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes, const Premultiplied& behind) {
+  Straight(rgba, pixels, codes, behind);
+}
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -88,11 +96,11 @@ HWY_EXPORT(Straight16);
 HWY_EXPORT(FromStraight8);
 
 void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes) { HWY_DYNAMIC_DISPATCH(Plain8)(samples, count, codes); }
-void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes) {
-  HWY_DYNAMIC_DISPATCH(Straight8)(premultiplied, pixels, codes);
+void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes, const Premultiplied& behind) {
+  HWY_DYNAMIC_DISPATCH(Straight8)(premultiplied, pixels, codes, behind);
 }
-void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes) {
-  HWY_DYNAMIC_DISPATCH(Straight16)(premultiplied, pixels, codes);
+void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes, const Premultiplied& behind) {
+  HWY_DYNAMIC_DISPATCH(Straight16)(premultiplied, pixels, codes, behind);
 }
 void FromStraightCodes(const std::uint8_t* codes, std::size_t pixels, float* premultiplied) {
   HWY_DYNAMIC_DISPATCH(FromStraight8)(codes, pixels, premultiplied);

@@ -1,21 +1,29 @@
 // StraightImage: the pixels of a finished picture in the codes that a PNG of 8 bits holds (StraightCodes, sample_codes.h).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "common/image/pixel_bounds.h"
+#include "common/image/sample_codes.h"
 #include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 
 struct StraightImage {
-  PixelBounds bounds;                // within the picture; may be empty
+  PixelBounds bounds;                // within the picture; may be empty. What is beside it is empty
   PooledVector<std::uint8_t> codes;  // 4 * pixel_count: [y][x], top down without padding
+  Premultiplied behind = {};         // they are those of the picture over it
 };
 
-// All pixels empty.
-inline StraightImage MakeStraightImage(const PixelBounds& bounds) {
-  return {bounds, PooledVector<std::uint8_t>(4 * std::size_t(bounds.pixel_count()), 0)};
+// All pixels are `behind`.
+inline StraightImage MakeStraightImage(const PixelBounds& bounds, const Premultiplied& behind = {}) {
+  StraightImage image{bounds, PooledVector<std::uint8_t>(4 * std::size_t(bounds.pixel_count()), 0), behind};
+  if (behind == Premultiplied{}) return image;
+  std::array<std::uint8_t, 4> code;
+  StraightCodes(behind.data(), 1, code.data());
+  for (std::size_t i = 0; i < image.codes.size(); i += code.size()) std::ranges::copy(code, image.codes.begin() + std::ptrdiff_t(i));
+  return image;
 }
 
 }  // namespace slabstream

@@ -218,7 +218,8 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                                            .policy = &resolved->policy,
                                                            .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                            .box_bytes_target = box_bytes_target}));
-  return PlanFrame(*std::move(setup), resolved->policy, roster, std::move(layout), {}, {.straight8 = request.straight8});
+  return PlanFrame(*std::move(setup), resolved->policy, roster, std::move(layout), {},
+                   {.straight8 = request.straight8 && !request.straight8_over});
 }
 
 }  // namespace slabstream

@@ -60,7 +60,7 @@ struct ClientTakes {
   // Not 0: it puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do if there
   // is one group (SharesOf).
   std::uint64_t share_pixels = 0;
-  bool straight8 = false;  // FrameRequest::straight8
+  bool straight8 = false;  // FrameRequest::straight8, of the picture alone
   friend bool operator==(const ClientTakes&, const ClientTakes&) = default;
 };
 

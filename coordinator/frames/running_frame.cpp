@@ -116,6 +116,7 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
                              .first_group = first_group_,
                              .previews = request_.submit.frame.previews,
                              .straight8 = request_.submit.frame.straight8,
+                             .straight8_over = request_.submit.frame.straight8_over,
                              .display = plan_.display,
                              .setup = plan_.setup,
                              .group = plan_.groups[number],

@@ -134,8 +134,9 @@ LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const Fra
 }
 
 Result<PlannedFrame> Planner::WithLayout(const PlanRequest& asked, FrameSetup setup, std::shared_ptr<const Layout> layout) {
-  Result<FramePlan> plan = PlanFrame(std::move(setup), asked.resolved->policy, asked.roster, std::move(layout), asked.turn,
-                                     {.share_pixels = asked.share_pixels, .straight8 = asked.resolved->frame.straight8});
+  Result<FramePlan> plan = PlanFrame(
+      std::move(setup), asked.resolved->policy, asked.roster, std::move(layout), asked.turn,
+      {.share_pixels = asked.share_pixels, .straight8 = asked.resolved->frame.straight8 && !asked.resolved->frame.straight8_over});
   if (!plan.ok()) return plan.status();
   Result<int> fit = FramesThatFit(*plan, *asked.resolved->summary, asked.limits);
   return PlannedFrame{.asked = asked, .plan = *std::move(plan), .fit = std::move(fit)};

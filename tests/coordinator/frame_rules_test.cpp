@@ -257,7 +257,10 @@ TEST(CoordinatorFrames, WorkersAreToldInWhichCodesThePictureMayCome) {
   script.Join(11, 1);
   SubmitFrame submit = Frame(1, 1);
   submit.frame.straight8 = true;
-  EXPECT_TRUE(HandedOut(script.Submit(kClient, submit)).at(0).straight8);
+  submit.frame.straight8_over = {1, 0.5F, 0};
+  const GroupAssignment assignment = HandedOut(script.Submit(kClient, submit)).at(0);
+  EXPECT_TRUE(assignment.straight8);
+  EXPECT_EQ(assignment.straight8_over, submit.frame.straight8_over);
 }
 
 TEST(CoordinatorFrames, PreviewsGoToTheClientInOrderAndTellOfGroupsDone) {

@@ -30,9 +30,9 @@ EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers, in
   return options;
 }
 
-std::vector<std::uint8_t> StraightCodesOf(const LocalImage& image) {
+std::vector<std::uint8_t> StraightCodesOf(const LocalImage& image, const Premultiplied& behind = {}) {
   std::vector<std::uint8_t> codes(image.rgba.size());
-  StraightCodes(image.rgba.data(), codes.size() / 4, codes.data());
+  StraightCodes(image.rgba.data(), codes.size() / 4, codes.data(), behind);
   return codes;
 }
 
@@ -90,6 +90,11 @@ TEST_F(EmbeddedServiceTest, PicturesComeInTheCodesOfAFileIfThatIsEnough) {
     EXPECT_EQ(codes->image.bounds(), floats->image.bounds());
     const PooledVector<std::uint8_t>& found = codes->image.codes()->codes;
     EXPECT_TRUE(std::ranges::equal(found, StraightCodesOf(*floats->image.floats())));
+    request.straight8_over = {0.25F, 1, 0.5F};
+    const Result<Picture> over = client.Render(request);
+    ASSERT_TRUE(over.ok() && over->image.codes() != nullptr) << over.status().message();
+    EXPECT_EQ(over->image.bounds(), floats->image.bounds());
+    EXPECT_TRUE(std::ranges::equal(over->image.codes()->codes, StraightCodesOf(*floats->image.floats(), {0.25F, 1, 0.5F, 1})));
   }
 }
 

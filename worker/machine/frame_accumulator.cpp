@@ -18,6 +18,7 @@ FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId s
       group_count_(assignment.group_count),
       previews_(assignment.previews),
       straight8_(assignment.straight8),
+      straight8_over_(assignment.straight8_over),
       setup_(std::make_shared<const FrameSetup>(assignment.setup)),
       pictures_(assignment.pictures),
       share_(share),
@@ -140,8 +141,8 @@ void FrameAccumulator::SendPicture(WorkerActions& actions) {
                      .share = std::uint32_t(share_),
                      .share_count = std::uint32_t(share_count_)};
   message.picture.runs.image.format = setup_->format;
-  actions.push_back(
-      SendFrame{client_, std::move(message), image_, pixels_, straight8_, setup_, pictures_, shapes_->shapes, shapes_->lights});
+  actions.push_back(SendFrame{client_, std::move(message), image_, pixels_, straight8_, straight8_over_, setup_, pictures_, shapes_->shapes,
+                              shapes_->lights});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

@@ -60,6 +60,7 @@ class FrameAccumulator {
   const FrameId frame_;
   const std::uint32_t group_count_;
   const bool previews_, straight8_;
+  const std::optional<Rgb> straight8_over_;
   const std::shared_ptr<const FrameSetup> setup_;
   const std::optional<PicturesAddress> pictures_;
   const std::size_t share_, share_count_;

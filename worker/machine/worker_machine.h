@@ -330,6 +330,7 @@ struct SendFrame {
   ImageHandle image = 0;
   PixelRange pixels;       // others of the image may hold anything
   bool straight8 = false;  // FrameRequest::straight8
+  std::optional<Rgb> straight8_over = {};
   std::shared_ptr<const FrameSetup> setup;
   std::optional<PicturesAddress> pictures = {};  // where its client takes it; none: through the coordinator
   std::vector<BoxKey> shapes = {}, lights = {};  // if the setup has shapes: as those of StartRender

@@ -506,14 +506,16 @@ Status Executor::MakePicture(LocalImage& frame, SendFrame& send, const ShapeBoxe
     // At the seams of shares that are resampled, pixels are sums, and codes of their parts would not add up.
     const bool straight8 = send.straight8 && (whole || renderer.FrameIsPicture(*send.setup));
     const ColorCoding color = straight8 ? ColorCoding::kStraight8 : ColorCoding::kFloat32;
-    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color);
+    const std::optional<Rgb>& over = send.straight8_over;
+    const Premultiplied behind = over ? Premultiplied{over->r, over->g, over->b, 1} : Premultiplied{};
+    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color, behind);
     FillRows(image);
     const ShapeBytes bytes = BytesOf(shape_boxes.shapes);
     const auto shapes = ShapesFrom(bytes, LightFrom(shape_boxes.lights, bytes, send.client, *send.setup), shape_boxes.shared.get());
     if (!shapes.ok()) return shapes.status();
     const LocalImage picture = *shapes == nullptr ? renderer.Finish(image, *send.setup) : FinishWithShapes(image, send, **shapes);
     resolved_ns = NowNs();
-    return EncodePicture(picture, color);
+    return EncodePicture(picture, color, behind);
   });
   if (!made.ok()) return made.status();
   RunImage& runs = *made;

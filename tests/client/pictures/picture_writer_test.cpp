@@ -95,6 +95,17 @@ TEST_F(ImageWriterTest, PngIsTheSameOfThePictureAndOfItsCodes) {
   for (std::size_t i = 0; i < of_codes.samples.size(); ++i) EXPECT_NEAR(of_codes.samples[i], of_floats.samples[i], 1.01 / 255) << i;
 }
 
+TEST_F(ImageWriterTest, FilesAreTheSameOfCodesOverTheirBackground) {
+  const PictureFormat format{.background = {1, 0.5F, 0.25F, 1}};
+  const LocalImage floats = TwoPixels(PixelFormat::kRgba);
+  StraightImage codes = MakeStraightImage(floats.bounds, {1, 0.5F, 0.25F, 1});
+  StraightCodes(floats.rgba.data(), 2, codes.codes.data(), codes.behind);
+  for (const PictureFileType type : {PictureFileType::kPng, PictureFileType::kJpeg}) {
+    const auto file = [&](const PictureImage& image) { return PictureFile(type, image, kSize, format).value(); };
+    EXPECT_EQ(file(codes), file(floats)) << int(type);
+  }
+}
+
 TEST_F(ImageWriterTest, PngOf16BitsKeepsFinerSteps) {
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, 1, 1});
   image.rgba = {0.5F + 1.0F / 4096, 0.5F, 0, 1};

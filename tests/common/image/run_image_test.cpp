@@ -154,6 +154,24 @@ TEST(RunImage, PicturesMayComeInTheCodesOfAFile) {
   }
 }
 
+// The same pixels travel, and the others are what lies behind.
+TEST(RunImage, CodesMayBeThoseOverABackground) {
+  constexpr Premultiplied kBehind = {0.25F, 1, 0.5F, 1};
+  Random random(38);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 20; ++i) {
+    LocalImage image = RandomImage(random, PixelFormat::kRgba, {2, 3, 20, 15});
+    for (float& value : image.rgba) value = value == 0 ? 0 : random.Real(0.1, 1);
+    const RunImage alone = EncodePicture(image, ColorCoding::kStraight8), over = EncodePicture(image, ColorCoding::kStraight8, kBehind);
+    EXPECT_EQ(over.header, alone.header);
+    StraightImage picture = MakeStraightImage(image.bounds, kBehind);
+    ASSERT_EQ(ReadCodesInto(over.header, over.payload, kFrame, picture), Status::Ok());
+    std::vector<std::uint8_t> expected(image.rgba.size());
+    StraightCodes(image.rgba.data(), expected.size() / 4, expected.data(), kBehind);
+    EXPECT_TRUE(std::ranges::equal(picture.codes, expected)) << "image " << i;
+  }
+}
+
 TEST(RunImage, BoundsOfPicturesEndWhereTheyShowNothing) {
   Random random(36);
   SCOPED_TRACE(random.trace());

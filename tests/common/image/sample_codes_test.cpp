@@ -75,19 +75,21 @@ TEST(SampleCodes, AreThoseOfTheReferenceOnEveryInstructionSet) {
   SCOPED_TRACE(random.trace());
   for (std::size_t pixels = 0; pixels < 40; ++pixels) {
     const std::vector<float> rgba = AnyPixels(random, pixels);
+    const float alpha = random.Chance(0.5) ? 1 : float(random.Real(0, 1));
+    const Premultiplied behind = random.Chance(0.3) ? Premultiplied{} : Premultiplied{0.25F * alpha, alpha, 0, alpha};
     std::vector<std::uint8_t> plain(rgba.size()), straight(rgba.size());
     std::vector<std::uint16_t> deep(rgba.size());
     testing::SampleCodesReference(rgba.data(), rgba.size(), plain.data());
-    testing::StraightCodesReference(rgba.data(), pixels, straight.data());
-    testing::StraightCodesReference(rgba.data(), pixels, deep.data());
+    testing::StraightCodesReference(rgba.data(), pixels, straight.data(), behind);
+    testing::StraightCodesReference(rgba.data(), pixels, deep.data(), behind);
     ForEachTarget([&] {
       std::vector<std::uint8_t> codes(rgba.size());
       SampleCodes(rgba.data(), rgba.size(), codes.data());
       EXPECT_EQ(codes, plain);
-      StraightCodes(rgba.data(), pixels, codes.data());
+      StraightCodes(rgba.data(), pixels, codes.data(), behind);
       EXPECT_EQ(codes, straight);
       std::vector<std::uint16_t> deep_codes(rgba.size());
-      StraightCodes(rgba.data(), pixels, deep_codes.data());
+      StraightCodes(rgba.data(), pixels, deep_codes.data(), behind);
       EXPECT_EQ(deep_codes, deep);
     });
   }

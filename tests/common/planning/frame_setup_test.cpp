@@ -241,6 +241,10 @@ TEST(PlanFrame, ColoursOfTheNearestPixelsTravelIn8BitsIfTheClientTakesThese) {
   FrameRequest request = SomeRequest();
   request.renderer = ZBuffer()->name();
   request.straight8 = true;
+  request.straight8_over = {1, 1, 1};
+  EXPECT_EQ(Plan(request, summary, FullRoster(4)).groups[0].color, ColorCoding::kFloat32)
+      << "codes are those of the sum with what lies behind";
+  request.straight8_over.reset();
   request.shading.model = ShadingModel::kDepthGradient;
   EXPECT_EQ(Plan(request, summary, FullRoster(4)).groups[0].color, ColorCoding::kFloat32) << "colours are shaded after combining";
 }

@@ -71,6 +71,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   message.group_count = 1024;
   message.first_group = 3;
   message.previews = message.straight8 = true;
+  message.straight8_over = {0, 0.5F, 1};
   message.display = kMax32;
   FrameSetup& setup = message.setup;
   setup.dataset = kMax64;
@@ -468,6 +469,7 @@ std::vector<SubmitFrame> SamplesOf() {
   full.termination = 0.5;
   full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
   full.previews = full.straight8 = full.key = true;
+  full.straight8_over = {1, 0.5F, 0};
   FrameRequest sliced = Request();
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
   FrameRequest surfaces = Request();
