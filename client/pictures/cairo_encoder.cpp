@@ -176,9 +176,8 @@ void Describe(const EncodedFormat& format, cairo_surface_t* page) {
 std::optional<std::string> EncodeByCairo(const EncodedFormat& format, const PictureRows& rows, const WriteBytes& write) {
   const Surface image(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, format.width, format.height));
   if (const auto status = cairo_surface_status(image.get())) return cairo_status_to_string(status);
-  if (!rows([&](int y, const void* row) { return TakeRow(y, static_cast<const std::uint8_t*>(row), format.width, image.get()); })) {
-    return kBytesNotTaken;
-  }
+  const auto take = [&](int y, const void* row) { return TakeRow(y, static_cast<const std::uint8_t*>(row), format.width, image.get()); };
+  if (!rows(0, format.height, take)) return kBytesNotTaken;
   cairo_surface_mark_dirty(image.get());
 
   ByteSink sink{write};

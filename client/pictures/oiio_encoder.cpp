@@ -76,7 +76,7 @@ std::optional<std::string> EncodeByOiio(const EncodedFormat& format, const Pictu
   const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(exr ? "openexr" : "tiff");
   if (!out) return OIIO::geterror();
   if (!out->open(exr ? "picture.exr" : "picture.tif", spec)) return out->geterror();
-  const bool written = rows([&](int y, const void* row) { return out->write_scanline(y, 0, spec.format, row); });
+  const bool written = rows(0, format.height, [&](int y, const void* row) { return out->write_scanline(y, 0, spec.format, row); });
   const bool closed = out->close();
   if (!written || !closed) return out->geterror();
   if (!sink.ok()) return kBytesNotTaken;

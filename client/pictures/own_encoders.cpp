@@ -4,17 +4,22 @@
 #include <webp/mux.h>
 #include <zlib.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdio>  // jpeglib.h needs FILE
 #include <cstring>
 #include <new>
+#include <utility>
 #include <vector>
 
 #include <jpeglib.h>
 
 #include "client/pictures/exif.h"
 #include "client/pictures/picture_encoder.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -75,12 +80,84 @@ void AddText(PngWriter& writer, const char* name, std::string value) {
   png_set_text(writer.png, writer.info, &text, 1);
 }
 
+// Some rows of a picture, compressed. Strips are made in parallel; one after the other they are the picture's stream of zlib.
+struct PngStrip {
+  std::vector<std::uint8_t> deflated;
+  std::uint32_t adler = 0;
+  std::size_t filtered_bytes = 0;
+};
+
+void Subtract(const std::uint8_t* __restrict row, const std::uint8_t* __restrict above, std::size_t bytes, std::uint8_t* __restrict out) {
+  for (std::size_t i = 0; i < bytes; ++i) out[i] = std::uint8_t(row[i] - above[i]);  // the compiler vectorises it
+}
+
+// The rows, each less the one above it: the smallest of those filters that cost one subtraction, on our pictures. nullopt: `rows` failed.
+std::optional<std::vector<std::uint8_t>> FilteredRows(const EncodedFormat& format, int begin, int end, const PictureRows& rows) {
+  const std::size_t bytes = 4 * std::size_t(format.width) * std::size_t(format.bits / 8);
+  std::vector<std::uint8_t> filtered((bytes + 1) * std::size_t(end - begin)), above(bytes), row(bytes);
+  std::uint8_t* out = filtered.data();
+  const bool complete = rows(std::max(begin - 1, 0), end, [&](int y, const void* samples) {
+    std::memcpy(row.data(), samples, bytes);
+    if (format.bits == 16 && std::endian::native == std::endian::little) {
+      for (std::size_t i = 0; i < bytes; i += 2) std::swap(row[i], row[i + 1]);
+    }
+    if (y >= begin) {
+      *out++ = PNG_FILTER_VALUE_UP;
+      Subtract(row.data(), above.data(), bytes, out);
+      out += bytes;
+    }
+    std::swap(row, above);
+    return true;
+  });
+  return complete ? std::optional(std::move(filtered)) : std::nullopt;
+}
+
+// The usual level, 6, takes 1.7 times as long to render 60 pictures of a head, 8 % smaller. Z_RLE is hardly faster, and up to 15 % larger.
+PngStrip Deflate(std::vector<std::uint8_t> filtered, bool last) {
+  constexpr int kFastest = 1, kNoHeader = -15, kMemoryLevel = 8;
+  z_stream stream{};
+  if (deflateInit2(&stream, kFastest, Z_DEFLATED, kNoHeader, kMemoryLevel, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
+  constexpr std::size_t kFlushBytes = 16;
+  PngStrip strip{std::vector<std::uint8_t>(deflateBound(&stream, filtered.size()) + kFlushBytes), 0, filtered.size()};
+  stream.next_in = filtered.data();
+  stream.avail_in = uInt(filtered.size());
+  stream.next_out = strip.deflated.data();
+  stream.avail_out = uInt(strip.deflated.size());
+  deflate(&stream, last ? Z_FINISH : Z_SYNC_FLUSH);
+  strip.deflated.resize(stream.total_out);
+  deflateEnd(&stream);
+  strip.adler = std::uint32_t(adler32(adler32(0, nullptr, 0), filtered.data(), uInt(filtered.size())));
+  return strip;
+}
+
+// False: `rows` or the writer failed.
+bool WriteStrips(const EncodedFormat& format, const PictureRows& rows, PngWriter& writer) {
+  constexpr std::size_t kStripBytes = std::size_t{1} << 19;
+  const int strip_rows = std::max(1, int(kStripBytes / (std::size_t(format.width) * std::size_t(format.bits) / 2)));
+  const int strips = (format.height + strip_rows - 1) / strip_rows;
+  std::atomic<bool> ok = true;
+  std::uint32_t adler = 1;
+  const auto make = [&](std::int64_t number) {
+    const int begin = int(number) * strip_rows, end = std::min(begin + strip_rows, format.height);
+    auto filtered = ok ? FilteredRows(format, begin, end, rows) : std::nullopt;
+    if (!filtered) ok = false;
+    return filtered ? Deflate(*std::move(filtered), end == format.height) : PngStrip();
+  };
+  const auto use = [&](std::int64_t number, PngStrip strip) {
+    if (!ok) return;
+    constexpr std::array<std::uint8_t, 2> kHeader = {0x78, 0x01};  // of zlib: a window of 32 kB, the fastest level
+    if (number == 0) strip.deflated.insert(strip.deflated.begin(), kHeader.begin(), kHeader.end());
+    adler = std::uint32_t(adler32_combine(adler, strip.adler, z_off_t(strip.filtered_bytes)));
+    for (int shift = 24; number + 1 == strips && shift >= 0; shift -= 8) strip.deflated.push_back(std::uint8_t(adler >> unsigned(shift)));
+    png_write_chunk(writer.png, reinterpret_cast<png_const_bytep>("IDAT"), strip.deflated.data(), strip.deflated.size());
+    if (!writer.ok()) ok = false;
+  };
+  ParallelInOrder(strips, 2 * ThreadsHere(), make, use);
+  return ok;
+}
+
 std::optional<std::string> EncodePng(const EncodedFormat& format, const PictureRows& rows, const WriteBytes& write) {
-  constexpr int kFastest = 1;  // the usual level, 6, takes 1.7 times as long to render 60 pictures of a head, 8 % smaller
   PngWriter writer(write);
-  png_set_compression_level(writer.png, kFastest);
-  png_set_filter(writer.png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);  // smallest of those that cost one subtraction, on our pictures
-  png_set_compression_buffer_size(writer.png, std::size_t{1} << 18);
   png_set_IHDR(writer.png, writer.info, png_uint_32(format.width), png_uint_32(format.height), format.bits, PNG_COLOR_TYPE_RGBA,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB_gAMA_and_cHRM(writer.png, writer.info, PNG_sRGB_INTENT_ABSOLUTE);
@@ -93,12 +170,8 @@ std::optional<std::string> EncodePng(const EncodedFormat& format, const PictureR
     AddText(writer, format.record_name.c_str(), format.record);
   }
   png_write_info(writer.png, writer.info);
-  if (format.bits == 16 && std::endian::native == std::endian::little) png_set_swap(writer.png);
-  const bool complete = rows([&](int, const void* row) {
-    png_write_row(writer.png, static_cast<png_const_bytep>(row));
-    return writer.ok();
-  });
-  if (complete) png_write_end(writer.png, nullptr);
+  const bool complete = WriteStrips(format, rows, writer);
+  if (complete) png_write_chunk(writer.png, reinterpret_cast<png_const_bytep>("IEND"), nullptr, 0);
   if (complete && writer.ok()) return std::nullopt;
   return kBytesNotTaken;
 }
@@ -182,7 +255,7 @@ std::optional<std::string> EncodeJpeg(const EncodedFormat& format, const Picture
   StateDensity(format, info);
   jpeg_start_compress(&info, TRUE);
   AddExif(format, info);
-  const bool complete = rows([&](int, const void* row) {
+  const bool complete = rows(0, format.height, [&](int, const void* row) {
     auto* samples = const_cast<JSAMPROW>(static_cast<const JSAMPLE*>(row));  // libjpeg reads them only
     jpeg_write_scanlines(&info, &samples, 1);
     return writer.ok();
@@ -230,7 +303,7 @@ std::optional<std::string> WriteWithExif(std::span<const std::uint8_t> picture, 
 std::optional<std::string> EncodeWebp(const EncodedFormat& format, const PictureRows& rows, const WriteBytes& write) {
   const std::size_t stride = 4 * std::size_t(format.width);
   std::vector<std::uint8_t> pixels(stride * std::size_t(format.height));
-  const bool complete = rows([&](int y, const void* row) {
+  const bool complete = rows(0, format.height, [&](int y, const void* row) {
     std::memcpy(pixels.data() + std::size_t(y) * stride, row, stride);
     return true;
   });

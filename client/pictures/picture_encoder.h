@@ -38,10 +38,10 @@ using WriteBytes = std::function<bool(std::int64_t offset, std::span<const std::
 // Takes row y. False: the encoder has failed. Samples of a pixel: R, G, B, A with straight alpha, of EncodedFormat::bits; JPEG: R, G, B
 // and one that does not count, of 8 bits; EXR: premultiplied floats R, G, B, A and perhaps Z.
 using WriteRow = std::function<bool(int y, const void* row)>;
-// Passes on all rows from 0 and returns false as soon as one fails, or if it gives up.
-using PictureRows = std::function<bool(const WriteRow&)>;
+// Passes on the rows [begin, end) in their order and returns false as soon as one fails, or if it gives up. Any thread.
+using PictureRows = std::function<bool(int begin, int end, const WriteRow&)>;
 
-// Calls `rows` once. nullopt: done; else the reason. std::bad_alloc: there is no memory left. Any thread.
+// nullopt: done; else the reason. std::bad_alloc: there is no memory left. Any thread.
 using PictureEncoder = std::optional<std::string> (*)(const EncodedFormat& format, const PictureRows& rows, const WriteBytes& write);
 
 // Of PNG, JPEG and WebP; of the other types null.

@@ -18,23 +18,23 @@
 namespace slabstream {
 namespace {
 
-// Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
+// Calls write(y, row) for each of the rows, in the file's own sample layout. Stops at the first failure.
 template <class Code>
-bool WriteStraightRows(const ComposedPicture& picture, const WriteRow& write) {
+bool WriteStraightRows(const ComposedPicture& picture, int begin, int end, const WriteRow& write) {
   const auto width = std::size_t(picture.size().width);
   std::vector<Code> codes(4 * width);
-  for (int y = 0; y < picture.size().height; ++y) {
+  for (int y = begin; y < end; ++y) {
     picture.StraightRow(y, codes);
     if (!write(y, codes.data())) return false;
   }
   return true;
 }
 
-bool WriteExrRows(const ComposedPicture& picture, const WriteRow& write) {
+bool WriteExrRows(const ComposedPicture& picture, int begin, int end, const WriteRow& write) {
   const bool with_depth = picture.has_depth();
   const std::size_t width = std::size_t(picture.size().width);
   std::vector<float> rgba(4 * width), depth(with_depth ? width : 0), rgbaz(with_depth ? 5 * width : 0);
-  for (int y = 0; y < picture.size().height; ++y) {
+  for (int y = begin; y < end; ++y) {
     picture.Row(y, rgba, depth);
     for (std::size_t x = 0; x < depth.size(); ++x) {
       std::copy_n(&rgba[4 * x], 4, &rgbaz[5 * x]);
@@ -132,10 +132,10 @@ Result<Prepared> Prepare(PictureFileType type, const PictureImage& image, ImageS
 
 // nullopt: done; else the encoder's reason.
 std::optional<std::string> Encode(const Prepared& prepared, const WriteBytes& write) {
-  const auto rows = [&](const WriteRow& write_row) {
-    if (prepared.encoded.type == PictureFileType::kExr) return WriteExrRows(prepared.picture, write_row);
-    return prepared.encoded.bits == 8 ? WriteStraightRows<std::uint8_t>(prepared.picture, write_row)
-                                      : WriteStraightRows<std::uint16_t>(prepared.picture, write_row);
+  const auto rows = [&](int begin, int end, const WriteRow& write_row) {
+    if (prepared.encoded.type == PictureFileType::kExr) return WriteExrRows(prepared.picture, begin, end, write_row);
+    return prepared.encoded.bits == 8 ? WriteStraightRows<std::uint8_t>(prepared.picture, begin, end, write_row)
+                                      : WriteStraightRows<std::uint16_t>(prepared.picture, begin, end, write_row);
   };
   return prepared.encoder(prepared.encoded, rows, write);
 }
@@ -198,9 +198,9 @@ Result<std::vector<std::byte>> PictureFile(PictureFileType type, const PictureIm
 std::optional<std::vector<std::byte>> EncodePart(PictureFileType type, const ComposedPicture& picture, const PixelBounds& bounds,
                                                  int quality, const std::atomic<bool>& given_up) {
   const EncodedFormat format{.type = type, .width = bounds.width(), .height = bounds.height(), .quality = quality};
-  const auto rows = [&](const WriteRow& write) {
+  const auto rows = [&](int begin, int end, const WriteRow& write) {
     std::vector<std::uint8_t> codes(4 * std::size_t(picture.size().width));
-    for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    for (int y = bounds.y_begin + begin; y < bounds.y_begin + end; ++y) {
       if (given_up.load(std::memory_order_relaxed)) return false;
       if (type == PictureFileType::kJpeg) {
         picture.OpaqueRow(y, codes);

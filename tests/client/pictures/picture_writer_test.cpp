@@ -257,15 +257,18 @@ LocalImage Noise(int side) {
   return noise;
 }
 
+// PNGs of the larger ones are compressed in several strips.
 TEST_F(ImageWriterTest, TiffHoldsThePixelsOfThePng) {
-  const LocalImage noise = Noise(40);
-  for (const int bits : {8, 16}) {
-    ASSERT_EQ(WritePicture(noise, {40, 40}, Path("a.png"), {.png_bits = bits}), Status::Ok());
-    ASSERT_EQ(WritePicture(noise, {40, 40}, Path("a.TIFF"), {.png_bits = bits}), Status::Ok());
-    const FileImage png = Read(Path("a.png")), tiff = Read(Path("a.TIFF"));
-    EXPECT_EQ(tiff.spec.format, bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
-    EXPECT_EQ(tiff.spec.nchannels, 4);
-    EXPECT_EQ(tiff.samples, png.samples);
+  for (const int side : {1, 40, 600}) {
+    const LocalImage noise = Noise(side);
+    for (const int bits : {8, 16}) {
+      ASSERT_EQ(WritePicture(noise, {side, side}, Path("a.png"), {.png_bits = bits}), Status::Ok());
+      ASSERT_EQ(WritePicture(noise, {side, side}, Path("a.TIFF"), {.png_bits = bits}), Status::Ok());
+      const FileImage png = Read(Path("a.png")), tiff = Read(Path("a.TIFF"));
+      EXPECT_EQ(tiff.spec.format, bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
+      EXPECT_EQ(tiff.spec.nchannels, 4);
+      EXPECT_EQ(tiff.samples, png.samples);
+    }
   }
 }
 
@@ -418,18 +421,17 @@ TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
 }
 
 TEST(PictureEncoderTest, APictureIsGivenUpAtAnyRow) {
-  constexpr int kSide = 256;
-  std::vector<std::uint8_t> row(std::size_t{4} * kSide);
-  for (std::size_t i = 0; i < row.size(); ++i) row[i] = std::uint8_t(i * i * 31 >> 3);  // hard to pack: many buffers are filled
+  constexpr int kSide = 384;  // PNG: several strips
+  std::vector<std::uint8_t> codes(std::size_t{4} * kSide * 2);
+  for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = std::uint8_t(i * i * 31 >> 3);  // hard to pack: many buffers are filled
   for (const PictureFileType type : {PictureFileType::kPng, PictureFileType::kJpeg, PictureFileType::kWebp}) {
     const EncodedFormat format{.type = type, .width = kSide, .height = kSide, .quality = 100};
     const auto encode = [&](int row_count, int write_count) {
-      const auto rows = [&](const WriteRow& write) {
-        for (int y = 0; y < row_count; ++y) {
-          std::ranges::rotate(row, row.begin() + 4 * (y % 7));
-          if (!write(y, row.data())) return false;
+      const auto rows = [&](int begin, int end, const WriteRow& write) {
+        for (int y = begin; y < std::min(end, row_count); ++y) {
+          if (!write(y, codes.data() + 4 * (y * y % kSide))) return false;
         }
-        return row_count == kSide;
+        return end <= row_count;
       };
       return OwnPictureEncoder(type)(format, rows, [&](std::int64_t, std::span<const std::byte>) { return write_count-- > 0; });
     };
