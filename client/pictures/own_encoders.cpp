@@ -251,7 +251,7 @@ std::optional<std::string> EncodeJpeg(const EncodedFormat& format, const Picture
   info.in_color_space = JCS_EXT_RGBX;
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, format.quality, TRUE);
-  info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = format.quality >= kFullColorFrom ? 1 : 2;
+  info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = format.quality >= kFullColorFrom && !format.quickly ? 1 : 2;
   StateDensity(format, info);
   jpeg_start_compress(&info, TRUE);
   AddExif(format, info);

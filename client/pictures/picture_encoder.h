@@ -26,6 +26,7 @@ struct EncodedFormat {
   int bits = 8;                               // bits of the samples of PNG and TIFF: 8 or 16. EXR has floats, the others have 8 bits
   bool with_depth = false;                    // an EXR has depths: Z follows R, G, B and A
   int quality = 90;                           // the quality of JPEG and WebP, [1, 100]
+  bool quickly = false;                       // JPEG: colours have half the resolution whatever the quality
   std::optional<double> density;              // pixels a metre
   std::string software, record_name, record;  // texts for the file's header; an empty record: none of them
   // What PDF and SVG show over the pixels; in other formats the pixels hold it, and so they hold what lies below the picture.

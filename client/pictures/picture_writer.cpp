@@ -197,7 +197,7 @@ Result<std::vector<std::byte>> PictureFile(PictureFileType type, const PictureIm
 
 std::optional<std::vector<std::byte>> EncodePart(PictureFileType type, const ComposedPicture& picture, const PixelBounds& bounds,
                                                  int quality, const std::atomic<bool>& given_up) {
-  const EncodedFormat format{.type = type, .width = bounds.width(), .height = bounds.height(), .quality = quality};
+  const EncodedFormat format{.type = type, .width = bounds.width(), .height = bounds.height(), .quality = quality, .quickly = true};
   const auto rows = [&](int begin, int end, const WriteRow& write) {
     std::vector<std::uint8_t> codes(4 * std::size_t(picture.size().width));
     for (int y = bounds.y_begin + begin; y < bounds.y_begin + end; ++y) {

@@ -51,8 +51,8 @@ Result<std::vector<std::byte>> PictureFile(PictureFileType type, const PictureIm
                                            const PictureNotes& notes = {});
 
 // A part of a picture as browsers take it, quickly: the pixels in `bounds`, which lies within the picture and is not empty. PNG: the codes
-// that WritePicture stores, of 8 bits. JPEG of this quality: over black as far as the picture is transparent; from 85 colours have the full
-// resolution. nullopt: `given_up` became true meanwhile. Any thread.
+// that WritePicture stores, of 8 bits. JPEG of this quality: over black as far as the picture is transparent; colours have half the
+// resolution, which takes two thirds of the time. nullopt: `given_up` became true meanwhile. Any thread.
 std::optional<std::vector<std::byte>> EncodePart(PictureFileType type, const ComposedPicture& picture, const PixelBounds& bounds,
                                                  int quality, const std::atomic<bool>& given_up);
 
