@@ -1,8 +1,12 @@
 // AlignedVector<T>: std::vector whose storage begins at a 64-byte boundary, so that kernels may use whole-register loads. Large ones go
-// back to the system when they are freed (mapped_memory.h).
+// back to the system when they are freed (mapped_memory.h). New storage reads as 0, so elements without a value are not written: to write a
+// volume's zeros before its voxels took longer than to read them. Where a vector becomes shorter and grows again, they keep what was there.
 #pragma once
 
 #include <cstddef>
+#include <memory>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "common/memory/mapped_memory.h"
@@ -15,8 +19,16 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) {}  // NOLINT(google-explicit-constructor): rebinding
-  T* allocate(std::size_t count) { return static_cast<T*>(TakeMemory(count * sizeof(T))); }
+  T* allocate(std::size_t count) { return static_cast<T*>(TakeZeros(count * sizeof(T))); }
   void deallocate(T* data, std::size_t count) { FreeMemory(data, count * sizeof(T)); }
+  template <class U>
+  void construct(U* element) {
+    if constexpr (!std::is_trivially_default_constructible_v<U>) std::construct_at(element);
+  }
+  template <class U, class... Args>
+  void construct(U* element, Args&&... args) {
+    std::construct_at(element, std::forward<Args>(args)...);
+  }
   friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
 };
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstdint>
+#include <cstring>
 #include <new>
 
 namespace slabstream {
@@ -34,6 +35,12 @@ void UnmapMemory(void* block, std::size_t bytes) { ::munmap(block, bytes); }
 
 void* TakeMemory(std::size_t bytes, std::size_t mapped_from) {
   return IsMapped(bytes, mapped_from) ? MapMemory(bytes) : ::operator new(bytes, std::align_val_t(kBufferAlignment));
+}
+
+void* TakeZeros(std::size_t bytes) {
+  void* const block = TakeMemory(bytes);
+  if (!IsMapped(bytes, kLargeBlock)) std::memset(block, 0, bytes);
+  return block;
 }
 
 void FreeMemory(void* block, std::size_t bytes, std::size_t mapped_from) {

@@ -27,6 +27,8 @@ void UnmapMemory(void* block, std::size_t bytes);  // both as taken
 // A block at a boundary of kBufferAlignment: from the heap if it has less than `mapped_from` bytes or is kWatched; else a
 // mapping. Throws std::bad_alloc.
 void* TakeMemory(std::size_t bytes, std::size_t mapped_from = kLargeBlock);
+// The same, of kLargeBlock. It reads as 0.
+void* TakeZeros(std::size_t bytes);
 void FreeMemory(void* block, std::size_t bytes, std::size_t mapped_from = kLargeBlock);  // all three as taken
 
 }  // namespace slabstream
