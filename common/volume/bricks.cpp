@@ -110,6 +110,16 @@ BrickedVoxels::BrickedVoxels(const VoxelBlock& block) : BrickedVoxels(block.box,
   });
 }
 
+VoxelBricks VoxelBricks::Part(const Box& box) const {
+  CHECK(grid_.box.Contains(box));
+  VoxelBricks part = *this;
+  part.grid_ = BrickGrid(box);
+  if (bricks_ != nullptr) return part;
+  const Index3 offset = box.begin - grid_.box.begin;
+  part.first_ += (offset.z * slice_ + offset.y * row_ + offset.x) * std::ptrdiff_t(BytesPerSample(type_));
+  return part;
+}
+
 void VoxelBricks::Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const {
   CHECK(grid_.box.Contains(box));
   VisitStoredType(type_, [&]<class T>(const T*) {

@@ -104,13 +104,22 @@ class VoxelBricks {
   const Box& box() const { return grid_.box; }
   ScalarType type() const { return type_; }
 
+  // Those of `box`, which lies inside this one.
+  VoxelBricks Part(const Box& box) const;
+
   // Reads part of the samples of `box`, which lies inside this one: whole samples, x fastest, from byte `begin` of the box's samples on.
   void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
 
   template <class T>
   BrickView<T> View(const Index3& brick) const {
-    if (bricks_ != nullptr) return bricks_->View<T>(brick);
-    const Index3 begin = grid_.BoxOf(brick).begin, offset = begin - grid_.box.begin;
+    const Index3 begin = grid_.BoxOf(brick).begin;
+    if (bricks_ != nullptr) {
+      BrickView<T> view = bricks_->View<T>(brick);
+      view.first = view.Row(begin.y, begin.z) + (begin.x - view.begin.x);
+      view.begin = begin;
+      return view;
+    }
+    const Index3 offset = begin - grid_.box.begin;
     return {reinterpret_cast<const T*>(first_) + offset.z * slice_ + offset.y * row_ + offset.x, begin, row_, slice_};
   }
 

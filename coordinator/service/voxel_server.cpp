@@ -55,6 +55,11 @@ VoxelServer::~VoxelServer() {
 }
 
 void VoxelServer::Publish(DatasetId dataset, Samples samples) {
+  if (samples.volume != nullptr) {
+    samples.held = HeldVoxels::Publish(dataset, {samples.volume, samples.read_from});
+  } else if (samples.bricks != nullptr) {
+    samples.held = HeldVoxels::Publish(dataset, {samples.bricks, samples.read_from});
+  }
   const std::lock_guard lock(mutex_);
   if (samples.description) light_volume_of_[LightVolumeOf(dataset)] = dataset;
   samples_.insert_or_assign(dataset, std::move(samples));

@@ -35,6 +35,7 @@
 #include "common/volume/sample_types.h"
 #include "common/wire/any_message.h"
 #include "coordinator/service/fair_tasks.h"
+#include "data/sources/held_voxels.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -59,6 +60,7 @@ class VoxelServer {
     // What is known of these voxels alone, where their dataset has the range and histogram of several times.
     std::shared_ptr<const VolumeSummary> own = nullptr;
     std::optional<VolumeDescription> description = {};  // describes what is held; none: nobody can ask for its light volume
+    std::shared_ptr<const HeldVoxels> held = nullptr;   // so that workers of this process find the voxels; Publish sets it
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().

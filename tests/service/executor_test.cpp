@@ -287,6 +287,33 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
 }
 
+TEST(StoredBoxTest, VoxelsThatTheProcessHoldsAreReadWhereTheyLie) {
+  auto volume = std::make_shared<Volume>();
+  volume->description.geometry.size = {40, 20, 10};
+  volume->block = MakeVoxelBlock(volume->description.geometry.bounds(), ScalarType::kUint8);
+  for (std::size_t i = 0; i < volume->block.bytes.size(); ++i) volume->block.bytes[i] = std::byte(i % 251);
+  constexpr std::uint64_t kDataset = 0x8E1D;
+  EXPECT_EQ(HeldVoxels::Find(kDataset), nullptr);
+  const BoxKey key{.dataset = kDataset, .box = {{3, 2, 1}, {30, 20, 9}}, .types = ScalarType::kUint8};
+  StoredBox box(key, {}, false);
+  {
+    const auto held = HeldVoxels::Publish(kDataset, {std::shared_ptr<const Volume>(volume)});
+    box.Hold(HeldVoxels::Find(kDataset));
+  }
+  EXPECT_FALSE(box.Assemble()) << "nothing is copied";
+  EXPECT_NE(HeldVoxels::Find(kDataset), nullptr) << "the box keeps the voxels";
+  EXPECT_EQ(box.bytes(), 0U) << "they are not its own";
+  {
+    const StoredBox::Lease lease = box.Lend(1);
+    const VoxelBricks bricks = lease.data().bricks();
+    EXPECT_EQ(bricks.box(), key.box);
+    const BrickView<std::uint8_t> view = bricks.View<std::uint8_t>({0, 0, 0});
+    EXPECT_EQ(view.Row(2, 1), volume->block.samples<std::uint8_t>() + volume->block.Offset({3, 2, 1}));
+    EXPECT_EQ(lease.data().voxels().bytes, CutBlock(volume->block, key.box).bytes);
+  }
+  EXPECT_EQ(HeldVoxels::Find(kDataset), nullptr) << "a block of its own has taken their place";
+}
+
 TEST(StoredBoxTest, WhatIsFilledHasItsSampleAndSoHasThePaddingBesideIt) {
   const Box whole = {{0, 0, 0}, {40, 20, 10}}, read = {{8, 0, 0}, {32, 20, 10}};
   const BoxKey key{.dataset = 1, .box = whole, .types = ScalarType::kUint16};

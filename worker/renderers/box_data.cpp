@@ -10,7 +10,7 @@ BoxVoxels::Samples BoxVoxels::Block() {
     const VoxelBricks bricks = samples_.view();
     VoxelBlock block = MakeVoxelBlock(bricks.box(), bricks.type());
     bricks.Read(block.box, 0, block.bytes);
-    samples_ = {std::make_shared<const VoxelBlock>(std::move(block)), nullptr, nullptr};
+    samples_ = {std::make_shared<const VoxelBlock>(std::move(block)), nullptr, nullptr, nullptr};
   }
   return samples_;
 }
@@ -19,7 +19,8 @@ std::size_t BoxVoxels::bytes() const {
   const Samples stored = samples();
   std::size_t total = stored.block != nullptr    ? stored.block->bytes.capacity()
                       : stored.bricks != nullptr ? stored.bricks->bytes()
-                                                 : stored.padded->bytes();
+                      : stored.padded != nullptr ? stored.padded->bytes()
+                                                 : 0;
   return total + (cells_ != nullptr ? cells_->bytes() : 0);
 }
 

@@ -29,23 +29,28 @@ namespace slabstream {
 // stored may. Any thread may call it.
 class BoxVoxels {
  public:
-  // Samples, stored in one of three ways; the pointers of the others are null. Whoever holds a Samples may read them.
+  // Samples, stored in one of four ways; the pointers of the others are null. Whoever holds a Samples may read them.
   struct Samples {
     std::shared_ptr<const VoxelBlock> block;
     std::shared_ptr<const BrickedVoxels> bricks;
     std::shared_ptr<const PaddedVoxels> padded;
+    std::shared_ptr<const VoxelBricks> held;  // by somebody else: this keeps them there
 
     VoxelBricks view() const {
-      return block != nullptr ? VoxelBricks(*block) : bricks != nullptr ? VoxelBricks(*bricks) : padded->bricks();
+      if (block != nullptr) return *block;
+      return bricks != nullptr ? VoxelBricks(*bricks) : padded != nullptr ? padded->bricks() : *held;
     }
   };
 
   BoxVoxels(VoxelBlock voxels, std::shared_ptr<const Mesh> cells)
-      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr, nullptr}, cells_(std::move(cells)) {}
+      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr, nullptr, nullptr}, cells_(std::move(cells)) {}
   BoxVoxels(BrickedVoxels voxels, std::shared_ptr<const Mesh> cells)
-      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels)), nullptr}, cells_(std::move(cells)) {}
+      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels)), nullptr, nullptr}, cells_(std::move(cells)) {}
   BoxVoxels(PaddedVoxels voxels, std::shared_ptr<const Mesh> cells)
-      : samples_{nullptr, nullptr, std::make_shared<const PaddedVoxels>(std::move(voxels))}, cells_(std::move(cells)) {}
+      : samples_{nullptr, nullptr, std::make_shared<const PaddedVoxels>(std::move(voxels)), nullptr}, cells_(std::move(cells)) {}
+  // `owner` keeps the voxels.
+  BoxVoxels(const VoxelBricks& voxels, std::shared_ptr<const void> owner, std::shared_ptr<const Mesh> cells)
+      : samples_{nullptr, nullptr, nullptr, KeptBy(std::move(owner), voxels)}, cells_(std::move(cells)) {}
 
   Samples samples() const {
     const std::lock_guard lock(mutex_);
@@ -55,9 +60,14 @@ class BoxVoxels {
   Samples Block();
   // Those of an unstructured grid that touch the box, and perhaps others, in the order of the whole grid. Null: it is none.
   const std::shared_ptr<const Mesh>& cells() const { return cells_; }
-  std::size_t bytes() const;  // memory
+  std::size_t bytes() const;  // memory, without that of others
 
  private:
+  static std::shared_ptr<const VoxelBricks> KeptBy(std::shared_ptr<const void> owner, const VoxelBricks& voxels) {
+    const auto kept = std::make_shared<std::pair<std::shared_ptr<const void>, VoxelBricks>>(std::move(owner), voxels);
+    return {kept, &kept->second};
+  }
+
   mutable std::mutex mutex_;  // guards samples_
   Samples samples_;
   const std::shared_ptr<const Mesh> cells_;

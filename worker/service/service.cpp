@@ -107,6 +107,7 @@ struct WorkerService::Impl {
   // One for each kind of action.
   void Perform(SendControl& action);
   void Perform(SendChunkRequest& action);
+  bool ReadsHeld(const SendChunkRequest& action);  // whether this process holds the voxels, so that none need to come
   void Perform(ConnectVoxels& action);
   void Perform(ResendImage& action);
   void Perform(AnswerPeer& action);
@@ -321,7 +322,21 @@ void WorkerService::Impl::Perform(StopProcess& action) {
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
   if (action.stored != nullptr && stored_voxels.Read(action, executor->BoxOf(action.padded), MonotonicNow())) return;
+  if (ReadsHeld(action)) return;
   if (voxels) Send(*voxels, action.request);
+}
+
+// A box keeps the whole volume there. A process with a limit counts the voxels of the box alone, so its boxes have copies.
+bool WorkerService::Impl::ReadsHeld(const SendChunkRequest& action) {
+  const ChunkRequest& request = action.request;
+  const bool may_share = options.share_memory && options.machine.memory_bytes == 0 && voxels_endpoint.starts_with("inproc://");
+  if (!may_share || action.stored != nullptr || IsCellChunk(request.chunk)) return false;
+  std::shared_ptr<const HeldVoxels> held = HeldVoxels::Find(request.dataset);
+  if (held == nullptr) return false;
+  const std::uint64_t stored_bytes = held->read_from == nullptr ? 0 : held->read_from->TakeStoredBytes();
+  executor->BoxOf(action.padded)->Hold(std::move(held));
+  outbox.Post(WorkerEvent(ChunkStored{action.padded, request.box, request.chunk, {}, stored_bytes}));
+  return true;
 }
 
 void WorkerService::Impl::Perform(ConnectVoxels& action) {

@@ -20,7 +20,7 @@ namespace slabstream {
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
-  bool share_memory = true;          // lend images to workers of this host
+  bool share_memory = true;          // lend images to workers of this host, and read voxels of this process in place
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;                             // called for the executor's tasks, and for "send"
   std::optional<ClientKeys> keys = std::nullopt;  // the worker's keys; none: the service has no keys

@@ -32,6 +32,12 @@ Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
   return Status::Ok();
 }
 
+void StoredBox::Hold(std::shared_ptr<const HeldVoxels> held) {
+  CHECK(!stored_);
+  const std::lock_guard lock(mutex_);
+  if (voxels_ == nullptr) held_ = std::move(held);
+}
+
 BrickedVoxels& StoredBox::Arriving() {
   if (!arriving_) arriving_.emplace(key_.box, key_.types.samples);
   return *arriving_;
@@ -79,8 +85,11 @@ void StoredBox::CopyFrom(const BoxVoxels& from, const Box& box) {
 bool StoredBox::Assemble() {
   const std::lock_guard lock(mutex_);
   if (voxels_ != nullptr) return false;
+  if (held_ != nullptr) copies_ = {};
   for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), copy.box);
-  if (stored_) {
+  if (held_ != nullptr) {
+    voxels_ = std::make_shared<BoxVoxels>(held_->view().Part(key_.box), held_, cells_.cells());
+  } else if (stored_) {
     for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
     FillPadding(ArrivingStored());
     voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), cells_.cells());
@@ -91,6 +100,7 @@ bool StoredBox::Assemble() {
   arriving_.reset();
   arriving_stored_.reset();
   filled_ = {};
+  held_ = {};
   cells_ = {};
   unpacked_ = {};
   return !std::exchange(copies_, {}).empty();

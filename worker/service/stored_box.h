@@ -14,6 +14,7 @@
 #include "common/volume/filled_box.h"
 #include "common/wire/payload.h"
 #include "common/wire/voxel_messages.h"
+#include "data/sources/held_voxels.h"
 #include "data/sources/volume_source.h"
 #include "worker/machine/worker_machine.h"
 #include "worker/renderers/box_data.h"
@@ -35,6 +36,9 @@ class StoredBox {
   // For a box of stored voxels: where those of `box`, which lies in this one, must be written; nullopt: all are there.
   // Whoever writes there keeps this object.
   std::optional<BoxRoom> RoomFor(const Box& box);
+
+  // Unless its voxels are read in parts: they are among these, which are not copied.
+  void Hold(std::shared_ptr<const HeldVoxels> held);
 
   // DataLoss: the chunk does not fit this padded box.
   Status Store(const Chunk& chunk, const Bytes& payload);
@@ -93,6 +97,7 @@ class StoredBox {
   std::vector<FilledBox> filled_;
   std::optional<BrickedVoxels> arriving_;        // unless stored_
   std::optional<PaddedVoxels> arriving_stored_;  // if stored_
+  std::shared_ptr<const HeldVoxels> held_;       // instead of arriving_ and copies_; null: voxels must come
   ArrivingCells cells_;
   std::vector<std::byte> unpacked_;    // a chunk's samples
   std::shared_ptr<BoxVoxels> voxels_;  // null: not all there

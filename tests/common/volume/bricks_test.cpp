@@ -163,5 +163,40 @@ TEST(BrickedVoxels, KeepTheBitsOfWhatIsNotANumber) {
   EXPECT_EQ(std::memcmp(read.data(), volume.block.bytes.data(), read.size()), 0);
 }
 
+// A part has its own bricks, cut off by its box, of voxels that stay where they are.
+TEST(VoxelBricks, APartIsTheSameVoxelsInPlace) {
+  Random random(17);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 40; ++i) {
+    const Index3 size = {random.Integer(1, 70), random.Integer(1, 50), random.Integer(1, 40)};
+    const Volume volume = PatchyVolume(random, size, ScalarType(random.Integer(1, 3)));
+    const BrickedVoxels bricked(volume.block);
+    const Box box = RandomBox(random, volume.block.box);
+    if (box.empty()) continue;
+    const VoxelBlock expected = Cut(volume.block, box);
+    for (const VoxelBricks& whole : {VoxelBricks(volume.block), VoxelBricks(bricked)}) {
+      const VoxelBricks part = whole.Part(box);
+      EXPECT_EQ(part.box(), box);
+      VoxelBlock read = MakeVoxelBlock(box, part.type());
+      part.Read(box, 0, read.bytes);
+      EXPECT_EQ(read.bytes, expected.bytes);
+      VisitScalarType(part.type(), [&]<class T>(const T*) {
+        for (std::size_t number = 0; number < part.grid().size(); ++number) {
+          const Index3 brick = part.grid().first + PlaceIn(part.grid().counts, number);
+          const Box of_brick = part.grid().BoxOf(brick);
+          const BrickView<T> view = part.View<T>(brick);
+          ASSERT_EQ(view.begin, of_brick.begin);
+          for (std::int32_t z = of_brick.begin.z; z < of_brick.end.z; ++z) {
+            for (std::int32_t y = of_brick.begin.y; y < of_brick.end.y; ++y) {
+              const T* const row = expected.samples<T>() + expected.Offset({of_brick.begin.x, y, z});
+              ASSERT_EQ(std::memcmp(view.Row(y, z), row, std::size_t(of_brick.size().x) * sizeof(T)), 0);
+            }
+          }
+        }
+      });
+    }
+  }
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -1,0 +1,30 @@
+// HeldVoxels: the voxels that a coordinator holds, for the workers of its own process (`--local`). They read them where they lie: a copy
+// would take as much memory again, and more time than to read the file.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <variant>
+
+#include "common/volume/bricks.h"
+#include "common/volume/volume.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+struct HeldVoxels {
+  std::variant<std::shared_ptr<const Volume>, std::shared_ptr<const BrickedVoxels>> voxels;
+  std::shared_ptr<VolumeSource> read_from = nullptr;  // tells how much was read of it (TakeStoredBytes); null: nothing does
+
+  VoxelBricks view() const {
+    if (const auto* const volume = std::get_if<std::shared_ptr<const Volume>>(&voxels)) return (*volume)->block;
+    return *std::get<std::shared_ptr<const BrickedVoxels>>(voxels);
+  }
+
+  // Those of a dataset (DatasetId) can be found as long as somebody keeps what this returns. The same id means the same voxels. Any thread.
+  static std::shared_ptr<const HeldVoxels> Publish(std::uint64_t dataset, HeldVoxels held);
+  // Null: nobody in this process holds them. Any thread.
+  static std::shared_ptr<const HeldVoxels> Find(std::uint64_t dataset);
+};
+
+}  // namespace slabstream
