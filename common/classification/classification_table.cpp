@@ -112,16 +112,21 @@ float StoredIsovalue(double value, const ValueMapping& mapping) {
   return float(stored - std::abs(stored) * 0x1p-20);
 }
 
-float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values) {
-  if (!(values.min <= values.max)) return 0;
+BinRange BinsOf(const ClassificationTable& table, const VolumeDescription& description, ValueRange values) {
+  if (!(values.min <= values.max)) return {};
   StoredRange stored = StoredFromData(description, values);
   if (description.type == ScalarType::kFloat32 && description.mapping != ValueMapping{}) {
     // Mapped to data values, the ends were rounded to floats.
     const double slack = std::max(std::abs(stored.low), std::abs(stored.high)) * 0x1p-22;
     stored = {stored.low - slack, stored.high + slack};
   }
-  const auto first = table.opacity.begin() + table.BinOf(stored.low), last = table.opacity.begin() + table.BinOf(stored.high);
-  return *std::max_element(first, last + 1);
+  return {table.BinOf(stored.low), table.BinOf(stored.high)};
+}
+
+float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values) {
+  const BinRange bins = BinsOf(table, description, values);
+  if (bins.first > bins.last) return 0;
+  return *std::max_element(table.opacity.begin() + bins.first, table.opacity.begin() + bins.last + 1);
 }
 
 }  // namespace slabstream

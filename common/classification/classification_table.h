@@ -50,6 +50,12 @@ float StoredIsovalue(double value, const ValueMapping& mapping);
 // `range` is in data values and comes from the volume's summary, so that all workers build the same table.
 ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescription& description, ValueRange range);
 
+// The first and the last bin of samples with a data value in `values`, such as a brick of the summary. None: first > last.
+struct BinRange {
+  int first = 0, last = -1;
+};
+BinRange BinsOf(const ClassificationTable& table, const VolumeDescription& description, ValueRange values);
+
 // Largest opacity that the table gives to a sample with a data value in `values`, such as a brick of the summary (0 for kNoFiniteValue). If
 // it is 0, the values are empty for every renderer; MaxOpacity(TransferFunction) may differ by what happens within one bin.
 float MaxOpacity(const ClassificationTable& table, const VolumeDescription& description, ValueRange values);

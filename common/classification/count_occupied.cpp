@@ -3,7 +3,9 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <type_traits>
+#include <vector>
 
 #include "common/base/check.h"
 #include "common/classification/occupancy_layers.h"
@@ -40,6 +42,32 @@ class Occupied {
   std::vector<std::uint8_t> by_sample_;
 };
 
+// What the volume's summary tells of its bricks.
+class KnownBricks {
+ public:
+  KnownBricks(const ClassificationTable& table, const VolumeSummary* summary) : table_(table), summary_(summary) {
+    if (summary_ == nullptr || summary_->bricks.empty()) return;
+    visible_before_.push_back(0);
+    for (const float opacity : table.opacity) visible_before_.push_back(visible_before_.back() + int(opacity > 0));
+  }
+
+  // Whether all voxels of a brick are occupied, or none is. None: it must be read.
+  std::optional<bool> AllOf(const Index3& brick) const {
+    if (visible_before_.empty()) return std::nullopt;
+    const BinRange bins = BinsOf(table_, summary_->description, summary_->bricks[NumberIn(summary_->brick_counts, brick)]);
+    const int visible = bins.first > bins.last ? 0 : visible_before_[std::size_t(bins.last) + 1] - visible_before_[std::size_t(bins.first)];
+    if (visible == 0) return false;
+    // Of floats some may not be finite.
+    const bool all = visible > bins.last - bins.first && summary_->description.type != ScalarType::kFloat32;
+    return all ? std::optional(true) : std::nullopt;
+  }
+
+ private:
+  const ClassificationTable& table_;
+  const VolumeSummary* const summary_;
+  std::vector<int> visible_before_;  // [bin]: visible bins before it; empty: nothing is known
+};
+
 // The occupied samples of a cell's row, at most kOccupancyCell: bit i is sample i. Rows of one value, most rows of sparse data, take one
 // comparison.
 template <class T>
@@ -66,8 +94,9 @@ CellOccupancy CountCell(const BrickView<T>& brick, const Box& cell, const Occupi
 }
 
 template <class T>
-void Count(const VoxelBricks& voxels, const ClassificationTable& table, OccupancyGrid& grid) {
+void Count(const VoxelBricks& voxels, const ClassificationTable& table, const VolumeSummary* summary, OccupancyGrid& grid) {
   const Occupied<T> occupied(table);
+  const KnownBricks known(table, summary);
   const Index3 cells = OccupancyCells(grid.size);
   constexpr std::int32_t kCellsOfBrick = kBrick / kOccupancyCell;
   ParallelFor(0, cells.y * cells.z, [&](std::int32_t row) {
@@ -75,19 +104,25 @@ void Count(const VoxelBricks& voxels, const ClassificationTable& table, Occupanc
     CellOccupancy* out = &grid.cells[std::size_t(row) * std::size_t(cells.x)];
     for (; cell.x < cells.x; ++cell.x) {
       const Index3 brick = {cell.x / kCellsOfBrick, cell.y / kCellsOfBrick, cell.z / kCellsOfBrick};
-      out[cell.x] = CountCell(voxels.View<T>(brick), OccupancyCellBox(cell, grid.size), occupied);
+      const Box box = OccupancyCellBox(cell, grid.size);
+      const std::optional<bool> all = known.AllOf(brick);
+      if (all) {
+        out[cell.x] = *all ? FullCell(box) : CellOccupancy{};
+      } else {
+        out[cell.x] = CountCell(voxels.View<T>(brick), box, occupied);
+      }
     }
   });
 }
 
 }  // namespace
 
-OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table) {
+OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table, const VolumeSummary* summary) {
   const Box& box = voxels.box();
   CHECK(box.begin == Index3{} && !box.empty());
   const Index3 cells = OccupancyCells(box.end);
   OccupancyGrid grid{box.end, std::vector<CellOccupancy>(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z))};
-  VisitScalarType(voxels.type(), [&](auto* type) { Count<std::remove_cvref_t<decltype(*type)>>(voxels, table, grid); });
+  VisitScalarType(voxels.type(), [&](auto* type) { Count<std::remove_cvref_t<decltype(*type)>>(voxels, table, summary, grid); });
   return grid;
 }
 

@@ -9,8 +9,9 @@
 namespace slabstream {
 
 // Occupied: the voxel's bin has an opacity above zero, as the renderers see it; samples that are not finite never are. `voxels` are those
-// of a whole volume, from voxel 0 on. Parallel, with the same result for any number of threads; bricks of one value cost next to nothing.
-OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table);
+// of a whole volume, from voxel 0 on. Parallel, with the same result for any number of threads; bricks of one value cost next to nothing,
+// and so do those of which the volume's summary tells that all or none of their voxels are occupied. Null: nothing is known of them.
+OccupancyGrid CountOccupied(const VoxelBricks& voxels, const ClassificationTable& table, const VolumeSummary* summary = nullptr);
 
 // Counts the voxels of an unstructured grid's lattice. A voxel is occupied if the space that it fills touches the
 // bounding box of a cell that may be visible, because an opacity between the cell's least and greatest value is above

@@ -8,7 +8,7 @@ OccupancyGrid CountDrawn(const Volume& volume, const VolumeSummary& summary, con
                          const TransferFunction& transfer) {
   const ClassificationTable drawn = renderer.DrawnTable(transfer, summary);
   return renderer.Can(Ability::kCells) ? CountOccupiedByCells(*volume.cells, volume.description, drawn)
-                                       : CountOccupied(volume.block, drawn);
+                                       : CountOccupied(volume.block, drawn, &summary);
 }
 
 }  // namespace slabstream

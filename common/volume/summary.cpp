@@ -278,6 +278,14 @@ void PiecewiseSummary::AddAgain(const VoxelBlock& piece) { PiecesOf<float>::AddT
 
 VolumeSummary PiecewiseSummary::Take() { return std::move(state_->summary); }
 
+VolumeSummary SummaryOfBricks(const Volume& volume, const VolumeSummary& surveyed) {
+  VolumeSummary summary = UnreadSummary(volume.description, surveyed);
+  summary.bricks.resize(CountIn(summary.brick_counts));
+  FindBrickRanges(volume.block, summary.brick_counts, summary.bricks);
+  for (ValueRange& brick : summary.bricks) brick = DataRange(volume.description, brick);
+  return summary;
+}
+
 VolumeSummary Summarize(const Volume& volume) {
   PiecewiseSummary pieces(volume.description);
   pieces.Add(volume.block);

@@ -114,6 +114,9 @@ class PiecewiseSummary {
   std::unique_ptr<State> state_;
 };
 
+// The statistics of the survey, and the bricks of the volume. Parallel.
+VolumeSummary SummaryOfBricks(const Volume& volume, const VolumeSummary& surveyed);
+
 // Reads every voxel once; those of float volumes a second time for the histogram. Parallel; the result is the same for any number of
 // threads.
 VolumeSummary Summarize(const Volume& volume);

@@ -86,7 +86,7 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
   Result<OccupancyGrid> grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(*samples.cells, action.summary->description, drawn)
-                                                             : count(samples.view(), drawn);
+                                                             : count(samples.view(), drawn, action.summary.get());
   if (!grid.ok()) return grid.status();
   AddBricks(OtherBricks(*action.summary, action.volume), *action.summary, *grid);
   return std::make_shared<const OccupancyGrid>(*std::move(grid));
@@ -261,10 +261,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     }
   }
   if (samples.volume != nullptr) {
-    summary = at.surveyed_level ? *at.surveyed : Summarize(*samples.volume);
-    summary = WithStatistics(std::move(summary), *at.surveyed);
-    summary.non_finite = at.surveyed->non_finite;
-    summary.labels = at.surveyed->labels;
+    summary = at.surveyed_level ? *at.surveyed : SummaryOfBricks(*samples.volume, *at.surveyed);
   } else {
     samples.in_parts = {at.source, at.stored.level};
     summary = at.surveyed_level ? *at.surveyed : UnreadSummary(description, *at.surveyed);

@@ -32,7 +32,7 @@ namespace slabstream {
 using CoordinatorEvent = Merged<FrameEvent, DatasetEvent>;
 
 // Called by the planning and the counting threads. Tests replace them by functions that fail or wait.
-using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
+using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&, const VolumeSummary*)>;
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;

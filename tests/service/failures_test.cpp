@@ -144,9 +144,9 @@ TEST_F(FailuresTest, PlanningWithoutMemoryFailsThatFrameOnly) {
 
 TEST_F(FailuresTest, CountingWithoutMemoryFailsWhatNeedsItOnly) {
   std::atomic<bool> first = true;
-  coordinator_options.count_occupied = [&first](const VoxelBricks& voxels, const ClassificationTable& table) {
+  coordinator_options.count_occupied = [&first](const VoxelBricks& voxels, const ClassificationTable& table, const VolumeSummary* summary) {
     if (first.exchange(false)) throw std::bad_alloc();
-    return CountOccupied(voxels, table);
+    return CountOccupied(voxels, table, summary);
   };
   StartOne();
   ExpectFailure(Render("ball", "kd-tree"), StatusCode::kResourceExhausted, "counting of occupied voxels: not enough memory");

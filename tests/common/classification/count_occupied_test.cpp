@@ -38,10 +38,12 @@ TEST(CountOccupied, CountsWhatTheTableShows) {
       volume.block.samples<float>()[0] = std::numeric_limits<float>::quiet_NaN();
       volume.block.samples<float>()[std::size_t(volume.block.box.voxel_count()) - 1] = std::numeric_limits<float>::infinity();
     }
-    const ClassificationTable table = Classify(RandomTransfer(random), volume.description, Summarize(volume).range);
+    const VolumeSummary summary = Summarize(volume);
+    const ClassificationTable table = Classify(RandomTransfer(random), volume.description, summary.range);
     const OccupancyGrid expected = CountOneByOne(volume, table);
     EXPECT_EQ(CountOccupied(volume.block, table), expected);
     EXPECT_EQ(CountOccupied(BrickedVoxels(volume.block), table), expected);
+    EXPECT_EQ(CountOccupied(volume.block, table, &summary), expected);
   }
 }
 

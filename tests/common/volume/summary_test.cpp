@@ -96,6 +96,21 @@ TEST(Summary, IsWhatItsDefinitionSaysForEveryTypeAndOddSizes) {
   }
 }
 
+TEST(Summary, OfBricksHasThoseOfTheVolumeAndTheStatisticsOfTheSurvey) {
+  Random random(63);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    Volume volume = RandomVolume(random, {50, 33, 20}, type);
+    volume.description.mapping = {0.5, -100};
+    const VolumeSummary whole = Summarize(volume);
+    VolumeSummary surveyed = whole;
+    surveyed.range = {-7, 7};
+    surveyed.histogram.fill(3);
+    const VolumeSummary of_bricks = SummaryOfBricks(volume, surveyed);
+    EXPECT_EQ(of_bricks, WithStatistics(whole, surveyed));
+  }
+}
+
 TEST(Summary, LeavesValuesOutThatAreNotFinite) {
   Random random(2);
   SCOPED_TRACE(random.trace());
