@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <span>
 #include <thread>
 
 #include "common/mesh/mesh_part.h"
@@ -29,6 +30,13 @@ double StoredAt(const Volume& volume, const Index3& v) {
   return double(volume.block.samples<T>()[volume.block.Offset(v)]);
 }
 
+// All records of the box.
+std::span<const VoxelRecord> RecordsOf(BoxData& data, const FrameSetup& setup) {
+  const OccupiedVoxels& voxels = data.CacheOf<SplatCache>().Occupied(data, setup, data.bricks().box());
+  if (voxels.to_make != nullptr) voxels.to_make->NeedAll();
+  return voxels.records;
+}
+
 // A ramp has the same gradient everywhere, at the border too, whatever the spacing.
 TEST(OccupiedVoxels, NormalsAreThoseOfTheGradient) {
   const Vec3 spacing = {0.5, 2, 1};
@@ -39,7 +47,7 @@ TEST(OccupiedVoxels, NormalsAreThoseOfTheGradient) {
   FrameSetup setup = MakeSetup(ramp, {});
   for (Axis axis : kAxes) {
     setup.camera.traversal_axis = axis;
-    for (const VoxelRecord& record : data->CacheOf<SplatCache>().Occupied(*data, setup, ramp.block.box).records) {
+    for (const VoxelRecord& record : RecordsOf(*data, setup)) {
       ASSERT_NE(record.normal, kNoGradient);
       ASSERT_GT(std::abs(Dot(DecodeNormal(record.normal), expected)), 0.9999);
     }
@@ -56,7 +64,7 @@ TEST(OccupiedVoxels, NormalsAreThoseOfTheirDefinition) {
       const auto data = CutBox(noise, noise.block.box);
       FrameSetup setup = MakeSetup(noise, {});
       setup.camera.traversal_axis = Axis::kZ;  // records are in memory order
-      const auto& records = data->CacheOf<SplatCache>().Occupied(*data, setup, noise.block.box).records;
+      const auto records = RecordsOf(*data, setup);
       ASSERT_EQ(records.size(), std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z));
       std::size_t record = 0;
       for (Index3 v; v.z < size.z; ++v.z) {
@@ -85,7 +93,7 @@ TEST(OccupiedVoxels, NormalsOfAHardEdgedBallAreTheBalls) {
   const auto data = CutBox(ball, ball.block.box);
   FrameSetup setup = MakeSetup(ball, {});
   setup.camera.traversal_axis = Axis::kZ;  // records are in memory order
-  const auto& records = data->CacheOf<SplatCache>().Occupied(*data, setup, ball.block.box).records;
+  const auto records = RecordsOf(*data, setup);
   double sum = 0;
   int count = 0;
   std::size_t record = 0;

@@ -1,10 +1,11 @@
-// FindVoxelBeams: two passes over the bricks that may hold anything, with a row of bricks along x as a task. The first pass marks occupied
-// voxels, which determines where each beam's records begin; the second fills in the records.
+// FindVoxelBeams: a pass over the bricks that may hold anything, with a row of bricks along x as a task, marks occupied voxels. This
+// determines where each beam's records begin. RecordsOfBricks makes the records of a brick.
 #include <algorithm>
 #include <array>
 #include <bit>
 
 #include "common/volume/indices.h"
+#include "common/volume/occupancy_grid.h"
 #include "worker/kernels/brick_normals.h"
 #include "worker/renderers/splat/occupied_voxels.h"
 
@@ -20,8 +21,8 @@ using RowMasks = std::array<std::uint16_t, kBrick>;  // bit i of [y]: a property
 template <class T>
 class BeamFinder {
  public:
-  BeamFinder(const VoxelBricks& voxels, const BrickRanges& ranges, const BinLookup<T>& lookup, const Vec3& spacing)
-      : voxels_(voxels), grid_(voxels.grid()), lookup_(lookup), spacing_(spacing), intervals_(lookup.Intervals()), shows_(grid_.size()) {
+  BeamFinder(const VoxelBricks& voxels, const BrickRanges& ranges, const BinLookup<T>& lookup)
+      : voxels_(voxels), grid_(voxels.grid()), lookup_(lookup), intervals_(lookup.Intervals()), shows_(grid_.size()) {
     for (const Index3& brick : IndicesIn(Box{grid_.first, grid_.first + grid_.counts})) {
       const BrickRanges::Range& range = ranges.Of(brick);
       if (!lookup.AnyBetween(range.min, range.max)) continue;
@@ -47,7 +48,6 @@ class BeamFinder {
       total += count;
     }
     beams_.records = MakeLargeArray<VoxelRecord>(total);
-    ForEachRowOfBricks(bricks, [this](const Index3& first) { Fill(first); });
     return std::move(beams_);
   }
 
@@ -110,76 +110,105 @@ class BeamFinder {
     }
   }
 
-  void Fill(const Index3& first_brick) {
-    const Box row = grid_.BoxOf(first_brick);
-    const auto height = std::size_t(row.size().y);
-    std::array<std::array<std::uint64_t, kBrick>, kBrick> next;  // [z][y]: the next record
-    for (std::int32_t z = row.begin.z; z < row.end.z; ++z) {
-      std::copy_n(&beams_.first_record[BeamOf(row.begin.y, z)], height, next[std::size_t(z - row.begin.z)].begin());
-    }
-    std::array<NormalSums, 3> planes;  // of z: [z % 3]
-    ForEachShown(first_brick, [&](const Index3& brick) {
-      const BrickView<T> view = voxels_.View<T>(brick);
-      const Box box = grid_.BoxOf(brick);
-      const std::int32_t shift = box.begin.x % kCellVoxels;
-      const std::uint32_t width_bits = (std::uint32_t{1} << box.size().x) - 1;
-      NormalScales scales = ScalesIn(box);
-      std::int32_t summed_end = grid_.box.begin.z;  // earlier planes are already summed, if they are needed again
-      for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
-        RowMasks masks;
-        std::uint32_t rows = 0;
-        const std::uint32_t* cell = MasksOf(BeamOf(box.begin.y, z)) + CellOf(box.begin.x);
-        for (std::size_t y = 0; y < height; ++y, cell += beams_.cell_count) {
-          masks[y] = std::uint16_t(*cell >> shift & width_bits);
-          rows |= std::uint32_t{masks[y] != 0} << y;
-        }
-        if (rows == 0) continue;
-        const std::int32_t below = std::max(z - 1, grid_.box.begin.z), above = std::min(z + 1, grid_.box.end.z - 1);
-        for (summed_end = std::max(summed_end, below); summed_end <= above; ++summed_end) {
-          NormalSamples<T> samples;
-          LoadPlane(box, brick, summed_end, samples);
-          SumPlane(samples, planes[std::size_t(summed_end % 3)]);
-        }
-        scales.z = ScaleAt(Axis::kZ, z);
-        std::uint16_t codes[kBrick][kBrick];
-        EncodeNormals(planes[std::size_t(below % 3)], planes[std::size_t(z % 3)], planes[std::size_t(above % 3)], scales, rows, codes);
-        for (; rows != 0; rows &= rows - 1) {
-          const auto y = std::size_t(std::countr_zero(rows));
-          std::uint64_t& place = next[std::size_t(z - box.begin.z)][y];
-          place += WriteRecords(masks[y], view.Row(box.begin.y + std::int32_t(y), z), codes[y], &beams_.records[place]);
-        }
+  const VoxelBricks& voxels_;
+  const BrickGrid& grid_;
+  const BinLookup<T>& lookup_;
+  const std::vector<SampleInterval<T>> intervals_;
+  std::vector<std::uint8_t> shows_;  // by brick: 1 if it may hold a selected sample
+  VoxelBeams beams_;
+};
+
+// `beams` have their masks and places of records, and memory for the records. Its arrays stay where they are when it is moved.
+template <class T>
+class RecordsOfBricks : public BrickRecords {
+ public:
+  RecordsOfBricks(const VoxelBricks& voxels, const ClassificationTable& table, const BinSelection& selection, const Vec3& spacing,
+                  const VoxelBeams& beams)
+      : BrickRecords(voxels, beams.box),
+        table_(table),
+        selection_(selection),
+        spacing_(spacing),
+        all_(voxels.box()),
+        box_(beams.box),
+        first_cell_(beams.first_cell),
+        cell_count_(std::size_t(beams.cell_count)),
+        z_stride_(beams.Stride(Axis::kZ)),
+        masks_(beams.masks.get()),
+        first_record_(beams.first_record.get()),
+        records_(beams.records.get()) {}
+
+ private:
+  void Make(const Index3& brick) const override {
+    const Box box = voxels().grid().BoxOf(brick);
+    const BrickView<T> view = voxels().View<T>(brick);
+    const auto height = std::size_t(box.size().y);
+    const std::int32_t shift = box.begin.x % kCellVoxels;
+    const std::uint32_t width_bits = (std::uint32_t{1} << box.size().x) - 1;
+    const auto cell = std::size_t(box.begin.x / kCellVoxels - first_cell_);
+    NormalScales scales = ScalesIn(box);
+    std::array<NormalSums, 3> planes;        // of z: [z % 3]
+    std::int32_t summed_end = all_.begin.z;  // earlier planes are already summed, if they are needed again
+    for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
+      RowMasks masks;
+      std::uint32_t rows = 0;
+      const std::size_t first_beam = std::size_t(z - box_.begin.z) * z_stride_ + std::size_t(box.begin.y - box_.begin.y);
+      for (std::size_t y = 0; y < height; ++y) {
+        masks[y] = std::uint16_t(MasksOf(first_beam + y)[cell] >> shift & width_bits);
+        rows |= std::uint32_t{masks[y] != 0} << y;
       }
-    });
+      if (rows == 0) continue;
+      const std::int32_t below = std::max(z - 1, all_.begin.z), above = std::min(z + 1, all_.end.z - 1);
+      for (summed_end = std::max(summed_end, below); summed_end <= above; ++summed_end) {
+        NormalSamples<T> samples;
+        LoadPlane(box, brick, summed_end, samples);
+        SumPlane(samples, planes[std::size_t(summed_end % 3)]);
+      }
+      scales.z = ScaleAt(Axis::kZ, z);
+      std::uint16_t codes[kBrick][kBrick];
+      EncodeNormals(planes[std::size_t(below % 3)], planes[std::size_t(z % 3)], planes[std::size_t(above % 3)], scales, rows, codes);
+      for (; rows != 0; rows &= rows - 1) {
+        const auto y = std::size_t(std::countr_zero(rows));
+        const std::uint64_t place = first_record_[first_beam + y] + RecordsBefore(MasksOf(first_beam + y), cell, shift);
+        WriteRecords(masks[y], view.Row(box.begin.y + std::int32_t(y), z), codes[y], &records_[place]);
+      }
+    }
   }
 
-  std::uint64_t WriteRecords(std::uint32_t mask, const T* samples, const std::uint16_t* codes, VoxelRecord* out) const {
+  const std::uint32_t* MasksOf(std::size_t beam) const { return &masks_[beam * cell_count_]; }
+
+  // Of a beam's records, those of voxels before bit `shift` of a cell.
+  static std::uint64_t RecordsBefore(const std::uint32_t* masks, std::size_t cell, std::int32_t shift) {
+    std::uint64_t count = std::uint64_t(CountOf(masks[cell] & ((std::uint32_t{1} << shift) - 1)));
+    std::size_t i = 0;
+    for (; i + 2 <= cell; i += 2) count += std::uint64_t(CountOf(masks[i] | std::uint64_t{masks[i + 1]} << kCellVoxels));
+    return i < cell ? count + std::uint64_t(CountOf(masks[i])) : count;
+  }
+
+  void WriteRecords(std::uint32_t mask, const T* samples, const std::uint16_t* codes, VoxelRecord* out) const {
     if (mask == 0xFFFF) {
       for (std::size_t i = 0; i < std::size_t{kBrick}; ++i) out[i] = {lookup_(samples[i]), codes[i]};
-      return kBrick;
+      return;
     }
-    std::uint64_t count = 0;
-    for (; mask != 0; mask &= mask - 1, ++count) {
+    for (; mask != 0; mask &= mask - 1) {
       const auto i = std::size_t(std::countr_zero(mask));
-      out[count] = {lookup_(samples[i]), codes[i]};
+      *out++ = {lookup_(samples[i]), codes[i]};
     }
-    return count;
   }
 
   // A plane of the brick with one more voxel on each side.
   void LoadPlane(const Box& box, const Index3& brick, std::int32_t z, NormalSamples<T>& samples) const {
-    const Box& all = grid_.box;
-    const bool has_left = box.begin.x > all.begin.x, has_right = box.end.x < all.end.x;
+    const bool has_left = box.begin.x > all_.begin.x, has_right = box.end.x < all_.end.x;
     const std::int32_t width = box.size().x;
     BrickView<T> middle, left, right;
     std::int32_t row_of_views = -1;
     for (std::int32_t y = box.begin.y - 1; y <= box.end.y; ++y) {
-      const std::int32_t inside = std::clamp(y, all.begin.y, all.end.y - 1);
+      const std::int32_t inside = std::clamp(y, all_.begin.y, all_.end.y - 1);
       if (inside / kBrick != row_of_views) {
         row_of_views = inside / kBrick;
         const std::int32_t layer = z / kBrick;
-        middle = voxels_.View<T>({brick.x, row_of_views, layer});
-        if (has_left) left = voxels_.View<T>({brick.x - 1, row_of_views, layer});
-        if (has_right) right = voxels_.View<T>({brick.x + 1, row_of_views, layer});
+        middle = voxels().View<T>({brick.x, row_of_views, layer});
+        if (has_left) left = voxels().View<T>({brick.x - 1, row_of_views, layer});
+        if (has_right) right = voxels().View<T>({brick.x + 1, row_of_views, layer});
       }
       const T* from = middle.Row(inside, z);
       T* to = samples.row[y - box.begin.y + 1];
@@ -190,7 +219,7 @@ class BeamFinder {
   }
 
   float ScaleAt(Axis axis, std::int32_t at) const {
-    const int steps = int(at > grid_.box.begin[axis]) + int(at + 1 < grid_.box.end[axis]);
+    const int steps = int(at > all_.begin[axis]) + int(at + 1 < all_.end[axis]);
     return steps == 0 ? 0.0F : float(1 / (steps * spacing_[axis]));
   }
   NormalScales ScalesIn(const Box& box) const {
@@ -200,13 +229,16 @@ class BeamFinder {
     return scales;
   }
 
-  const VoxelBricks& voxels_;
-  const BrickGrid& grid_;
-  const BinLookup<T>& lookup_;
+  const ClassificationTable table_;
+  const BinSelection selection_;
+  const BinLookup<T> lookup_{table_, selection_};
   const Vec3 spacing_;
-  const std::vector<SampleInterval<T>> intervals_;
-  std::vector<std::uint8_t> shows_;  // by brick: 1 if it may hold a selected sample
-  VoxelBeams beams_;
+  const Box all_, box_;  // of the voxels; of the beams
+  const std::int32_t first_cell_;
+  const std::size_t cell_count_, z_stride_;
+  const std::uint32_t* const masks_;
+  const std::uint64_t* const first_record_;
+  VoxelRecord* const records_;
 };
 
 }  // namespace
@@ -215,7 +247,9 @@ VoxelBeams FindVoxelBeams(const VoxelBricks& voxels, const BrickRanges& bricks, 
                           const BinSelection& selection, const Vec3& spacing) {
   return VisitScalarType(voxels.type(), [&]<class T>(const T*) {
     const BinLookup<T> lookup(table, selection);
-    return BeamFinder<T>(voxels, bricks, lookup, spacing).Find();
+    VoxelBeams beams = BeamFinder<T>(voxels, bricks, lookup).Find();
+    if (!beams.box.empty()) beams.to_make = std::make_unique<RecordsOfBricks<T>>(voxels, table, selection, spacing, beams);
+    return beams;
   });
 }
 

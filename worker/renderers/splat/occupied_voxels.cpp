@@ -60,7 +60,8 @@ Found FindInSlice(const OccupiedVoxels& cells, const Box& wanted, std::int32_t s
 }  // namespace
 
 std::size_t VoxelBeams::bytes() const {
-  return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord);
+  return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord) +
+         (to_make == nullptr ? 0 : to_make->bytes());
 }
 
 OccupiedVoxels VoxelsOf(const VoxelBeams& beams, Axis traversal, const Box& wanted) {
@@ -83,6 +84,7 @@ OccupiedVoxels VoxelsOf(const VoxelBeams& beams, Axis traversal, const Box& want
   cells.masks = beams.masks.get();
   cells.first_record = {beams.first_record.get(), beams.beam_count + 1};
   cells.records = {beams.records.get(), beams.record_count()};
+  cells.to_make = beams.to_make.get();
 
   PerThread<Found> parts;
   ParallelFor(cells.box.begin[c], cells.box.end[c], [&](std::int32_t slice) { parts.Mine().Include(FindInSlice(cells, wanted, slice)); });

@@ -3,13 +3,15 @@
 //
 // In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels = 32
 // voxels of a beam from a global multiple of 32 on, stored as a 32-bit mask of the occupied ones. So a beam costs a bit per voxel and four
-// bytes per occupied voxel, for dense and sparse data alike. A voxel's record is found by counting bits from the beam's first cell on.
+// bytes per occupied voxel, for dense and sparse data alike. A voxel's record is found by counting bits from the beam's first cell on. Each
+// record has its place from the beginning, but is made when its brick is first needed (brick_records.h).
 //
 // Traversals along z and along y visit the same beams, those along x, in different orders. So VoxelBeams are kept for two directions only:
 // along x, found in the voxels (FindVoxelBeams), and along y, for traversal along x, made from those (TurnVoxelBeams).
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "common/memory/large_array.h"
@@ -18,6 +20,7 @@
 #include "worker/kernels/voxel_record.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/brick_ranges.h"
+#include "worker/renderers/splat/brick_records.h"
 
 namespace slabstream {
 
@@ -32,6 +35,7 @@ struct VoxelBeams {
   LargeArray<std::uint32_t> masks;         // [beam][cell]
   LargeArray<std::uint64_t> first_record;  // [beam], and one more: index of the beam's first record
   LargeArray<VoxelRecord> records;
+  std::unique_ptr<BrickRecords> to_make;  // null: all records are there
 
   std::size_t Stride(Axis axis) const { return axis == inner ? 1 : std::size_t(box.size()[inner]); }  // from beam to beam
   std::size_t cells() const { return beam_count * std::size_t(cell_count); }
@@ -39,13 +43,13 @@ struct VoxelBeams {
   std::size_t bytes() const;
 };
 
-// A voxel is occupied if `selection` holds its bin. Normals are those of the data's gradient by smoothed central differences
-// (docs/rendering.md) over physical spacing. They are one-sided at the border of the given voxels, which is the volume's border or lies
-// inside the halo where nothing is read. Parallel; the result is the same for any number of threads.
+// Makes no record yet (VoxelBeams::to_make). A voxel is occupied if `selection` holds its bin. Normals are those of the data's gradient by
+// smoothed central differences (docs/rendering.md) over physical spacing. They are one-sided at the border of the given voxels, which is
+// the volume's border or lies inside the halo where nothing is read. Parallel; the result is the same for any number of threads.
 VoxelBeams FindVoxelBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
                           const BinSelection& selection, const Vec3& spacing);
 
-// The same voxels, from beams along x, in beams along y, [x][z].
+// The same voxels, from beams along x, all records of which are there, in beams along y, [x][z].
 VoxelBeams TurnVoxelBeams(const VoxelBeams& along_x);
 
 // The cells of one traversal axis; refers to beams, which must outlive it.
@@ -59,6 +63,7 @@ struct OccupiedVoxels {
   const std::uint32_t* masks = nullptr;
   std::span<const std::uint64_t> first_record;
   std::span<const VoxelRecord> records;
+  BrickRecords* to_make = nullptr;    // of the beams
   std::uint64_t occupied_in_box = 0;  // voxels found inside the wanted box, not in its halo
 
   // `slice` and `v` are inside `box`.

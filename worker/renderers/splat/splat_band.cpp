@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "common/image/local_image.h"
@@ -18,6 +19,8 @@ constexpr auto kOctetCount = [] {
   for (std::size_t mask = 0; mask < counts.size(); ++mask) counts[mask] = std::uint8_t(std::popcount(mask));
   return counts;
 }();
+
+constexpr std::int32_t kBrickOctets = kBrick / kOctet;
 
 // Non-empty octets of up to 16 cells: bit i is octet i.
 constexpr std::int32_t kSetCells = 64 / kCellOctets;
@@ -242,6 +245,11 @@ void SplatBand::FindOctets(std::int32_t beam) {
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
   const float along_v = slopes_.AlongV(beam), across = 1 + along_v * along_v;
   std::uint64_t drawn = 0;
+  Index3 brick;
+  brick[cells.axes.c] = slice_ / kBrick;
+  brick[cells.axes.v] = beam / kBrick;
+  std::optional<BrickRecords::Row> bricks;  // none: all records are there
+  if (cells.to_make != nullptr) bricks = cells.to_make->RowAt(brick.y, brick.z);
   for (std::int32_t first_cell = 0; first_cell < cell_count; first_cell += kSetCells) {
     const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
     for (std::uint64_t rest = OccupiedOctets(masks + first_cell, set_cells); rest != 0; rest &= rest - 1) {
@@ -252,6 +260,8 @@ void SplatBand::FindOctets(std::int32_t beam) {
       if (!AnyOf(needed, reached[octet].whole)) continue;
       const SegmentSpan span = reached[octet].Of(occupied);
       if (!AnyOf(needed, span)) continue;
+      brick[cells.axes.u] = (pass_.first_octet + octet) / kBrickOctets;
+      if (bricks && !bricks->Has(brick.x)) MakeRecords(brick);
       __builtin_prefetch(records);  // used for shading only after the slice's other octets
       Insert(filled, span);
       octets_.push_back(
@@ -264,6 +274,12 @@ void SplatBand::FindOctets(std::int32_t beam) {
   SegmentWord any = 0;
   for (std::int32_t word = 0; word < words_; ++word) any |= filled[word] &= needed[word];
   any_filled_[std::size_t(beam - first_beam_)] = any != 0;
+}
+
+void SplatBand::MakeRecords(const Index3& brick) {
+  clock_.Charge(Stage::kTransform);
+  pass_.cells.to_make->Need(brick);
+  clock_.Charge(Stage::kPrepare);
 }
 
 // Beams of a slice are contiguous in memory; those of the next slice are elsewhere.

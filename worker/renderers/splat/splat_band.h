@@ -48,6 +48,7 @@ class SplatBand {
   bool PlaceBeams(const SliceSamples& slice);
   void FindNeeded(const SliceSamples& slice);
   void FindOctets(std::int32_t beam);
+  void MakeRecords(const Index3& brick);
   void PrefetchCells(std::int32_t slice, std::int32_t beam) const;
   void ShadeAndFilter(const SliceSamples& slice);
   void ClearForeignSamples(const SliceSamples& slice, std::int32_t beam);

@@ -10,7 +10,10 @@ const VoxelBeams& SplatCache::Beams(BoxData& data, const FrameSetup& setup, Axis
     along_x_ = FindVoxelBeams(data.bricks(), data.ranges(), table, occupied_bins_, setup.description.geometry.spacing);
   }
   if (u == Axis::kX) return *along_x_;
-  if (!along_y_) along_y_ = TurnVoxelBeams(*along_x_);
+  if (!along_y_) {
+    if (along_x_->to_make != nullptr) along_x_->to_make->NeedAll();
+    along_y_ = TurnVoxelBeams(*along_x_);
+  }
   return *along_y_;
 }
 
@@ -21,6 +24,7 @@ const OccupiedVoxels& SplatCache::Occupied(BoxData& data, const FrameSetup& setu
     along_y_.reset();
     occupied_bins_ = std::move(bins);
   }
+  if (along_x_ && along_x_->to_make != nullptr) along_x_->to_make->SetVoxels(data.bricks());
   const Axis axis = setup.camera.traversal_axis;
   auto& of_axis = occupied_[std::size_t(axis)];
   if (const OccupiedVoxels* kept = of_axis.Find(box)) return *kept;

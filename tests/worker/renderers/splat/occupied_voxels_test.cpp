@@ -4,12 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
+#include <thread>
 #include <vector>
 
+#include "common/volume/indices.h"
 #include "tests/support/random_volume.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/kernels/normal_code.h"
@@ -63,6 +66,7 @@ class PlainLook {
 };
 
 void ExpectAsPlainlySeen(const OccupiedVoxels& cells, const PlainLook& plain, const Box& data, const Box& wanted) {
+  if (cells.to_make != nullptr) cells.to_make->NeedAll();
   const auto [c, u, v] = cells.axes;
   std::uint64_t found = 0, in_box = 0;
   for (std::int32_t slice = std::max(wanted.begin[c], data.begin[c]); slice < std::min(wanted.end[c], data.end[c]); ++slice) {
@@ -172,6 +176,7 @@ TEST(OccupiedVoxels, DoNotDependOnThreads) {
     TaskArena arena(threads);
     return arena.Run([&] {
       VoxelBeams along_x = FindVoxelBeams(scene.volume.block, BrickRanges(scene.volume.block), table, selection, {1, 1, 1});
+      along_x.to_make->NeedAll();
       VoxelBeams along_y = TurnVoxelBeams(along_x);
       return std::pair(std::move(along_x), std::move(along_y));
     });
@@ -189,6 +194,38 @@ TEST(OccupiedVoxels, DoNotDependOnThreads) {
     const auto many = find(threads);
     expect_equal(one.first, many.first);
     expect_equal(one.second, many.second);
+  }
+}
+
+// Whichever bricks are needed first, by whichever threads.
+TEST(OccupiedVoxels, RecordsAreMadeOnceInAnyOrder) {
+  const Scene scene = MakeScene({90, 80, 70}, ScalarType::kUint8, 2, 52);
+  const ClassificationTable table = Classify(scene.setup.transfer, scene.setup.description, scene.setup.range);
+  const BinSelection selection = SelectBins(table, 0);
+  const auto find = [&] { return FindVoxelBeams(scene.volume.block, BrickRanges(scene.volume.block), table, selection, {1, 1, 1}); };
+  const VoxelBeams all = find();
+  all.to_make->NeedAll();
+  const BrickGrid grid(all.box);
+  std::vector<Index3> bricks;
+  for (const Index3& brick : IndicesIn(Box{grid.first, grid.first + grid.counts})) bricks.push_back(brick);
+  for (int round = 0; round < 5; ++round) {
+    const VoxelBeams each = find();
+    ASSERT_EQ(each.record_count(), all.record_count());
+    EXPECT_FALSE(each.to_make->RowAt(grid.first.y, grid.first.z).Has(grid.first.x));
+    const BrickedVoxels elsewhere(scene.volume.block);
+    each.to_make->SetVoxels(elsewhere);
+    std::vector<std::jthread> threads;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      threads.emplace_back([&, seed, order = bricks]() mutable {
+        std::shuffle(order.begin(), order.end(), std::mt19937(seed));
+        for (const Index3& brick : order) {
+          each.to_make->Need(brick);
+          EXPECT_TRUE(each.to_make->RowAt(brick.y, brick.z).Has(brick.x));
+        }
+      });
+    }
+    threads.clear();
+    EXPECT_EQ(std::memcmp(each.records.get(), all.records.get(), all.record_count() * sizeof(VoxelRecord)), 0);
   }
 }
 
