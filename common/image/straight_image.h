@@ -11,9 +11,9 @@
 namespace slabstream {
 
 struct StraightImage {
-  PixelBounds bounds;                // within the picture; may be empty. What is beside it is empty
+  PixelBounds bounds;                // within the picture; may have no pixels. Outside, it is transparent
   PooledVector<std::uint8_t> codes;  // 4 * pixel_count: [y][x], top down without padding
-  Premultiplied behind = {};         // they are those of the picture over it
+  Premultiplied behind = {};         // `codes` are those of the picture over this colour
 };
 
 // All pixels are `behind`.

@@ -1,6 +1,6 @@
 // AlignedVector<T>: std::vector whose storage begins at a 64-byte boundary, so that kernels may use whole-register loads. Large ones go
-// back to the system when they are freed (mapped_memory.h). New storage reads as 0, so elements without a value are not written: to write a
-// volume's zeros before its voxels took longer than to read them. Where a vector becomes shorter and grows again, they keep what was there.
+// back to the system when they are freed (mapped_memory.h). New storage reads as 0, so elements without a value are not written: filling
+// a volume with zeros took longer than reading its voxels. If a vector shrinks and grows again, these elements keep their old values.
 #pragma once
 
 #include <cstddef>

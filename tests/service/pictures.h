@@ -123,10 +123,10 @@ inline float AllowedDifference(const FrameRequest& request) {
 }
 
 // Of pictures of the same samples: 0, or what rounding leaves if sums have another order. Rays add most numbers: a channel is off by up to
-// 7 in the last place of 24 bits, whether boxes are a kd-tree's or lie as owners have them.
+// 9 in the last place of 24 bits, whether boxes are a kd-tree's or lie as owners have them.
 inline float AllowedRounding(const FrameRequest& request) {
   if (AllowedDifference(request) == 0) return 0;
-  return request.renderer == "raycast" ? 5e-7F : 3e-7F;
+  return request.renderer == "raycast" ? 5.5e-7F : 3e-7F;
 }
 
 // The least alpha that the most opaque pixel of a test picture has: opacity accumulates, but a projection shows that of one value.

@@ -265,7 +265,7 @@ HWY_INLINE void SumSamples(const ProjectWork& work, const RayPacket& among, cons
       k = next;
     };
     const auto leaps_over = [&](const CommonValue& value) HWY_ATTR { return hn::AllTrue(df, hn::Or(hn::Not(active), value.common)); };
-    // What is interpolated between voxels that are not finite is not within bounds.
+    // Samples near voxels that are not finite may lie outside the bounds.
     if (std::is_integral_v<T> && blind-- <= 0) {
       const auto block = CommonValueOf(work, bounds.blocks, opposite.blocks, CellOf<kBlockShift>(place, bounds.block_counts, active));
       if (leaps_over(block)) {

@@ -37,7 +37,7 @@ class StoredBox {
   // Whoever writes there keeps this object.
   std::optional<BoxRoom> RoomFor(const Box& box);
 
-  // Unless its voxels are read in parts: they are among these, which are not copied.
+  // Takes the box's voxels from `held`, without a copy. Not for voxels that are read in parts.
   void Hold(std::shared_ptr<const HeldVoxels> held);
 
   // DataLoss: the chunk does not fit this padded box.

@@ -142,7 +142,8 @@ class OfVtk(unittest.TestCase):
                     writer.Write()
                     shape = Shape(writer.GetFileName())
                     np.testing.assert_allclose(shape.positions, places, rtol=0 if binary else 1e-5)
-                    np.testing.assert_allclose(shape.normals, normals, atol=1e-6 if binary else 1e-4)
+                    written = normals if b" nx\n" in pathlib.Path(writer.GetFileName()).read_bytes() else np.empty((0, 3))  # not by VTK 9.1
+                    np.testing.assert_allclose(shape.normals, written, atol=1e-6 if binary else 1e-4)
                     np.testing.assert_array_equal(shape.colors[:, :3], colors)
                     np.testing.assert_array_equal(shape.triangles, lists)
                     writer = vtkSTLWriter()

@@ -21,7 +21,7 @@ class BrickRecords {
   BrickRecords(const BrickRecords&) = delete;
   BrickRecords& operator=(const BrickRecords&) = delete;
 
-  // The same voxels, which may lie elsewhere in each frame. They must stay until its last Need, and come before its first one.
+  // Call before a frame's first Need: the voxels may lie elsewhere than before. They must stay until its last Need.
   void SetVoxels(const VoxelBricks& voxels) { voxels_ = voxels; }
 
   // A row of bricks along x: a frame asks for each octet that it draws.
