@@ -10,6 +10,7 @@
 #include "common/base/time.h"
 #include "common/image/local_image.h"
 #include "common/image/occlusion_mask.h"
+#include "common/parallel/parallel.h"
 #include "common/stats/report.h"
 #include "worker/renderers/for_each_piece.h"
 
@@ -19,11 +20,12 @@ namespace slabstream {
 template <class Render>
 void ForEachTile(std::int32_t count, const RenderControl& control, RankReport& report, Render&& render) {
   std::atomic<std::int64_t> ns = 0;
-  ForEachPiece(count, control, [&](std::int32_t number) {
+  const auto timed = [&](std::int32_t number) {
     const Time begin = MonotonicNow();
     render(number);
     ns += (MonotonicNow() - begin).count();
-  });
+  };
+  ForEachPiece(count, control, timed, ThreadsHere());
   report.stage_ns[std::size_t(Stage::kSample)] += ns;
 }
 

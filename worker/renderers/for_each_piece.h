@@ -11,16 +11,16 @@
 
 namespace slabstream {
 
-// Calls render(number) for each number of `count` pieces, on all threads of the task arena. Each thread follows a run of neighbours, which
-// need much the same voxels, then helps the others with theirs. While the render pauses, threads are free for others. Returns early if the
-// render is cancelled.
+// Calls render(number) for each number of `count` pieces, on all threads of the task arena, each about in order. With several `run_count`,
+// each thread follows a run of neighbours, which need much the same voxels, then helps the others with theirs: for many pieces that take
+// about as long. While the render pauses, threads are free for others. Returns early if the render is cancelled.
 template <class Render>
-void ForEachPiece(std::int32_t count, const RenderControl& control, Render&& render) {
+void ForEachPiece(std::int32_t count, const RenderControl& control, Render&& render, int run_count = 1) {
   struct alignas(64) Run {
     std::atomic<std::int32_t> next = 0;
     std::int32_t end = 0;
   };
-  std::vector<Run> runs(std::size_t(std::clamp(ThreadsHere(), 1, std::max(count, 1))));
+  std::vector<Run> runs(std::size_t(std::clamp(run_count, 1, std::max(count, 1))));
   for (std::size_t i = 0; i < runs.size(); ++i) {
     runs[i].next = std::int32_t(std::int64_t(i) * count / std::int64_t(runs.size()));
     runs[i].end = std::int32_t(std::int64_t(i + 1) * count / std::int64_t(runs.size()));

@@ -244,6 +244,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
   const float along_v = slopes_.AlongV(beam), across = 1 + along_v * along_v;
+  constexpr std::uint32_t kAll = (1U << kOctet) - 1;
   std::uint64_t drawn = 0;
   Index3 brick;
   brick[cells.axes.c] = slice_ / kBrick;
@@ -254,12 +255,15 @@ void SplatBand::FindOctets(std::int32_t beam) {
     const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
     for (std::uint64_t rest = OccupiedOctets(masks + first_cell, set_cells); rest != 0; rest &= rest - 1) {
       const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
-      const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & ((1U << kOctet) - 1);
+      const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & kAll;
       const VoxelRecord* records = record;
       record += kOctetCount[occupied];
-      if (!AnyOf(needed, reached[octet].whole)) continue;
-      const SegmentSpan span = reached[octet].Of(occupied);
+      SegmentSpan span = reached[octet].whole;
       if (!AnyOf(needed, span)) continue;
+      if (occupied != kAll) {
+        span = reached[octet].Of(occupied);
+        if (!AnyOf(needed, span)) continue;
+      }
       brick[cells.axes.u] = (pass_.first_octet + octet) / kBrickOctets;
       if (bricks && !bricks->Has(brick.x)) MakeRecords(brick);
       __builtin_prefetch(records);  // used for shading only after the slice's other octets
