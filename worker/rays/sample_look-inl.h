@@ -179,9 +179,10 @@ HWY_INLINE Light LightAt(const RayLook& look, const Gradient& g, const FrameLigh
   return LightFrom(look, g, first.open, reached);
 }
 
-// The light on samples with this gradient, if there is any. `light`: null: no shadows and no occlusion.
-HWY_INLINE Light LightOn(const RayLook& look, const FrameLight::View* light, const Gradient& g, const SamplePlace& place) {
-  return light != nullptr ? LightAt(look, g, *light, place) : LightOf(look, g);
+// The light on samples with this gradient. `light`: null: no shadows and no occlusion; place_of(): where the samples are.
+template <class PlaceOf>
+HWY_INLINE Light LightOn(const RayLook& look, const FrameLight::View* light, const Gradient& g, PlaceOf&& place_of) {
+  return light != nullptr ? LightAt(look, g, *light, place_of()) : LightOf(look, g);
 }
 
 }  // namespace slabstream::HWY_NAMESPACE

@@ -63,9 +63,8 @@ struct FieldPlace {
   const Floats (&face)[3];  // there: the face's normal among the volume's voxels
 };
 
-// Adds samples of a field. `entry`: EntryOf; gradient_of(): theirs, asked for where one is visible.
-template <class GradientOf>
-HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask visible, const LaneNumbers& entry, GradientOf&& gradient_of,
+// Adds samples of a field. `entry`: EntryOf.
+HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask visible, const LaneNumbers& entry, Gradient gradient,
                            Mixture& mixture) {
   const FloatTag df;
   const RayLook& look = *field.look;
@@ -75,12 +74,11 @@ HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask vis
   if (hn::AllFalse(df, visible)) return;
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong || at.light != nullptr) {
-    Gradient gradient = gradient_of();
     if (!hn::AllFalse(df, at.on_face)) {
       const auto face = [&](std::size_t i) HWY_ATTR { return Combined(field.normals, at.face, i); };
       gradient = Choose(at.on_face, {face(0), face(1), face(2)}, gradient);
     }
-    light = LightOn(look, at.light, gradient, at.of_volume);
+    light = LightOn(look, at.light, gradient, [&]() HWY_ATTR { return at.of_volume; });
   }
   if (field.over) {
     const bool by_step = field.steps_a_length == 1;
@@ -105,43 +103,43 @@ HWY_INLINE SamplePlace Shifted(const RayField& field, SamplePlace place) {
   return place;
 }
 
-// Calls with(a sample) for the type of a field's bricks. False: it has none.
+// Calls with(a sample) for the type of a field's samples.
 template <class With>
-HWY_INLINE bool WithBricks(const RayField& field, With&& with) {
-  if (field.voxels.type == ScalarType::kUint8) {
-    with(std::uint8_t());
-  } else if (field.voxels.type == ScalarType::kUint16) {
-    with(std::uint16_t());
-  } else {
-    return false;
+HWY_INLINE void WithSampleOf(const RayField& field, With&& with) {
+  switch (field.voxels.type) {
+    case ScalarType::kUint8: return with(std::uint8_t());
+    case ScalarType::kUint16: return with(std::uint16_t());
+    default: return with(float());
   }
-  return true;
+}
+
+// Sets EntryOf where samples are finite; returns where.
+template <class T>
+HWY_INLINE Mask SetEntry(const RayField& field, Floats value, LaneNumbers& entry) {
+  const auto finite = FiniteOf<T>(value);
+  if constexpr (std::is_same_v<T, float>) {
+    entry.Set(EntryOf(*field.look, value, finite));
+  } else {
+    entry.Set(EntryOf(*field.look, value));
+  }
+  return finite;
 }
 
 // Adds what a field has of the samples that are `sampled`. `among`: AmongVoxels, unless it is on the volume's grid.
 HWY_NOINLINE void MixField(const RayField& field, const FieldPlace& at, Mask sampled, const RayPacket& among, GradientBricks& bricks,
                            Mixture& mixture) {
-  const FloatTag df;
   const SamplePlace place = field.on_same_grid ? Shifted(field, at.of_volume) : PlaceSample(among, field.voxels, at.k);
   sampled = WithinField(field, place, sampled);
-  if (hn::AllFalse(df, sampled)) return;
-  LaneNumbers entry;
-  const bool has_bricks = WithBricks(field, [&](auto type) HWY_ATTR {
+  if (hn::AllFalse(FloatTag(), sampled)) return;
+  WithSampleOf(field, [&](auto type) HWY_ATTR {
     using Type = decltype(type);
     BrickPlace found;
     FindInBricks<Type>(field.voxels, place, sampled, bricks, found, found);
-    const LitSample sample = InterpolateCorners<Type>(bricks.corners(), found.corner, WeightsAt(place));
-    entry.Set(EntryOf(*field.look, sample.value));
-    MixSamples(
-        field, at, sampled, entry, [&]() HWY_ATTR { return sample.gradient; }, mixture);
+    const LitSample sample = ReadBricks<Type>(bricks, found.corner, BrickWeights(place));
+    LaneNumbers entry;
+    const Mask finite = SetEntry<Type>(field, sample.value, entry);
+    MixSamples(field, at, hn::And(sampled, finite), entry, sample.gradient, mixture);
   });
-  if (has_bricks) return;
-  const Neighbours<float> neighbours = LoadNeighbours<float>(field.voxels, place, sampled);
-  const auto value = Interpolate(neighbours, place);
-  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-  entry.Set(EntryOf(*field.look, value, finite));
-  MixSamples(
-      field, at, hn::And(sampled, finite), entry, [&]() HWY_ATTR { return GradientAt(neighbours, place); }, mixture);
 }
 
 // RayFields::shown at samples; 0 where not `sampled`.
@@ -165,8 +163,8 @@ HWY_NOINLINE void MixFields(const RayFields& fields, const FieldPlace& at, Ints 
   }
 }
 
-// Samples of the volume and of all other fields. Those in bricks at the volume's own places are found and read a step ahead each, so that
-// the voxels of one field are waited for while others are at work; others are read when they are mixed.
+// Samples of the volume and of all other fields. Those at the volume's own places are found and read a step ahead each, so that the voxels
+// of one field are waited for while others are at work; others are read when they are mixed.
 struct FieldSamples {
   struct Found {
     BrickPlace of[kMaxShownFields];
@@ -179,7 +177,6 @@ struct FieldSamples {
     for (BrickPlace& of : found.of) of.number = hn::Zero(IntTag());
     return found;
   }
-  static HWY_INLINE bool Ahead(const RayField& field) { return field.on_same_grid && field.voxels.type != ScalarType::kFloat32; }
 
   static HWY_INLINE void Find(const RayFields& fields, const SamplePlace& place, Ints shown, GradientBricks* bricks, Found& found,
                               Found& before) {
@@ -187,22 +184,22 @@ struct FieldSamples {
       const RayField& field = fields.fields[i];
       found.of[i].number = hn::Zero(IntTag());
       const Mask sampled = ShowsField(shown, i);
-      if (hn::AllFalse(FloatTag(), sampled) || !Ahead(field)) continue;
+      if (hn::AllFalse(FloatTag(), sampled) || !field.on_same_grid) continue;
       const Mask within = WithinField(field, place, sampled);
-      WithBricks(field, [&](auto type) SLABSTREAM_INLINED {
+      WithSampleOf(field, [&](auto type) SLABSTREAM_INLINED {
         FindInBricks<decltype(type)>(field.voxels, Shifted(field, place), within, bricks[i], found.of[i], before.of[i]);
       });
     }
   }
   HWY_INLINE void Read(const RayFields& fields, const CellPlace& place, Ints shown, GradientBricks* bricks, const Found& found) {
-    const CornerWeights weights = WeightsAt(place);
+    const BrickWeights weights(place);
     for (std::size_t i = 0; i < fields.fields.size(); ++i) {
       const RayField& field = fields.fields[i];
-      if (hn::AllFalse(FloatTag(), ShowsField(shown, i)) || !Ahead(field)) continue;
-      WithBricks(field, [&](auto type) SLABSTREAM_INLINED {
-        of[i] = InterpolateCorners<decltype(type)>(bricks[i].corners(), found.of[i].corner, weights);
+      if (hn::AllFalse(FloatTag(), ShowsField(shown, i)) || !field.on_same_grid) continue;
+      WithSampleOf(field, [&](auto type) SLABSTREAM_INLINED {
+        of[i] = ReadBricks<decltype(type)>(bricks[i], found.of[i].corner, weights);
+        SetEntry<decltype(type)>(field, of[i].value, entry[i]);
       });
-      entry[i].Set(EntryOf(*field.look, of[i].value));
     }
   }
   HWY_INLINE void Mix(const RayFields& fields, const FieldPlace& at, Ints shown, const RayPacket* among, GradientBricks* bricks,
@@ -211,9 +208,9 @@ struct FieldSamples {
       const RayField& field = fields.fields[i];
       const Mask sampled = ShowsField(shown, i);
       if (hn::AllFalse(FloatTag(), sampled)) continue;
-      if (Ahead(field)) {
-        MixSamples(
-            field, at, WithinField(field, at.of_volume, sampled), entry[i], [&]() HWY_ATTR { return of[i].gradient; }, mixture);
+      if (field.on_same_grid) {
+        const Mask within = WithinField(field, at.of_volume, sampled);
+        MixSamples(field, at, hn::And(within, FiniteOf<float>(of[i].value)), entry[i], of[i].gradient, mixture);
       } else {
         Mixture so_far = mixture;  // a call that takes its address would keep `mixture` out of registers
         MixField(field, at, sampled, among[i], bricks[i], so_far);

@@ -1,12 +1,14 @@
 // Values and gradients at samples, interpolated from GradientBricks. Included once for each instruction set, hence the unusual include
 // guard.
 //
-// A sample's eight corners have weights that are multiples of 2^-14, at least 0, and sum to 1. So a value lies between those of its
-// corners, as empty space requires. All sums are whole numbers: every instruction set gives the same bits.
+// Whole voxels: a sample's eight corners have weights that are multiples of 2^-14, at least 0, and sum to 1. So a value lies between those
+// of its corners, as empty space requires. All sums are whole numbers. Floating-point voxels are interpolated as elsewhere (Lerp). Either
+// way every instruction set gives the same bits.
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "worker/rays/sample_look-inl.h"
@@ -25,38 +27,48 @@ namespace slabstream::HWY_NAMESPACE {
 // --- Making bricks.
 
 using ShortTag = hn::CappedTag<std::int16_t, 16>;
-using Shorts = hn::Vec<ShortTag>;
-
-using Words = hn::Vec<hn::RebindToUnsigned<ShortTag>>;
+using WordTag = hn::RebindToUnsigned<ShortTag>;
+using Words = hn::Vec<WordTag>;
 
 // Samples from `at` on along x.
-HWY_INLINE Words SamplesAt(const std::uint8_t* at) {
-  return hn::PromoteTo(hn::RebindToUnsigned<ShortTag>(), hn::LoadU(hn::Rebind<std::uint8_t, ShortTag>(), at));
+HWY_INLINE Words SamplesAt(WordTag d, const std::uint8_t* at) {
+  return hn::PromoteTo(d, hn::LoadU(hn::Rebind<std::uint8_t, WordTag>(), at));
 }
-HWY_INLINE Words SamplesAt(const std::uint16_t* at) { return hn::LoadU(hn::RebindToUnsigned<ShortTag>(), at); }
+HWY_INLINE Words SamplesAt(WordTag d, const std::uint16_t* at) { return hn::LoadU(d, at); }
+HWY_INLINE Floats SamplesAt(FloatTag d, const float* at) { return hn::LoadU(d, at); }
 
 // Samples before and after others along an axis.
+template <class V>
 struct Around {
-  Words before, after;
+  V before, after;
 };
+template <class V>
 struct CornerVectors {
-  Shorts value, x, y, z;
+  V value, x, y, z;
 };
-HWY_INLINE CornerVectors CornersOf(std::uint8_t /*type*/, Words value, const Around& x, const Around& y, const Around& z) {
+using ShortCorners = CornerVectors<hn::Vec<ShortTag>>;
+
+HWY_INLINE ShortCorners CornersOf(std::uint8_t /*type*/, Words value, const Around<Words>& x, const Around<Words>& y,
+                                  const Around<Words>& z) {
   const ShortTag ds;
-  const auto difference = [&](const Around& of) HWY_ATTR { return hn::BitCast(ds, hn::Sub(of.after, of.before)); };
+  const auto difference = [&](const Around<Words>& of) HWY_ATTR { return hn::BitCast(ds, hn::Sub(of.after, of.before)); };
   return {hn::BitCast(ds, value), difference(x), difference(y), difference(z)};
 }
+HWY_INLINE CornerVectors<Floats> CornersOf(float /*type*/, Floats value, const Around<Floats>& x, const Around<Floats>& y,
+                                           const Around<Floats>& z) {
+  return {value, hn::Sub(x.after, x.before), hn::Sub(y.after, y.before), hn::Sub(z.after, z.before)};
+}
 // Values minus 32768. Where a difference does not fit into 16 bits, all three are those of halved samples.
-HWY_INLINE CornerVectors CornersOf(std::uint16_t /*type*/, Words value, const Around& x, const Around& y, const Around& z) {
+HWY_INLINE ShortCorners CornersOf(std::uint16_t /*type*/, Words value, const Around<Words>& x, const Around<Words>& y,
+                                  const Around<Words>& z) {
   const ShortTag ds;
-  const hn::RebindToUnsigned<ShortTag> du;
+  const WordTag du;
   // Negative where the difference does not fit.
-  const auto size = [&](const Around& of) HWY_ATTR {
+  const auto size = [&](const Around<Words>& of) HWY_ATTR {
     return hn::BitCast(ds, hn::Or(hn::SaturatedSub(of.after, of.before), hn::SaturatedSub(of.before, of.after)));
   };
   const auto large = hn::Lt(hn::Or(hn::Or(size(x), size(y)), size(z)), hn::Zero(ds));
-  const auto difference = [&](const Around& of) HWY_ATTR {
+  const auto difference = [&](const Around<Words>& of) HWY_ATTR {
     const auto of_halves = hn::Sub(hn::ShiftRight<1>(of.after), hn::ShiftRight<1>(of.before));
     return hn::IfThenElse(large, hn::BitCast(ds, of_halves), hn::BitCast(ds, hn::Sub(of.after, of.before)));
   };
@@ -64,14 +76,14 @@ HWY_INLINE CornerVectors CornersOf(std::uint16_t /*type*/, Words value, const Ar
 }
 
 // Writes the corners of a row, and up to eight more.
-HWY_INLINE void StoreCorners(const CornerVectors& c, GradientCorner* to) {
-  const ShortTag ds;
-  static_assert(sizeof(GradientCorner) == 8);
-  if constexpr (hn::MaxLanes(ds) == 16) {
-    const hn::RepartitionToWide<ShortTag> dw;
-    const auto wide = [&](Shorts v) HWY_ATTR { return hn::BitCast(dw, v); };
-    const auto vx_low = wide(hn::InterleaveLower(ds, c.value, c.x)), yz_low = wide(hn::InterleaveLower(ds, c.y, c.z));
-    const auto vx_high = wide(hn::InterleaveUpper(ds, c.value, c.x)), yz_high = wide(hn::InterleaveUpper(ds, c.y, c.z));
+template <class D>
+HWY_INLINE void StoreCorners(D d, const CornerVectors<hn::Vec<D>>& c, GradientCorner<hn::TFromD<D>>* to) {
+  if constexpr (sizeof(hn::TFromD<D>) == 2 && hn::MaxLanes(D()) == 16) {
+    static_assert(sizeof(*to) == 8);
+    const hn::RepartitionToWide<D> dw;
+    const auto wide = [&](hn::Vec<D> v) HWY_ATTR { return hn::BitCast(dw, v); };
+    const auto vx_low = wide(hn::InterleaveLower(d, c.value, c.x)), yz_low = wide(hn::InterleaveLower(d, c.y, c.z));
+    const auto vx_high = wide(hn::InterleaveUpper(d, c.value, c.x)), yz_high = wide(hn::InterleaveUpper(d, c.y, c.z));
     const hn::Half<decltype(dw)> half;
     const auto store = [&](auto pair, std::int32_t corner)
                            HWY_ATTR { hn::StoreU(pair, half, reinterpret_cast<std::int32_t*>(to + corner)); };
@@ -82,25 +94,36 @@ HWY_INLINE void StoreCorners(const CornerVectors& c, GradientCorner* to) {
     store(hn::LowerHalf(half, hn::InterleaveUpper(dw, vx_high, yz_high)), 6);
     store(hn::UpperHalf(half, first), 8);
   } else {
-    hn::StoreInterleaved4(c.value, c.x, c.y, c.z, ds, &to->value);
+    hn::StoreInterleaved4(c.value, c.x, c.y, c.z, d, &to->value);
   }
 }
 
-// The corners of `rows` rows and `slices` slices. `first`: the sample of the first one.
+// Where a brick's corners come from: `rows` rows and `slices` slices, `first` is the sample of the first corner.
 template <class T>
-HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t slice, std::int32_t rows, std::int32_t slices,
-                            GradientCorner* corners) {
-  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(ShortTag()));
+struct BrickSource {
+  const T* first;
+  std::ptrdiff_t row, slice;
+  std::int32_t rows, slices;
+};
+
+template <class T>
+HWY_INLINE void MakeCorners(const BrickSource<T>& source, CornerOf<T>* corners) {
+  using Tag = std::conditional_t<std::is_same_v<T, float>, FloatTag, WordTag>;
+  const Tag d;
+  const hn::Rebind<decltype(corners->value), Tag> of_corners;
+  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(Tag()));
+  const auto [first, row, slice, rows, slices] = source;
   // What is written beyond a row, later ones overwrite.
   for (std::int32_t x = (GradientBricks::kRow - 1) / kAtOnce * kAtOnce; x >= 0; x -= kAtOnce) {
     for (std::int32_t z = 0; z < slices; ++z) {
       const T* from = first + z * slice + x;
-      GradientCorner* to = corners + z * GradientBricks::kSlice + x;
-      auto before = SamplesAt(from - row), value = SamplesAt(from);
+      CornerOf<T>* to = corners + z * GradientBricks::kSlice + x;
+      auto before = SamplesAt(d, from - row), value = SamplesAt(d, from);
       for (std::int32_t y = 0; y < rows; ++y, from += row, to += GradientBricks::kRow) {
-        const auto after = SamplesAt(from + row);
-        StoreCorners(CornersOf(T(), value, {SamplesAt(from - 1), SamplesAt(from + 1)}, {before, after},
-                               {SamplesAt(from - slice), SamplesAt(from + slice)}),
+        const auto after = SamplesAt(d, from + row);
+        StoreCorners(of_corners,
+                     CornersOf(T(), value, {SamplesAt(d, from - 1), SamplesAt(d, from + 1)}, {before, after},
+                               {SamplesAt(d, from - slice), SamplesAt(d, from + slice)}),
                      to);
         before = value;
         value = after;
@@ -118,10 +141,10 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
   const std::int32_t rows = std::min(GradientBricks::kRow, left.y - 2), slices = std::min(GradientBricks::kRow, left.z - 2);
   const T* const samples = reinterpret_cast<const T*>(box.samples);
   const T* const from = samples + std::ptrdiff_t{begin.z} * box.slice + std::ptrdiff_t{begin.y} * box.row + begin.x;
-  GradientCorner* const corners = bricks.corners() + first;
+  CornerOf<T>* const corners = bricks.corners<T>() + first;
   const T* const end = samples + std::ptrdiff_t{box.padded.z} * box.slice;
   if (from + std::ptrdiff_t{slices + 1} * box.slice + std::ptrdiff_t{rows + 1} * box.row + kRead <= end) {
-    MakeCorners(from + 1 + box.row + box.slice, box.row, box.slice, rows, slices, corners);
+    MakeCorners<T>({from + 1 + box.row + box.slice, box.row, box.slice, rows, slices}, corners);
     return;
   }
   // Whole registers would read beyond the last sample.
@@ -133,7 +156,7 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
                   copy + (z * kAround + y) * kRead);
     }
   }
-  MakeCorners(copy + 1 + kRead + kAround * kRead, kRead, kAround * kRead, rows, slices, corners);
+  MakeCorners<T>({copy + 1 + kRead + kAround * kRead, kRead, kAround * kRead, rows, slices}, corners);
 }
 
 // --- Reading them.
@@ -234,6 +257,13 @@ struct LitSample {
   Floats value;
   Gradient gradient;
 };
+// Where values are finite: whole numbers always are.
+template <class T>
+HWY_INLINE Mask FiniteOf(Floats value) {
+  if constexpr (!std::is_same_v<T, float>) return hn::Le(hn::Zero(FloatTag()), Set(1));
+  return hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+}
+
 // The table's entries, four floats each: lane by lane `at`, in floats.
 struct Entries {
   Floats part[4];
@@ -287,7 +317,7 @@ HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
 
 // `index`: BrickPlace::corner.
 template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const CornerWeights& weights) {
+HWY_INLINE LitSample InterpolateCorners(GradientBricks& bricks, const LaneNumbers& index, const CornerWeights& weights) {
   const FloatTag df;
   const IntTag di;
   const hn::RepartitionToNarrow<IntTag> ds;
@@ -301,7 +331,7 @@ HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const Lan
     Ints sum = hn::Zero(di), rest = hn::Zero(di);
     for (int z = 0; z < 2; ++z) {
       for (int y = 0; y < 2; ++y) {
-        const GradientCorner* const row = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
+        const CornerOf<T>* const row = bricks.corners<T>() + z * GradientBricks::kSlice + y * GradientBricks::kRow;
         const auto voxels = FromBlocks(ds, [&](std::size_t lane) HWY_ATTR { return &row[index[lane + kGroup]].value; });
         const auto weight = hn::BitCast(ds, hn::Broadcast<kGroup>(weights.pairs[z][y]));
         sum = hn::ReorderWidenMulAccumulate(di, hn::TableLookupBytes(voxels, pairs), weight, sum, rest);
@@ -318,6 +348,50 @@ HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const Lan
   const auto of = [&](Ints sum) HWY_ATTR { return hn::Mul(hn::ConvertTo(df, sum), scale); };
   if constexpr (sizeof(T) == 2) sums[0] = hn::Add(sums[0], SetInt(32768 << 14));
   return {of(sums[0]), {of(sums[1]), of(sums[2]), of(sums[3])}};
+}
+
+// Of floating-point voxels: along x, then y, then z.
+HWY_INLINE LitSample InterpolateFloatCorners(GradientBricks& bricks, const LaneNumbers& index, const CellPlace& place) {
+  const FloatTag df;
+  Floats of[4];
+  const auto at = [&](auto number) SLABSTREAM_INLINED {
+    constexpr int kGroup = decltype(number)::value;
+    Floats fraction[3], slices[2];
+    for (std::size_t i = 0; i < 3; ++i) fraction[i] = hn::Broadcast<kGroup>(place.fraction[i]);
+    for (int z = 0; z < 2; ++z) {
+      Floats rows[2];
+      for (int y = 0; y < 2; ++y) {
+        const CornerOf<float>* const row = bricks.corners<float>() + z * GradientBricks::kSlice + y * GradientBricks::kRow;
+        const auto corner = [&](int x) HWY_ATTR {
+          return FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return &row[index[lane + kGroup] + x].value; });
+        };
+        rows[y] = Lerp(fraction[0], corner(0), corner(1));
+      }
+      slices[z] = Lerp(fraction[1], rows[0], rows[1]);
+    }
+    return Lerp(fraction[2], slices[0], slices[1]);
+  };
+  of[0] = at(std::integral_constant<int, 0>());
+  of[1] = at(std::integral_constant<int, 1>());
+  of[2] = at(std::integral_constant<int, 2>());
+  of[3] = at(std::integral_constant<int, 3>());
+  TurnBlocks(df, of);
+  return {of[0], {of[1], of[2], of[3]}};
+}
+
+// The weights of a sample's corners, for all fields on a grid.
+struct BrickWeights {
+  const CellPlace& place;
+  CornerWeights whole;
+  HWY_INLINE explicit BrickWeights(const CellPlace& of) : place(of), whole(WeightsAt(of)) {}
+};
+template <class T>
+HWY_INLINE LitSample ReadBricks(GradientBricks& bricks, const LaneNumbers& corner, const BrickWeights& weights) {
+  if constexpr (std::is_same_v<T, float>) {
+    return InterpolateFloatCorners(bricks, corner, weights.place);
+  } else {
+    return InterpolateCorners<T>(bricks, corner, weights.whole);
+  }
 }
 
 }  // namespace slabstream::HWY_NAMESPACE

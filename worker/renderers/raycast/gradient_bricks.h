@@ -1,10 +1,11 @@
-// GradientBricks: the voxels that rays of one thread passed last, each with its gradient, as rays read them: eight neighbours of a sample
-// take four loads. A brick is made where a ray first comes, and forgotten when there is no more room. So gradients take a fixed amount of
+// GradientBricks: the voxels that rays of one thread passed last, each with its gradient, as rays read them: a voxel's four numbers lie
+// side by side. A brick is made where a ray first comes, and forgotten when there is no more room. So gradients take a fixed amount of
 // memory for a thread, and nothing where no ray comes.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "common/memory/pooled_vector.h"
@@ -13,9 +14,13 @@
 namespace slabstream {
 
 // A voxel and its gradient: central differences, next voxel minus the one before.
+template <class Number>
 struct GradientCorner {
-  std::int16_t value, x, y, z;
+  Number value, x, y, z;
 };
+// Of samples of type T.
+template <class T>
+using CornerOf = GradientCorner<std::conditional_t<std::is_same_v<T, float>, float, std::int16_t>>;
 
 class GradientBricks {
  public:
@@ -38,17 +43,20 @@ class GradientBricks {
   // Room for a brick that is not there: its first corner. Where there is none left, it takes that of the brick that was made first.
   std::int32_t Add(std::int32_t number);
 
-  GradientCorner* corners() { return corners_.data(); }
+  template <class T>
+  CornerOf<T>* corners() {
+    return reinterpret_cast<CornerOf<T>*>(corners_.data());
+  }
 
  private:
-  static constexpr std::size_t kMost = 256;  // bricks: 1.5 MB. More of them do not fit the second cache, and take as long
+  static constexpr std::size_t kBytes = std::size_t{256} * kCorners * 8;  // 1.5 MB. More do not fit the second cache, and take as long
 
   const std::byte* samples_ = nullptr;
   Index3 counts_;
   PooledVector<std::int32_t> firsts_;
   std::vector<std::int32_t> made_;  // the numbers of bricks, by where they are among the corners; 0: none
   std::size_t next_ = 0;            // where the next one comes
-  PooledVector<GradientCorner> corners_;
+  PooledVector<std::byte> corners_;
 };
 
 }  // namespace slabstream

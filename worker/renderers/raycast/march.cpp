@@ -19,11 +19,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
-// place_of(): where the samples are.
-template <class PlaceOf>
-HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, PlaceOf&& place_of) {
-  return work.light != nullptr ? LightAt(*work.look, gradient, *work.light, place_of()) : LightOf(*work.look, gradient);
-}
 HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.light != nullptr; }
 
 // Adds crossings with isosurfaces. With labels: tinted, thinned or taken away like a sample there, and not in the place of a label that is
@@ -33,7 +28,10 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
   const FloatTag df;
   const SamplePlace place = crossing.Place(work.box->origin);
   Light light = {Set(1), hn::Zero(df)};
-  if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place), [&]() HWY_ATTR { return place; });
+  if (IsLit(work)) {
+    const Gradient gradient = GradientAt(LoadNeighbours<T>(*work.box, place, rays), place);
+    light = LightOn(*work.look, work.light, gradient, [&]() HWY_ATTR { return place; });
+  }
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
   const float* const colors = work.look->surface_looks.data();
   const auto opacity = hn::GatherIndex(df, colors + 3, entry);
@@ -63,12 +61,12 @@ template <class PlaceOf>
 HWY_INLINE Light LightOfLabels(const MarchWork& work, PlaceOf&& place_of, const LabelledSample& sample, Mask visible, Gradient gradient,
                                Mask on_face) {
   const FloatTag df;
-  if (work.labels == nullptr) return LightOn(work, gradient, place_of);
+  if (work.labels == nullptr) return LightOn(*work.look, work.light, gradient, place_of);
   const auto matter = hn::AndNot(on_face, hn::And(visible, sample.matter));
   if (!hn::AllFalse(df, matter)) {
     gradient = Choose(matter, NormalAt(*work.labels, sample.place, sample.label), gradient);
   }
-  return LightOn(work, gradient, place_of);
+  return LightOn(*work.look, work.light, gradient, place_of);
 }
 
 // The colours of samples with labels.
@@ -104,43 +102,20 @@ HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints 
           hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
 }
 
-// Samples, from stored voxels. A gradient is computed where it is asked for.
-struct StoredSamples {
-  struct Found {
-    Ints at;
-  };
-  Neighbours<float> neighbours;
-  Floats value;
-
-  static HWY_INLINE Found Nowhere() { return {hn::Zero(IntTag())}; }
-  static HWY_INLINE void Find(const MarchWork& work, const SamplePlace& place, Mask inside, GradientBricks* /*bricks*/, Found& found,
-                              Found& /*before*/) {
-    found.at = IndexBefore(*work.box, place, inside);
-  }
-  HWY_INLINE void Read(const MarchWork& work, const CellPlace& place, const Found& found, GradientBricks* /*bricks*/) {
-    neighbours = NeighboursAt(*work.box, reinterpret_cast<const float*>(work.box->samples), found.at);
-    value = Interpolate(neighbours, place);
-  }
-  HWY_INLINE Gradient GradientOf(const CellPlace& place) const { return GradientAt(neighbours, place); }
-};
-// Samples, from bricks that have the gradients, too.
+// Samples of the volume, from bricks.
 template <class T>
-struct BrickSamples {
+struct VolumeSamples {
   using Found = BrickPlace;
-  Floats value;
-  Gradient gradient;
+  LitSample of;
 
   static HWY_INLINE Found Nowhere() { return {hn::Zero(IntTag()), hn::Zero(IntTag()), {}}; }
   static HWY_INLINE void Find(const MarchWork& work, const SamplePlace& place, Mask inside, GradientBricks* bricks, Found& found,
                               Found& before) {
     FindInBricks<T>(*work.box, place, inside, *bricks, found, before);
   }
-  HWY_INLINE void Read(const MarchWork& /*work*/, const CellPlace& place, const Found& found, GradientBricks* bricks) {
-    const LitSample sample = InterpolateCorners<T>(bricks->corners(), found.corner, WeightsAt(place));
-    value = sample.value;
-    gradient = sample.gradient;
+  HWY_INLINE void Read(const CellPlace& place, const Found& found, GradientBricks* bricks) {
+    of = ReadBricks<T>(*bricks, found.corner, BrickWeights(place));
   }
-  HWY_INLINE const Gradient& GradientOf(const CellPlace& /*place*/) const { return gradient; }
 };
 
 // The samples at which the rays of a packet are.
@@ -158,41 +133,32 @@ struct Step {
   bool shows_volume;  // the volume may show there
 };
 
-template <class T>
-HWY_INLINE Mask FiniteOf(Floats value) {
-  if constexpr (!std::is_same_v<T, float>) return hn::Le(hn::Zero(FloatTag()), Set(1));
-  return hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-}
-
 // Samples after classification. Lanes that are not visible mean nothing.
 template <Samples kSamples>
 struct Classified {
   Entries entries;
   Floats opacity;
   Mask visible;
-  Gradient gradient;  // if opacities depend on it
   std::conditional_t<kSamples == Samples::kMixed, LabelledSample, std::monostate> labelled;
 };
 template <class T, Samples kSamples, class Voxels, class PlaceOf>
 HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, PlaceOf&& place_of, Classified<kSamples>& of) {
   const FloatTag df;
   const RayLook& look = *work.look;
-  const Voxels& voxels = step.voxels;
+  const LitSample& sample = step.voxels.of;
   const auto zero = hn::Zero(df);
-  const auto finite = FiniteOf<T>(voxels.value);
+  const auto finite = FiniteOf<T>(sample.value);
   of.entries = EntriesAt(look.entries.data(), step.entry);
   of.opacity = of.entries.part[3];
   of.visible = hn::And(hn::And(step.sampled, finite), hn::Gt(of.opacity, zero));
-  of.gradient = {zero, zero, zero};
   if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
-    of.gradient = voxels.GradientOf(step.cell);
     if (look.regions != nullptr) {
       LaneNumbers region;
-      region.Set(RegionOf(look, hn::IfThenElseZero(finite, voxels.value), of.gradient));
+      region.Set(RegionOf(look, hn::IfThenElseZero(finite, sample.value), sample.gradient));
       of.entries = EntriesAt(look.regions->entries.data(), region);
       of.opacity = of.entries.part[3];
     } else {
-      of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
+      of.opacity = OpacityByGradient(look, of.opacity, sample.gradient);
     }
     of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
   }
@@ -222,8 +188,7 @@ HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, Plac
   const RayLook& look = *work.look;
   Light light = {Set(1), hn::Zero(FloatTag())};
   if (IsLit(work)) {
-    const bool has_gradient = kSamples != Samples::kPlain && look.by_gradient();
-    Gradient gradient = has_gradient ? samples.gradient : step.voxels.GradientOf(step.cell);
+    Gradient gradient = step.voxels.of.gradient;
     [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
     if constexpr (kSamples != Samples::kPlain) {
       on_face = hn::Lt(step.k, part->face_end);
@@ -232,7 +197,7 @@ HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, Plac
     if constexpr (kSamples == Samples::kMixed) {
       light = LightOfLabels(work, place_of, samples.labelled, samples.visible, gradient, on_face);
     } else {
-      light = LightOn(work, gradient, place_of);
+      light = LightOn(look, work.light, gradient, place_of);
     }
   }
   if constexpr (kSamples == Samples::kMixed) {
@@ -329,11 +294,12 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       step.voxels.Read(*fields, step.cell, step.shown, packet.bricks, step.found);
     } else {
       if (kSamples == Samples::kMixed && !step.shows_volume) return;
-      step.voxels.Read(work, step.cell, step.found, packet.bricks);
+      step.voxels.Read(step.cell, step.found, packet.bricks);
+      const Floats value = step.voxels.of.value;
       if constexpr (std::is_same_v<T, float>) {
-        step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
+        step.entry.Set(EntryOf(look, value, FiniteOf<T>(value)));
       } else {
-        step.entry.Set(EntryOf(look, step.voxels.value));
+        step.entry.Set(EntryOf(look, value));
       }
     }
   };
@@ -446,7 +412,7 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
 }
 
 // The rays of one packet.
-template <class T, class Voxels>
+template <class T>
 HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, const PacketShapes* shapes, GradientBricks* bricks,
                                      float* HWY_RESTRICT rgba) {
   const auto zero = hn::Zero(FloatTag());
@@ -460,18 +426,18 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_
   const bool mixed = work.labels != nullptr || work.fields != nullptr;
   const bool has_parts = !work.rays->clip.empty() || work.to_surfaces != nullptr || work.look->by_gradient() || shapes != nullptr;
   if (HWY_LIKELY(!mixed && !has_parts)) {
-    shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
+    shaded = MarchSamples<T, Samples::kPlain, VolumeSamples<T>>(work, packet, owned, nullptr, sums);
   } else if (!mixed) {
-    shaded = MarchParts<T, Samples::kAll, Voxels>(work, packet, owned, shapes, sums);
+    shaded = MarchParts<T, Samples::kAll, VolumeSamples<T>>(work, packet, owned, shapes, sums);
   } else {
-    shaded = MarchParts<T, Samples::kMixed, Voxels>(work, packet, owned, shapes, sums);
+    shaded = MarchParts<T, Samples::kMixed, VolumeSamples<T>>(work, packet, owned, shapes, sums);
   }
   if (shaded != 0 || (shapes != nullptr && shapes->any_owned))
     hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
 }
 
-template <class T, class Voxels>
+template <class T>
 HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds& tile, GradientBricks* bricks, float* HWY_RESTRICT rgba,
                                         std::size_t floats_a_row) {
   std::uint64_t shaded = 0;
@@ -480,29 +446,24 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
   ForEachPacket(*work.rays, tile, rgba, floats_a_row,
                 [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
                   const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
-                  const std::uint64_t found = MarchPacket<T, Voxels>(work, packet, cut ? &shapes : nullptr, bricks, pixels);
+                  const std::uint64_t found = MarchPacket<T>(work, packet, cut ? &shapes : nullptr, bricks, pixels);
                   shaded += found;
                   return found != 0 || (cut && shapes.any_owned);
                 });
   return shaded;
 }
 
-template <class T>
-std::uint64_t MarchInBricks(const MarchWork& work, const PixelBounds& tile, GradientBricks* bricks, float* rgba, std::size_t floats_a_row) {
-  bricks->Enter(*work.box);
-  return MarchPackets<T, BrickSamples<T>>(work, tile, bricks, rgba, floats_a_row);
-}
-
 std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
                        std::size_t floats_a_row) {
+  bricks[0].Enter(*work.box);
   if (work.fields != nullptr) {
     const std::span<const RayField> fields = work.fields->fields;
     for (std::size_t i = 1; i < fields.size(); ++i) bricks[i].Enter(fields[i].voxels);
   }
   switch (work.box->type) {
-    case ScalarType::kUint8: return MarchInBricks<std::uint8_t>(work, tile, bricks.data(), rgba, floats_a_row);
-    case ScalarType::kUint16: return MarchInBricks<std::uint16_t>(work, tile, bricks.data(), rgba, floats_a_row);
-    default: return MarchPackets<float, StoredSamples>(work, tile, bricks.data(), rgba, floats_a_row);
+    case ScalarType::kUint8: return MarchPackets<std::uint8_t>(work, tile, bricks.data(), rgba, floats_a_row);
+    case ScalarType::kUint16: return MarchPackets<std::uint16_t>(work, tile, bricks.data(), rgba, floats_a_row);
+    default: return MarchPackets<float>(work, tile, bricks.data(), rgba, floats_a_row);
   }
 }
 

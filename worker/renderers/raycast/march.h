@@ -1,7 +1,7 @@
 // March: the ray caster's kernel (Levoy 1988, 1990). Samples of a box along the rays of a tile of pixels are interpolated, classified,
 // shaded and composited front to back.
 //
-//   sample      trilinear interpolation of stored samples: along x, then y, then z
+//   sample      trilinear interpolation of stored samples (gradient_bricks-inl.h)
 //   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
 //   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
 //   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
