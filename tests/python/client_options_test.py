@@ -102,6 +102,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"transfer": FUNCTION}, ["--transfer", "map.json"]),
     ({"transfer": SHINY, "ambient": 0.2, "shininess": 20}, ["--transfer", "shiny.json", "--ambient", "0.2", "--shininess", "20"]),
     ({"renderer": "raycast", "sampling_rate": 0.5, "jitter": 0.8}, [*RAYCAST, "--sampling-rate", "0.5", "--jitter", "0.8"]),
+    ({"renderer": "raycast", "gradient": "smooth"}, [*RAYCAST, "--gradient", "smooth"]),
     ({"renderer": "raycast", "transfer": OF_REGIONS}, [*RAYCAST, "--transfer", "regions.json"]),
     ({"renderer": "raycast", "transfer": REGIONS, "opacity_distance": 2}, [*RAYCAST, "--transfer", "regions.json", "--opacity-distance", "2"]),
     ({"transfer": "gray-ramp", "scalar_range": (20, 150)}, ["--transfer", "gray-ramp", "--scalar-range", "20:150"]),

@@ -396,28 +396,25 @@ HWY_INLINE InnerPair LoadInner(const float* samples, Ints at) {
   return {hn::GatherIndex(df, samples + 1, at), hn::GatherIndex(df, samples + 2, at), at};
 }
 
-// Differences to the outer two: b - first and last - a, twice the slope at a and at b.
-struct OuterSlopes {
-  Floats at_a, at_b;
+// The outer two.
+struct OuterPair {
+  Floats first, last;
 };
-HWY_INLINE OuterSlopes LoadSlopes(const std::uint8_t* /*samples*/, Ints /*at*/, const InnerPair& inner) {
+HWY_INLINE OuterPair LoadOuter(const std::uint8_t* /*samples*/, Ints /*at*/, const InnerPair& inner) {
   const FloatTag df;
-  const auto byte = SetInt(0xFF);
-  const auto first = hn::ConvertTo(df, hn::And(inner.word, byte)), last = hn::ConvertTo(df, hn::And(hn::ShiftRight<24>(inner.word), byte));
-  return {hn::Sub(inner.b, first), hn::Sub(last, inner.a)};
+  return {hn::ConvertTo(df, hn::And(inner.word, SetInt(0xFF))), hn::ConvertTo(df, hn::And(hn::ShiftRight<24>(inner.word), SetInt(0xFF)))};
 }
-HWY_INLINE OuterSlopes LoadSlopes(const std::uint16_t* samples, Ints at, const InnerPair& inner) {
+HWY_INLINE OuterPair LoadOuter(const std::uint16_t* samples, Ints at, const InnerPair& /*inner*/) {
   const FloatTag df;
   const IntTag di;
   const auto low = SetInt(0xFFFF), offset = hn::Add(at, at);
   const auto* const words = reinterpret_cast<const std::int32_t*>(samples);
-  const auto first = hn::ConvertTo(df, hn::And(hn::GatherOffset(di, words, offset), low));
-  const auto last = hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(hn::GatherOffset(di, words + 1, offset)), low));
-  return {hn::Sub(inner.b, first), hn::Sub(last, inner.a)};
+  return {hn::ConvertTo(df, hn::And(hn::GatherOffset(di, words, offset), low)),
+          hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(hn::GatherOffset(di, words + 1, offset)), low))};
 }
-HWY_INLINE OuterSlopes LoadSlopes(const float* samples, Ints at, const InnerPair& inner) {
+HWY_INLINE OuterPair LoadOuter(const float* samples, Ints at, const InnerPair& /*inner*/) {
   const FloatTag df;
-  return {hn::Sub(inner.b, hn::GatherIndex(df, samples, at)), hn::Sub(hn::GatherIndex(df, samples + 3, at), inner.a)};
+  return {hn::GatherIndex(df, samples, at), hn::GatherIndex(df, samples + 3, at)};
 }
 
 // The eight voxels around a sample, in rows along x: [z][y].

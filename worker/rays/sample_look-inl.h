@@ -35,32 +35,58 @@ struct Gradient {
   Floats x, y, z;
 };
 
+// Smoothed over the neighbours along an axis (Zucker and Hummel 1981).
+HWY_INLINE Floats Smoothed(Floats before, Floats at, Floats after) {
+  return hn::Add(hn::Mul(Set(0.5F), at), hn::Mul(Set(0.25F), hn::Add(before, after)));
+}
+
 // Differences as they are: those of an even grid.
 struct Unscaled {
   HWY_INLINE Floats operator()(std::size_t /*axis*/, std::size_t /*side*/, Floats difference) const { return difference; }
 };
 // `scale` turns a difference over two voxels along an axis, round the lower (0) or upper (1) voxel beside the sample, to one of data space.
+// kSmooth: each of the two slices is smoothed along the other axes.
+template <bool kSmooth, class T, class Scale>
+HWY_INLINE Gradient GradientAmong(const Neighbours<T>& n, const CellPlace& place, const Scale& scale) {
+  using Four = Floats[4];  // voxels along an axis; the sample is between the middle two
+  const auto value = [&](std::size_t axis, const Four& of) SLABSTREAM_INLINED {
+    if constexpr (!kSmooth) return Lerp(place.fraction[axis], of[1], of[2]);
+    return Lerp(place.fraction[axis], Smoothed(of[0], of[1], of[2]), Smoothed(of[1], of[2], of[3]));
+  };
+  const auto slope = [&](std::size_t axis, const Four& of) SLABSTREAM_INLINED {
+    return Lerp(place.fraction[axis], scale(axis, 0, hn::Sub(of[2], of[0])), scale(axis, 1, hn::Sub(of[3], of[1])));
+  };
+  Four x, y, z;  // by slice: slopes along x and y, and the values of which those along z are the differences
+  for (int k = 0; k < 4; ++k) {
+    Four slopes, values;  // by row
+    for (int j = 0; j < 4; ++j) {
+      const bool inner = j % 3 != 0 && k % 3 != 0;
+      if (!kSmooth && j % 3 == 0 && k % 3 == 0) {  // nothing takes them
+        slopes[j] = values[j] = hn::Zero(FloatTag());
+        continue;
+      }
+      const Ints at = n.RowAt(j, k);
+      const InnerPair pair = inner ? n.inner[k - 1][j - 1] : LoadInner(n.samples, at);
+      const OuterPair outer = LoadOuter(n.samples, at, pair);
+      const Four row = {outer.first, pair.a, pair.b, outer.last};
+      slopes[j] = slope(0, row);
+      values[j] = value(0, row);
+    }
+    x[k] = value(1, slopes);
+    y[k] = slope(1, values);
+    z[k] = value(1, values);
+  }
+  return {value(2, x), value(2, y), slope(2, z)};
+}
+// Apart, and of copies, so that plain gradients stay in registers. `owned`: as of LoadNeighbours.
 template <class T, class Scale = Unscaled>
-HWY_INLINE Gradient GradientAt(const Neighbours<T>& n, const CellPlace& place, const Scale& scale = {}) {
-  const auto u = place.fraction[0], v = place.fraction[1], w = place.fraction[2];
-  // Row y, z of 0 ... 3, interpolated along x.
-  const auto inner = [&](int y, int z) SLABSTREAM_INLINED { return Lerp(u, n.inner[z - 1][y - 1].a, n.inner[z - 1][y - 1].b); };
-  const auto outer = [&](int y, int z) SLABSTREAM_INLINED {
-    const InnerPair pair = LoadInner(n.samples, n.RowAt(y, z));
-    return Lerp(u, pair.a, pair.b);
-  };
-  const auto slope = [&](int y, int z) SLABSTREAM_INLINED {
-    const OuterSlopes slopes = LoadSlopes(n.samples, n.RowAt(y, z), n.inner[z - 1][y - 1]);
-    return Lerp(u, scale(0, 0, slopes.at_a), scale(0, 1, slopes.at_b));
-  };
-  const auto r11 = inner(1, 1), r21 = inner(2, 1), r12 = inner(1, 2), r22 = inner(2, 2);
-  const auto along_y = [&](Floats first, Floats a, Floats b, Floats last)
-                           SLABSTREAM_INLINED { return Lerp(v, scale(1, 0, hn::Sub(b, first)), scale(1, 1, hn::Sub(last, a))); };
-  const auto along_z = [&](Floats first, Floats a, Floats b, Floats last)
-                           SLABSTREAM_INLINED { return Lerp(w, scale(2, 0, hn::Sub(b, first)), scale(2, 1, hn::Sub(last, a))); };
-  return {Lerp(w, Lerp(v, slope(1, 1), slope(2, 1)), Lerp(v, slope(1, 2), slope(2, 2))),
-          Lerp(w, along_y(outer(0, 1), r11, r21, outer(3, 1)), along_y(outer(0, 2), r12, r22, outer(3, 2))),
-          Lerp(v, along_z(outer(1, 0), r11, r12, outer(1, 3)), along_z(outer(2, 0), r21, r22, outer(2, 3)))};
+HWY_NOINLINE Gradient SmoothGradientAt(const RayBox& box, SamplePlace place, Mask owned, Scale scale = {}) {
+  return GradientAmong<true>(LoadNeighbours<T>(box, place, owned), place, scale);
+}
+template <class T, class Scale = Unscaled>
+HWY_INLINE Gradient GradientAt(const RayBox& box, const SamplePlace& place, Mask owned, bool smooth, const Scale& scale = {}) {
+  if (smooth) return SmoothGradientAt<T>(box, place, owned, scale);
+  return GradientAmong<false>(LoadNeighbours<T>(box, place, owned), place, scale);
 }
 
 // `a` where the mask is set, otherwise `b`.

@@ -6,6 +6,7 @@
 
 #include "common/calibration/calibration.h"
 #include "common/renderers/interpolated_table.h"
+#include "common/renderers/raycast/raycast_parameters.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/renderers/sampling_rate.h"
 #include "common/volume/cells_along.h"
@@ -81,7 +82,12 @@ class RaycastKind : public RendererKind {
                                                  "fixed pattern: rings become a fine grain",
                                       .standard = 0,
                                       .least = 0,
-                                      .most = 1}}}) {}
+                                      .most = 1},
+                                     {.name = "gradient",
+                                      .purpose = "Normals of light: differences of neighbouring voxels, or smoothed across them, which "
+                                                 "softens stripes and noise close up",
+                                      .standard = double(GradientKind::kCentral),
+                                      .choices = {"central", "smooth"}}}}) {}
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);
@@ -89,7 +95,7 @@ class RaycastKind : public RendererKind {
   AnalyticCost MakeCost(const CostBasis& basis) const override { return CostOf(basis); }
 
   Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
-    const double jitter = setup.parameters.at(1);
+    const double jitter = setup.parameters.at(kJitter);
     if (setup.description.geometry.rectilinear() && jitter > 0) {
       return Status::InvalidArgument(fmt::format("jitter is {}, must be 0 on a rectilinear grid; --resample even resamples it", jitter));
     }

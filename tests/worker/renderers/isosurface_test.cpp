@@ -32,9 +32,7 @@ SetupOptions RaycastOptions(Projection projection, std::mt19937& random) {
 }
 
 LocalImage Raycast(const Volume& volume, const SetupOptions& options, double rate = 1) {
-  FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {rate, 0};
-  return RenderPicture(volume, setup);
+  return RenderPicture(volume, RaycastSetup(volume, options, rate));
 }
 
 // The point of a pixel's ray at `distance` from its origin in units of its direction.

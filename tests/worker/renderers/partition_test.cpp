@@ -198,6 +198,31 @@ TEST_P(Partitions, JitteredRaysMakeOnePicture) {
   }
 }
 
+// Noise up to the volume's borders: a gradient takes 26 neighbours, of which other boxes and the border have some.
+TEST_P(Partitions, SmoothGradientsMakeOnePicture) {
+  if (GetParam()->name() != "raycast") return;  // it alone has --gradient
+  const unsigned seed = 37;
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> value(0, 255);
+  for (Projection projection : GetParam()->projections()) {
+    for (const ScalarType type : kTypes) {
+      const Volume volume = MakeVolume({{41, 37, 33}, {1, 0.8, 1.3}}, type, [&](const Index3&) { return value(random); });
+      for (int view = 0; view < 4; ++view) {
+        SetupOptions options;
+        options.view = RandomView(projection, random);
+        options.transfer = Ramp(view < 2 ? 0.3 : 0);
+        if (view % 2 == 1) options.transfer.isosurfaces = {{128, {0.9F, 0.4F, 0.2F}, 0.3}};
+        if (view == 0) options.transfer.gradient_opacities = {{3, 0.2}, {120, 1}};
+        const FrameSetup setup = RaycastSetup(volume, options, 0.7, 0, true);
+        SCOPED_TRACE(::testing::Message() << "seed " << seed << " type " << NameOf(type) << " view " << view);
+        const LocalImage one = RenderWhole(volume, setup);
+        ExpectRandomBoxesMake(one, volume, setup, random);
+        ExpectSamePicture(one, RenderByBoxes(volume, setup, CutIntoSlabs(volume, 13, kAxes[std::size_t(view) % 3])), setup);
+      }
+    }
+  }
+}
+
 TEST_P(Partitions, WideFootprintsMakeOnePicture) {
   if (GetParam()->name() != "splat") return;  // it alone has --footprint
   const unsigned seed = 31;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "common/renderers/mip/projection_mode.h"
+#include "common/renderers/raycast/raycast_parameters.h"
 #include "common/volume/indices.h"
 #include "tests/support/random.h"
 #include "tests/support/simd_targets.h"
@@ -150,7 +152,8 @@ TEST(Rectilinear, AllPartitionsMakeOnePicture) {
     if (round % 4 >= 2) options.clipping = RandomClipping(grid, boxes);
     for (const char* const renderer : {"raycast", "mip"}) {
       options.renderer = FindRenderer(renderer);
-      const FrameSetup setup = MakeSetup(volume, options);
+      FrameSetup setup = MakeSetup(volume, options);
+      if (renderer == std::string_view("raycast")) setup.parameters.at(raycast::kGradient) = round % 5 < 2 ? 1 : 0;
       const LocalImage one = RenderPicture(volume, setup);
       for (int count = 2; count <= 5; ++count) {
         const Partition partition =
@@ -302,7 +305,7 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
   Random random(12);
   SCOPED_TRACE(random.trace());
   enum class Of { kLight, kGradientOpacity, kRegion };
-  const auto colors = [](const VolumeGeometry& grid, const Vec3& slope, Of of) {
+  const auto colors = [](const VolumeGeometry& grid, const Vec3& slope, Of of, bool smooth = false) {
     const Vec3 centre = grid.centre();
     const Volume volume = MakeVolume(grid, ScalarType::kFloat32, [&](const Index3& v) {
       return 100 + Dot(slope, (grid.stretch.ToData(ToVec3(v)) - centre) * grid.spacing);
@@ -317,7 +320,7 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
       options.transfer.regions = {{{{95, steep - 1}, {105, steep - 1}, {105, steep + 1}, {95, steep + 1}}, {1, 1, 1}, 0.6}};
       options.transfer = WithCurvesOfRegions(options.transfer);
     }
-    const FrameSetup setup = RaycastSetup(volume, options, 16);
+    const FrameSetup setup = RaycastSetup(volume, options, 16, 0, smooth);
     const LocalImage image = RenderWhole(volume, setup);
     std::vector<double> straight;
     for (int y = 28; y < 36; ++y) {
@@ -336,7 +339,9 @@ TEST(Rectilinear, ALinearFieldHasOneGradient) {
     const std::vector<double> opacities = colors(grid, slope, Of::kGradientOpacity), of_region = colors(grid, slope, Of::kRegion);
     grid.stretch =
         Stretch::Make({{RandomPlaces(40, 6, random), RandomPlaces(36, 6, random), RandomPlaces(44, 6, random)}}, grid.size).value();
-    for (const double of : colors(grid, slope, Of::kLight)) EXPECT_NEAR(of, light, 1e-3) << round;
+    for (const bool smooth : {false, true}) {
+      for (const double of : colors(grid, slope, Of::kLight, smooth)) EXPECT_NEAR(of, light, 1e-3) << round << ' ' << smooth;
+    }
     const std::vector<double> stretched = colors(grid, slope, Of::kGradientOpacity), by_region = colors(grid, slope, Of::kRegion);
     for (std::size_t i = 0; i < opacities.size(); ++i) {
       EXPECT_NEAR(stretched[i], opacities[i], 0.01) << round;

@@ -86,10 +86,10 @@ std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup
   return MakeFrameLight(values, setup);
 }
 
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel, double jitter) {
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel, double jitter, bool smooth) {
   options.renderer = FindRenderer("raycast");
   FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {samples_per_voxel, jitter};
+  setup.parameters = {samples_per_voxel, jitter, smooth ? 1.0 : 0.0};
   return setup;
 }
 

@@ -42,7 +42,7 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
 // `fields`: those of the setup.
 std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup, const std::vector<Volume>& fields = {});
 CoarserLevel NewLightVolume(const VolumeDescription& description);  // with a dataset of its own
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1, double jitter = 0);
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1, double jitter = 0, bool smooth = false);
 // For a setup of splatting.
 FrameSetup SplatSetup(const Volume& volume, const SetupOptions& options, double footprint);
 

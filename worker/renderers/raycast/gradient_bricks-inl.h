@@ -35,6 +35,9 @@ HWY_INLINE Words SamplesAt(WordTag d, const std::uint8_t* at) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<std::uint8_t, WordTag>(), at));
 }
 HWY_INLINE Words SamplesAt(WordTag d, const std::uint16_t* at) { return hn::LoadU(d, at); }
+HWY_INLINE Floats SamplesAt(FloatTag d, const std::uint16_t* at) {
+  return hn::ConvertTo(d, hn::PromoteTo(IntTag(), hn::LoadU(hn::Rebind<std::uint16_t, FloatTag>(), at)));
+}
 HWY_INLINE Floats SamplesAt(FloatTag d, const float* at) { return hn::LoadU(d, at); }
 
 // Samples before and after others along an axis.
@@ -132,6 +135,82 @@ HWY_INLINE void MakeCorners(const BrickSource<T>& source, CornerOf<T>* corners) 
   }
 }
 
+// Of 8-bit samples SmoothCornersOf gets kSmoothUnit: sums are whole numbers.
+HWY_INLINE Words Smoothed(Words before, Words at, Words after) { return hn::Add(hn::Add(before, after), hn::ShiftLeft<1>(at)); }
+HWY_INLINE ShortCorners SmoothCornersOf(std::uint8_t /*type*/, Words value, Words x, Words y, Words z) {
+  const ShortTag ds;
+  return {hn::BitCast(ds, value), hn::BitCast(ds, x), hn::BitCast(ds, y), hn::BitCast(ds, z)};
+}
+// To whole numbers, as CornersOf has them.
+HWY_INLINE auto SmoothCornersOf(std::uint16_t /*type*/, Floats value, Floats x, Floats y, Floats z) {
+  const FloatTag df;
+  const hn::Rebind<std::int16_t, FloatTag> ds;
+  const auto greatest = hn::Max(hn::Max(hn::Abs(x), hn::Abs(y)), hn::Abs(z));
+  const auto unit = hn::IfThenElse(hn::Gt(greatest, Set(32767)), Set(0.5F), Set(1));
+  const auto whole = [&](Floats v) HWY_ATTR { return hn::DemoteTo(ds, Nearest(v)); };
+  return CornerVectors<hn::Vec<decltype(ds)>>{whole(hn::Sub(value, hn::Set(df, 32768.0F))), whole(hn::Mul(x, unit)),
+                                              whole(hn::Mul(y, unit)), whole(hn::Mul(z, unit))};
+}
+HWY_INLINE CornerVectors<Floats> SmoothCornersOf(float /*type*/, Floats value, Floats x, Floats y, Floats z) { return {value, x, y, z}; }
+
+// MakeCorners with smoothed gradients. Floats hold the sums of 16-bit samples exactly.
+template <class T>
+HWY_INLINE void MakeSmoothCorners(const BrickSource<T>& source, CornerOf<T>* corners) {
+  using Tag = std::conditional_t<sizeof(T) == 1, WordTag, FloatTag>;
+  using V = hn::Vec<Tag>;
+  const Tag d;
+  const hn::Rebind<decltype(corners->value), Tag> of_corners;
+  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(Tag())), kRow = GradientBricks::kRow;
+  const auto [first, row, slice, rows, slices] = source;
+  // Slopes along the axes, smoothed along the others but z; of z, what its slopes are the differences of.
+  struct Row {
+    V x, y, z;
+  };
+  for (std::int32_t x = (kRow - 1) / kAtOnce * kAtOnce; x >= 0; x -= kAtOnce) {
+    Row last[3][kRow];  // of three slices
+    for (std::int32_t z = 0; z < slices + 2; ++z) {
+      Row* const behind = last[(z + 1) % 3];
+      Row* const middle = last[(z + 2) % 3];
+      Row* const ahead = last[z % 3];
+      const T* from = first + (z - 1) * slice - row + x;
+      struct AlongX {
+        V slope, smooth;
+      };
+      const auto along_x = [&]() HWY_ATTR {
+        const V before = SamplesAt(d, from - 1), after = SamplesAt(d, from + 1);
+        const AlongX found = {hn::Sub(after, before), Smoothed(before, SamplesAt(d, from), after)};
+        from += row;
+        return found;
+      };
+      AlongX a = along_x(), b = along_x();
+      for (std::int32_t y = 0; y < rows; ++y) {
+        const AlongX c = along_x();
+        ahead[y] = {Smoothed(a.slope, b.slope, c.slope), hn::Sub(c.smooth, a.smooth), Smoothed(a.smooth, b.smooth, c.smooth)};
+        a = b;
+        b = c;
+      }
+      if (z < 2) continue;
+      CornerOf<T>* to = corners + (z - 2) * GradientBricks::kSlice + x;
+      const T* value = first + (z - 2) * slice + x;
+      for (std::int32_t y = 0; y < rows; ++y, value += row, to += kRow) {
+        StoreCorners(of_corners,
+                     SmoothCornersOf(T(), SamplesAt(d, value), Smoothed(behind[y].x, middle[y].x, ahead[y].x),
+                                     Smoothed(behind[y].y, middle[y].y, ahead[y].y), hn::Sub(ahead[y].z, behind[y].z)),
+                     to);
+      }
+    }
+  }
+}
+
+template <class T>
+HWY_INLINE void MakeCornersOf(const BrickSource<T>& source, bool smooth, CornerOf<T>* corners) {
+  if (smooth) {
+    MakeSmoothCorners(source, corners);
+  } else {
+    MakeCorners(source, corners);
+  }
+}
+
 template <class T>
 HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBricks& bricks, std::int32_t first) {
   constexpr std::int32_t kRead = 18;  // samples along x, from the one before the first corner: whole registers
@@ -144,7 +223,7 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
   CornerOf<T>* const corners = bricks.corners<T>() + first;
   const T* const end = samples + std::ptrdiff_t{box.padded.z} * box.slice;
   if (from + std::ptrdiff_t{slices + 1} * box.slice + std::ptrdiff_t{rows + 1} * box.row + kRead <= end) {
-    MakeCorners<T>({from + 1 + box.row + box.slice, box.row, box.slice, rows, slices}, corners);
+    MakeCornersOf<T>({from + 1 + box.row + box.slice, box.row, box.slice, rows, slices}, bricks.smooth(), corners);
     return;
   }
   // Whole registers would read beyond the last sample.
@@ -156,7 +235,7 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
                   copy + (z * kAround + y) * kRead);
     }
   }
-  MakeCorners<T>({copy + 1 + kRead + kAround * kRead, kRead, kAround * kRead, rows, slices}, corners);
+  MakeCornersOf<T>({copy + 1 + kRead + kAround * kRead, kRead, kAround * kRead, rows, slices}, bricks.smooth(), corners);
 }
 
 // --- Reading them.
@@ -344,10 +423,11 @@ HWY_INLINE LitSample InterpolateCorners(GradientBricks& bricks, const LaneNumber
   sums[2] = sum_of(std::integral_constant<int, 2>());
   sums[3] = sum_of(std::integral_constant<int, 3>());
   TurnBlocks(di, sums);
-  const auto scale = Set(1.0F / (1 << 14));
-  const auto of = [&](Ints sum) HWY_ATTR { return hn::Mul(hn::ConvertTo(df, sum), scale); };
+  constexpr float kUnit = 1.0F / (1 << 14);
+  const auto slope_unit = Set(kUnit * bricks.slope_unit());
+  const auto slope = [&](Ints sum) HWY_ATTR { return hn::Mul(hn::ConvertTo(df, sum), slope_unit); };
   if constexpr (sizeof(T) == 2) sums[0] = hn::Add(sums[0], SetInt(32768 << 14));
-  return {of(sums[0]), {of(sums[1]), of(sums[2]), of(sums[3])}};
+  return {hn::Mul(hn::ConvertTo(df, sums[0]), Set(kUnit)), {slope(sums[1]), slope(sums[2]), slope(sums[3])}};
 }
 
 // Of floating-point voxels: along x, then y, then z.

@@ -2,9 +2,11 @@
 
 namespace slabstream {
 
-void GradientBricks::Enter(const RayBox& box) {
-  if (samples_ == box.samples) return;
+void GradientBricks::Enter(const RayBox& box, bool smooth) {
+  if (samples_ == box.samples && smooth_ == smooth) return;
   samples_ = box.samples;
+  smooth_ = smooth;
+  slope_unit_ = smooth && box.type == ScalarType::kUint8 ? kSmoothUnit : 1;
   counts_ = (box.cells + Uniform(1)) / 2;  // a cell has half a brick's side
   const std::size_t corner_bytes = box.type == ScalarType::kFloat32 ? sizeof(CornerOf<float>) : sizeof(CornerOf<std::uint8_t>);
   corners_.resize(kBytes);

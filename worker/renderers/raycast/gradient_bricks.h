@@ -13,7 +13,7 @@
 
 namespace slabstream {
 
-// A voxel and its gradient: central differences, next voxel minus the one before.
+// A voxel and its gradient: central differences, next voxel minus the one before, or smoothed ones, in slope_unit().
 template <class Number>
 struct GradientCorner {
   Number value, x, y, z;
@@ -30,8 +30,11 @@ class GradientBricks {
   static constexpr std::int32_t kCorners = 736;  // a brick's; the last ones are room for kernels that write whole registers
   static constexpr std::int32_t kNone = -1;
 
-  // Forgets the bricks of other voxels. Voxels are told apart by where they are: those of all boxes must live as long as this.
-  void Enter(const RayBox& box);
+  // Forgets the bricks of other voxels, and those with other gradients. Voxels are told apart by where they are: those of all boxes must
+  // live as long as this.
+  void Enter(const RayBox& box, bool smooth);
+  bool smooth() const { return smooth_; }           // gradients are smoothed
+  float slope_unit() const { return slope_unit_; }  // what the slopes of corners count, in differences of samples
   const Index3& counts() const { return counts_; }  // bricks along each axis
 
   // By brick: its first corner, or kNone. Bricks are numbered from 1; the first corner of number 0 may be read and means nothing.
@@ -49,9 +52,12 @@ class GradientBricks {
   }
 
  private:
+  static constexpr float kSmoothUnit = 1.0F / 16;  // of 8-bit samples: their sums with weights 1, 2, 1 along two axes are whole
   static constexpr std::size_t kBytes = std::size_t{256} * kCorners * 8;  // 1.5 MB. More do not fit the second cache, and take as long
 
   const std::byte* samples_ = nullptr;
+  bool smooth_ = false;
+  float slope_unit_ = 1;
   Index3 counts_;
   PooledVector<std::int32_t> firsts_;
   std::vector<std::int32_t> made_;  // the numbers of bricks, by where they are among the corners; 0: none

@@ -29,7 +29,7 @@ HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& c
   const SamplePlace place = crossing.Place(work.box->origin);
   Light light = {Set(1), hn::Zero(df)};
   if (IsLit(work)) {
-    const Gradient gradient = GradientAt(LoadNeighbours<T>(*work.box, place, rays), place);
+    const Gradient gradient = GradientAt<T>(*work.box, place, rays, work.smooth);
     light = LightOn(*work.look, work.light, gradient, [&]() HWY_ATTR { return place; });
   }
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
@@ -141,6 +141,13 @@ struct Classified {
   Mask visible;
   std::conditional_t<kSamples == Samples::kMixed, LabelledSample, std::monostate> labelled;
 };
+
+// Opacities take gradients that are not smoothed. Apart, as few frames need it.
+template <class T>
+HWY_NOINLINE Gradient CentralGradientAt(const RayBox& box, SamplePlace place, Mask sampled) {
+  return GradientAt<T>(box, place, sampled, false);
+}
+
 template <class T, Samples kSamples, class Voxels, class PlaceOf>
 HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step, PlaceOf&& place_of, Classified<kSamples>& of) {
   const FloatTag df;
@@ -152,13 +159,14 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
   of.opacity = of.entries.part[3];
   of.visible = hn::And(hn::And(step.sampled, finite), hn::Gt(of.opacity, zero));
   if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
+    const Gradient gradient = work.smooth ? CentralGradientAt<T>(*work.box, place_of(), step.sampled) : sample.gradient;
     if (look.regions != nullptr) {
       LaneNumbers region;
-      region.Set(RegionOf(look, hn::IfThenElseZero(finite, sample.value), sample.gradient));
+      region.Set(RegionOf(look, hn::IfThenElseZero(finite, sample.value), gradient));
       of.entries = EntriesAt(look.regions->entries.data(), region);
       of.opacity = of.entries.part[3];
     } else {
-      of.opacity = OpacityByGradient(look, of.opacity, sample.gradient);
+      of.opacity = OpacityByGradient(look, of.opacity, gradient);
     }
     of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
   }
@@ -455,10 +463,10 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
 
 std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, std::span<GradientBricks> bricks, float* rgba,
                        std::size_t floats_a_row) {
-  bricks[0].Enter(*work.box);
+  bricks[0].Enter(*work.box, work.smooth);
   if (work.fields != nullptr) {
     const std::span<const RayField> fields = work.fields->fields;
-    for (std::size_t i = 1; i < fields.size(); ++i) bricks[i].Enter(fields[i].voxels);
+    for (std::size_t i = 1; i < fields.size(); ++i) bricks[i].Enter(fields[i].voxels, work.smooth);
   }
   switch (work.box->type) {
     case ScalarType::kUint8: return MarchPackets<std::uint8_t>(work, tile, bricks.data(), rgba, floats_a_row);

@@ -3,8 +3,10 @@
 //
 //   sample      trilinear interpolation of stored samples (gradient_bricks-inl.h)
 //   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
-//   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
-//   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
+//   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume.
+//               If `smooth`, each of the two slices is smoothed along the other axes
+//   opacity     times the factor that the magnitude of the gradient, not smoothed, has (RayLook::gradient_factors), if there is such a
+//               curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
 //   light       shadows and ambient occlusion at the sample (LightAt), if there are any
 //   labels      the label of the nearest voxel, or of those around if labels are smoothed, changes the volume's sample as
@@ -44,6 +46,7 @@ struct MarchWork {
   const EmptyDistances* to_surfaces = nullptr;  // null: no isosurface is shown
   const std::int32_t* surface_cells = nullptr;  // FindSurfaceCells
   float termination = 0;                        // a ray ends where it transmits less; 0: never
+  bool smooth = false;                          // light falls on smoothed gradients
   const RayLabels* labels = nullptr;            // null: none are shown
   const RayFields* fields = nullptr;            // null: no other field is shown
   const ShapeTile* shapes = nullptr;            // that holds the tile's pixels; null: there are none

@@ -54,7 +54,7 @@ HWY_INLINE Floats LengthOfBlocks(const StretchedSteps& steps, const RayPacket& p
   return hn::Min(hn::Max(power, Set(2)), aligned);
 }
 
-// GradientAt's scale.
+// The scale of GradientAt.
 struct StretchedDifferences {
   Floats factors[3][2];
 
@@ -97,7 +97,8 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   auto visible = hn::And(sampled, hn::Gt(entries.part[3], hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return 0;
   Gradient gradient = {Set(0), Set(0), Set(0)};
-  if (look.phong || look.by_gradient()) gradient = GradientAt(neighbours, place, DifferencesAt(*work.box, place));
+  const StretchedDifferences differences = DifferencesAt(*work.box, place);
+  if (look.by_gradient() || (look.phong && !work.smooth)) gradient = GradientAmong<false>(neighbours, place, differences);
   if (look.regions != nullptr) {
     LaneNumbers region;
     region.Set(RegionOf(look, hn::IfThenElseZero(sampled, value), gradient));
@@ -109,6 +110,7 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong) {
+    if (work.smooth) gradient = SmoothGradientAt<T>(*work.box, place, sampled, differences);
     light = LightOf(look, Choose(hn::Lt(k, part.face_end), {part.face[0], part.face[1], part.face[2]}, gradient));
   }
   sums.AddChannels(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
@@ -125,7 +127,7 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, const StretchedSte
     const SamplePlace place = crossing.Place(work.box->origin);
     Light light = {Set(1), hn::Zero(df)};
     if (look.phong) {
-      light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place, DifferencesAt(*work.box, place)));
+      light = LightOf(look, GradientAt<T>(*work.box, place, rays, work.smooth, DifferencesAt(*work.box, place)));
     }
     const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
     const float* const colors = look.surface_looks.data();

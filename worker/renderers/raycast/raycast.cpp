@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/parallel/per_thread.h"
+#include "common/renderers/raycast/raycast_parameters.h"
 #include "worker/rays/render_pieces.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/field_cells.h"
@@ -208,7 +209,7 @@ class RaycastRenderer : public Renderer {
     if (!fields.ok()) return fields.status();
     const ViewRays rays = stretched ? stretched->rays
                                     : Jittered(MakeViewRays(setup.camera, geometry, samples_per_voxel, setup.clip), setup.camera,
-                                               setup.clip, setup.parameters.at(1));
+                                               setup.clip, setup.parameters.at(kJitter));
     const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, shown_labels, *fields, OctantsOf(rays));
     clock.Charge(Stage::kPrepare);
 
@@ -232,6 +233,7 @@ class RaycastRenderer : public Renderer {
                                   .to_surfaces = visible[piece].to_surfaces ? &*visible[piece].to_surfaces : nullptr,
                                   .surface_cells = visible[piece].surface_cells.data(),
                                   .termination = ends[steps],
+                                  .smooth = SmoothGradient(setup.parameters),
                                   .labels = shown_labels,
                                   .fields = fields->empty() ? nullptr : &ray_fields,
                                   .shapes = TileOf(data.shapes(), tile),

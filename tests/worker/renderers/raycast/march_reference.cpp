@@ -159,7 +159,7 @@ class ReferenceMarch {
           Tint(entry, surface);
         }
       }
-      Light(GradientAt(samples(), crossing.position), surface);
+      Light(LitGradientAt(crossing.position), surface);
       Blend(surface.color, surface.opacity, sum);
     }
   }
@@ -204,7 +204,8 @@ class ReferenceMarch {
     Part volume = PartOf(EntryAt(look_, at.value));
     Float3 gradient = at.gradient;
     if (!look_.gradient_factors.empty()) {
-      volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(gradient), double(look_.step_exponent));
+      const Float3 central = work_.smooth ? GradientAt(p) : gradient;
+      volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(central), double(look_.step_exponent));
     }
     if (work_.labels != nullptr) AddLabel(p, volume, gradient);
     if (work_.fields != nullptr) {
@@ -232,7 +233,7 @@ class ReferenceMarch {
       for (std::size_t i = 0; i < 3; ++i) among.first.at(i) += field.map.offset.at(i);
       const Float3 there = SamplePosition(among, k), face_there = face != nullptr ? by(field.normals, *face) : Float3{};
       if (!Inside(there, field.map.low, field.map.high)) continue;
-      const MarchWork of_field = {.box = &field.voxels, .look = field.look};
+      const MarchWork of_field = {.box = &field.voxels, .look = field.look, .smooth = work_.smooth};
       const auto [opacity, lit] = VisitScalarType(field.voxels.type, [&]<class S>(const S*) {
         const auto part = ReferenceMarch<S>(of_field).LitPartAt(there, face != nullptr ? &face_there : nullptr);
         return std::pair(part.opacity, part.color);
@@ -372,11 +373,46 @@ class ReferenceMarch {
   }
 
   // Differences over two voxels.
-  template <class S>
-  Float3 GradientAt(const S* of, const Float3& p) const {
+  Float3 GradientAt(const Float3& p) const {
+    const T* const of = samples();
     return {Interpolated(of, p, {1, 0, 0}) - Interpolated(of, p, {-1, 0, 0}),
             Interpolated(of, p, {0, 1, 0}) - Interpolated(of, p, {0, -1, 0}),
             Interpolated(of, p, {0, 0, 1}) - Interpolated(of, p, {0, 0, -1})};
+  }
+  // The difference of the slices before and behind a voxel, each smoothed by (1, 2, 1) / 4 along its two axes.
+  double SmoothSlope(const Index3& voxel, int axis) const {
+    double sum = 0;
+    for (int a = -1; a <= 1; ++a) {
+      for (int b = -1; b <= 1; ++b) {
+        Index3 behind = voxel;
+        behind[(axis + 1) % 3] += a;
+        behind[(axis + 2) % 3] += b;
+        Index3 before = behind;
+        ++behind[axis];
+        --before[axis];
+        const double difference = double(Voxel(behind.x, behind.y, behind.z)) - double(Voxel(before.x, before.y, before.z));
+        sum += (2 - std::abs(a)) * (2 - std::abs(b)) / 16.0 * difference;
+      }
+    }
+    return sum;
+  }
+  // That of light, from the eight voxels around.
+  Float3 LitGradientAt(const Float3& p) const {
+    if (!work_.smooth) return GradientAt(p);
+    const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
+    double sums[3] = {};
+    for (int corner = 0; corner < 8; ++corner) {
+      Index3 voxel;
+      double weight = 1;
+      for (int i = 0; i < 3; ++i) {
+        const int upper = corner >> i & 1;
+        const double fraction = double(p.at(std::size_t(i)) - floor.at(std::size_t(i)));
+        voxel[i] = std::int32_t(floor.at(std::size_t(i))) + upper;
+        weight *= upper != 0 ? fraction : 1 - fraction;
+      }
+      for (int i = 0; i < 3; ++i) sums[i] += weight * SmoothSlope(voxel, i);
+    }
+    return {float(sums[0]), float(sums[1]), float(sums[2])};
   }
 
   // Of whole numbers: eight weights in 2^-14, which sum to 1.
@@ -385,7 +421,7 @@ class ReferenceMarch {
     Float3 gradient;
   };
   ValueAndGradient SampleAt(const Float3& p) const {
-    return std::is_same_v<T, float> ? ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)} : AtWholeWeights(p);
+    return std::is_same_v<T, float> ? ValueAndGradient{Interpolated(samples(), p, {}), LitGradientAt(p)} : AtWholeWeights(p);
   }
   ValueAndGradient AtWholeWeights(const Float3& p) const {
     const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
@@ -405,8 +441,15 @@ class ReferenceMarch {
     }
     return {float(sums[0]), {float(sums[1]), float(sums[2]), float(sums[3])}};
   }
-  // Differences over two voxels; those of halved samples where one of the three does not fit into 16 bits.
+  // Differences over two voxels; those of halved samples where one of the three does not fit into 16 bits. Smoothed ones of 16-bit samples
+  // are rounded.
   std::array<double, 4> VoxelAndGradient(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    if (work_.smooth) {
+      std::array<double, 3> d = {SmoothSlope({x, y, z}, 0), SmoothSlope({x, y, z}, 1), SmoothSlope({x, y, z}, 2)};
+      const bool large = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])}) > 32767;
+      if (sizeof(T) == 2) std::ranges::transform(d, d.begin(), [&](double slope) { return std::nearbyint(large ? slope / 2 : slope); });
+      return {double(Voxel(x, y, z)), d[0], d[1], d[2]};
+    }
     const auto differences = [&](int divisor) {
       const auto voxel = [&](int dx, int dy, int dz) { return std::floor(double(Voxel(x + dx, y + dy, z + dz)) / divisor); };
       return std::array<double, 3>{voxel(1, 0, 0) - voxel(-1, 0, 0), voxel(0, 1, 0) - voxel(0, -1, 0), voxel(0, 0, 1) - voxel(0, 0, -1)};

@@ -43,7 +43,8 @@ struct Scene {
             .to_samples = &to_samples,
             .to_surfaces = look.isovalues.empty() ? nullptr : &to_surfaces,
             .surface_cells = surface_cells.data(),
-            .termination = termination};
+            .termination = termination,
+            .smooth = smooth};
   }
 
   Camera camera;
@@ -56,6 +57,7 @@ struct Scene {
   std::vector<std::int32_t> surface_cells;
   EmptyDistances to_surfaces;
   RayBox ray_box;
+  bool smooth = false;  // MarchWork::smooth
 };
 
 LocalImage Marched(const Scene& scene, float termination = 0) {
@@ -106,9 +108,12 @@ TEST(MarchTile, AgreesWithTheReference) {
   std::mt19937 views(81);
   for (int i = 0; i < 18; ++i) {
     const RandomScene setup(i, random, views);
-    const Scene scene = setup.Make();
-    const LocalImage expected = MarchedByReference(scene);
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-5F) << "case " << i; });
+    Scene scene = setup.Make();
+    for (const bool smooth : {false, true}) {
+      scene.smooth = smooth;
+      const LocalImage expected = MarchedByReference(scene);
+      ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-5F) << "case " << i << " smooth " << smooth; });
+    }
   }
 }
 
@@ -135,10 +140,13 @@ TEST(MarchTile, AgreesWithTheReferenceOnGradientOpacity) {
     RandomScene setup(i, random, views);
     setup.options.transfer.gradient_opacities = {{2, 0.1}, {20, 0.9}, {60, 0.3}};
     if (i % 5 == 1) setup.options.transfer.opacity_distance = 2.5;
-    const Scene scene = setup.Make();
-    const LocalImage expected = MarchedByReference(scene);
-    // A rounding may move a gradient to the next of 4096 entries.
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 5e-4F) << "case " << i; });
+    Scene scene = setup.Make();
+    for (const bool smooth : {false, true}) {  // opacities stay
+      scene.smooth = smooth;
+      const LocalImage expected = MarchedByReference(scene);
+      // A rounding may move a gradient to the next of 4096 entries.
+      ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 5e-4F) << "case " << i << " smooth " << smooth; });
+    }
   }
 }
 
@@ -172,7 +180,8 @@ TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
       setup.options.clipping = RandomClipping(setup.volume.description.geometry, views);
       setup.options.clipping.mode = i % 8 == 3 ? ClipMode::kKeep : ClipMode::kCutAway;
     }
-    const Scene scene = setup.Make();
+    Scene scene = setup.Make();
+    scene.smooth = i % 5 < 2;
     const LocalImage expected = MarchedByReference(scene);
     ForEachTarget([&] {
       const auto [differ, seen] = DifferentPixels(expected, Marched(scene), 1e-3F);
@@ -233,9 +242,12 @@ TEST(MarchTile, LightsVoxelsOfTheWholeRangeOf16Bits) {
   options.size = {45, 38};
   for (Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     options.view = RandomView(projection, views);
-    const Scene scene(volume, volume.block.box, MakeSetup(volume, options), 1);
-    const LocalImage expected = MarchedByReference(scene);
-    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-4F); });
+    Scene scene(volume, volume.block.box, MakeSetup(volume, options), 1);
+    for (const bool smooth : {false, true}) {
+      scene.smooth = smooth;
+      const LocalImage expected = MarchedByReference(scene);
+      ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-4F) << "smooth " << smooth; });
+    }
   }
 }
 
@@ -249,8 +261,9 @@ TEST(MarchTile, ForgetsBricksWithoutATrace) {
   GradientBricks kept;
   const Volume a = MakeBlobs({{90, 90, 90}, {1, 1, 1}}, ScalarType::kUint8, 1),
                b = MakeBlobs({{90, 90, 90}, {1, 1, 1}}, ScalarType::kUint8, 2);
-  const Scene scenes[] = {{a, a.block.box, MakeSetup(a, options), 1}, {b, b.block.box, MakeSetup(b, options), 1}};
-  for (const Scene& scene : scenes) {
+  Scene scenes[] = {{a, a.block.box, MakeSetup(a, options), 1}, {b, b.block.box, MakeSetup(b, options), 1}};
+  for (Scene& scene : scenes) {
+    scene.smooth = &scene == &scenes[1];
     const LocalImage whole = Marched(scene);
     LocalImage tiled = MakeLocalImage(PixelFormat::kRgba, whole.bounds);
     for (std::int32_t y = 0; y < 64; y += 16) {

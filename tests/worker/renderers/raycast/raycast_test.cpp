@@ -44,6 +44,61 @@ TEST(Raycast, PicturesConvergeAsTheSamplingRateRises) {
   }
 }
 
+TEST(Raycast, SmoothingChangesNoNormalOfALinearField) {
+  std::mt19937 random(31);
+  for (const ScalarType type : kTypes) {
+    const Volume volume = MakeVolume({{30, 26, 34}, {1, 0.8, 1.3}}, type, [](const Index3& v) { return 20 + 2 * v.x + 3 * v.y + v.z; });
+    for (const Projection projection : kProjections) {
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      options.transfer = Ramp(0.3);
+      options.transfer.isosurfaces = {{90, {0.9F, 0.4F, 0.2F}, 0.5}};
+      const auto picture = [&](bool smooth) { return RenderPicture(volume, RaycastSetup(volume, options, 1, 0, smooth)); };
+      EXPECT_LE(LargestDifference(picture(true), picture(false)), 1e-5F) << NameOf(type);
+    }
+  }
+}
+
+// The sphere's values are rounded, so that plain differences have an error of up to a sixth. Light falls along the view.
+TEST(Raycast, SmoothedNormalsOfARoundedSphereAreNearerToTheTrueOnes) {
+  const double radius = 40;
+  const Vec3 centre = {49.6, 50.1, 49.3};
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16}) {
+    const Volume volume = MakeVolume({{100, 100, 100}, {1, 1, 1}}, type, [&](const Index3& v) {
+      return std::clamp(128 + std::round(3 * (radius - Length(ToVec3(v) - centre))), 0.0, 255.0);
+    });
+    SetupOptions options;
+    options.view = {.azimuth_degrees = 33, .elevation_degrees = 21};
+    options.size = {300, 300};
+    options.shading.ambient = options.shading.specular = 0;
+    options.shading.diffuse = 1;
+    options.transfer = Ramp(0);
+    options.transfer.isosurfaces = {{128, {1, 1, 1}, 1}};
+    const auto error = [&](bool smooth) {
+      const FrameSetup setup = RaycastSetup(volume, options, 1, 0, smooth);
+      const LocalImage image = RenderPicture(volume, setup);
+      double sum = 0;
+      int count = 0;
+      for (int y = 0; y < 300; ++y) {
+        for (int x = 0; x < 300; ++x) {
+          const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
+          const Vec3 along = Normalized(ray.direction), to_centre = centre - ray.origin;
+          const double miss = Length(to_centre - Dot(to_centre, along) * along) / radius;
+          if (miss > 0.9) continue;
+          const double difference = double(PixelOf(image, x, y)[0]) - std::sqrt(1 - miss * miss);
+          sum += difference * difference;
+          ++count;
+        }
+      }
+      EXPECT_GT(count, 10000);
+      return std::sqrt(sum / count);
+    };
+    const double central = error(false), smooth = error(true);
+    EXPECT_LT(smooth, 0.6 * central) << NameOf(type) << ' ' << smooth << ' ' << central;
+    EXPECT_LT(smooth, 0.03) << NameOf(type);
+  }
+}
+
 TEST(Raycast, HiddenTilesChangeNothingElse) {
   const unsigned seed = 30;
   std::mt19937 random(seed);

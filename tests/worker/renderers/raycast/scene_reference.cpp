@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/renderers/raycast/raycast_parameters.h"
 #include "tests/support/simd_targets.h"
 #include "tests/worker/renderers/raycast/march_reference.h"
 #include "worker/renderers/raycast/empty_distance.h"
@@ -13,7 +14,9 @@
 
 namespace slabstream::testing {
 
-void ExpectAgreesWithReference(const Scene& scene, float tolerance) {
+namespace {
+
+void ExpectAgreesAsItIs(const Scene& scene, float tolerance) {
   const FrameSetup& setup = scene.setup;
   const Box whole = scene.volume.block.box;
   const double rate = setup.parameters[0];
@@ -41,6 +44,7 @@ void ExpectAgreesWithReference(const Scene& scene, float tolerance) {
                           .to_samples = &everywhere,
                           .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
                           .surface_cells = surface_cells.data(),
+                          .smooth = raycast::SmoothGradient(setup.parameters),
                           .labels = *labels ? &**labels : nullptr,
                           .fields = *labels && shown->empty() ? nullptr : &fields};
   const PixelBounds all = {0, 0, setup.camera.width, setup.camera.height};
@@ -56,6 +60,16 @@ void ExpectAgreesWithReference(const Scene& scene, float tolerance) {
   };
   ForEachTarget([&] { EXPECT_LE(LargestDifference(marched(march), expected), tolerance); });
   EXPECT_LE(LargestDifference(Rendered(scene), expected), tolerance) << "leaps change it";
+}
+
+}  // namespace
+
+void ExpectAgreesWithReference(Scene scene, float tolerance) {
+  for (const bool smooth : {false, true}) {
+    SCOPED_TRACE(::testing::Message() << "smooth " << smooth);
+    scene.setup.parameters.at(raycast::kGradient) = smooth ? 1 : 0;
+    ExpectAgreesAsItIs(scene, tolerance);
+  }
 }
 
 }  // namespace slabstream::testing

@@ -5,8 +5,8 @@
 
 namespace slabstream::testing {
 
-// The whole scene as one box, for each instruction set: without leaps, and by the renderer with them. Its labels, if it has any, must reach
-// the volume.
-void ExpectAgreesWithReference(const Scene& scene, float tolerance);
+// The whole scene as one box, for each instruction set and gradient: without leaps, and by the renderer with them. Its labels, if it has
+// any, must reach the volume.
+void ExpectAgreesWithReference(Scene scene, float tolerance);
 
 }  // namespace slabstream::testing
