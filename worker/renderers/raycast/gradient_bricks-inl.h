@@ -135,13 +135,13 @@ HWY_INLINE void MakeCorners(const BrickSource<T>& source, CornerOf<T>* corners) 
   }
 }
 
-// Of 8-bit samples SmoothCornersOf gets kSmoothUnit: sums are whole numbers.
+// Sums of 8-bit samples stay whole: no step divides by four, but slope_unit() divides by all.
 HWY_INLINE Words Smoothed(Words before, Words at, Words after) { return hn::Add(hn::Add(before, after), hn::ShiftLeft<1>(at)); }
 HWY_INLINE ShortCorners SmoothCornersOf(std::uint8_t /*type*/, Words value, Words x, Words y, Words z) {
   const ShortTag ds;
   return {hn::BitCast(ds, value), hn::BitCast(ds, x), hn::BitCast(ds, y), hn::BitCast(ds, z)};
 }
-// To whole numbers, as CornersOf has them.
+// Slopes are rounded. Where one does not fit into 16 bits, all three are halved.
 HWY_INLINE auto SmoothCornersOf(std::uint16_t /*type*/, Floats value, Floats x, Floats y, Floats z) {
   const FloatTag df;
   const hn::Rebind<std::int16_t, FloatTag> ds;
@@ -162,7 +162,7 @@ HWY_INLINE void MakeSmoothCorners(const BrickSource<T>& source, CornerOf<T>* cor
   const hn::Rebind<decltype(corners->value), Tag> of_corners;
   constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(Tag())), kRow = GradientBricks::kRow;
   const auto [first, row, slice, rows, slices] = source;
-  // Slopes along the axes, smoothed along the others but z; of z, what its slopes are the differences of.
+  // Of a row: its slopes along x and y, smoothed along y and x; z: its values, smoothed along both. What is left is to be done along z.
   struct Row {
     V x, y, z;
   };

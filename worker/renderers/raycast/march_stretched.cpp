@@ -97,8 +97,8 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   auto visible = hn::And(sampled, hn::Gt(entries.part[3], hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return 0;
   Gradient gradient = {Set(0), Set(0), Set(0)};
-  const StretchedDifferences differences = DifferencesAt(*work.box, place);
-  if (look.by_gradient() || (look.phong && !work.smooth)) gradient = GradientAmong<false>(neighbours, place, differences);
+  const auto differences = [&]() HWY_ATTR { return DifferencesAt(*work.box, place); };
+  if (look.by_gradient() || (look.phong && !work.smooth)) gradient = GradientAmong<false>(neighbours, place, differences());
   if (look.regions != nullptr) {
     LaneNumbers region;
     region.Set(RegionOf(look, hn::IfThenElseZero(sampled, value), gradient));
@@ -110,7 +110,7 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong) {
-    if (work.smooth) gradient = SmoothGradientAt<T>(*work.box, place, sampled, differences);
+    if (work.smooth) gradient = SmoothGradientAt<T>(*work.box, place, sampled, differences());
     light = LightOf(look, Choose(hn::Lt(k, part.face_end), {part.face[0], part.face[1], part.face[2]}, gradient));
   }
   sums.AddChannels(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
