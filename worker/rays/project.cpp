@@ -31,7 +31,7 @@ HWY_NOINLINE ProjectedSamples SamplesOfFinite(const Neighbours<float>& n, const 
   auto least = Set(std::numeric_limits<float>::max()), largest = Set(std::numeric_limits<float>::lowest());
   for (std::size_t corner = 0; corner < 8; ++corner) {
     const std::array<std::size_t, 3> side = {corner % 2, corner / 2 % 2, corner / 4};
-    const InnerPair& pair = n.inner[side[2]][side[1]];
+    const SampleRow& pair = n.inner[side[2]][side[1]];
     const auto value = side[0] == 0 ? pair.a : pair.b;
     auto weight = one, is_nearest = one;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -56,25 +56,27 @@ HWY_INLINE ProjectedSamples SamplesAt(const RayBox& box, SamplePlace place, Mask
   if constexpr (kNearest) {
     for (Floats& fraction : place.fraction) fraction = hn::IfThenElseZero(hn::Ge(fraction, Set(0.5F)), Set(1));
   }
-  const Neighbours<T> n = LoadNeighbours<T>(box, place, owned);
-  const auto value = Interpolate(n, place);
-  Floats least = n.inner[0][0].a, largest = n.inner[0][0].a;
-  for (const auto& row : n.inner) {
-    for (const InnerPair& pair : row) {
-      least = hn::Min(least, hn::Min(pair.a, pair.b));
-      largest = hn::Max(largest, hn::Max(pair.a, pair.b));
+  if constexpr (std::is_integral_v<T>) {
+    return {InterpolateWhole<T>(box, place, owned), owned};
+  } else {
+    const Neighbours<T> n = LoadNeighbours<T>(box, place, owned);
+    const auto value = Interpolate(n, place);
+    Floats least = n.inner[0][0].a, largest = n.inner[0][0].a;
+    for (const auto& row : n.inner) {
+      for (const SampleRow& pair : row) {
+        least = hn::Min(least, hn::Min(pair.a, pair.b));
+        largest = hn::Max(largest, hn::Max(pair.a, pair.b));
+      }
     }
-  }
-  const auto clamped = hn::Min(hn::Max(value, least), largest);
-  if constexpr (std::is_floating_point_v<T>) {
+    const auto clamped = hn::Min(hn::Max(value, least), largest);
     // What is interpolated from voxels that are not finite is neither.
     const auto finite = hn::IsFinite(value);
     if (!hn::AllTrue(FloatTag(), hn::Or(hn::Not(owned), finite))) {
       const ProjectedSamples others = SamplesOfFinite(n, place, owned);
       return {hn::IfThenElse(finite, clamped, others.values), hn::Or(hn::And(owned, finite), others.valid)};
     }
+    return {clamped, owned};
   }
-  return {clamped, owned};
 }
 
 HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
@@ -110,10 +112,12 @@ HWY_INLINE SamplePlace PlaceAt(const RayPacket& packet, const RayBox& box, Float
   if constexpr (kStretched) return PlaceStretched(packet, box, k);
   return PlaceSample(packet, box, k);
 }
-template <bool kStretched, int kShift>
-HWY_INLINE Floats StepsToLeave(const RayBox& box, const LeapScales& scales, const SamplePlace& place) {
-  if constexpr (kStretched) return StretchedStepsWithin<kShift>(box, scales, place, Set(1));
-  return StepsWithin<kShift>(box, scales, place, Set(1));
+// Steps to leave the cube of `side` voxels that a ray is in.
+template <bool kStretched>
+HWY_INLINE Floats StepsToLeave(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side) {
+  const auto ahead = hn::ConvertTo(FloatTag(), side);
+  if constexpr (kStretched) return StretchedStepsWithin(box, scales, place, side, ahead);
+  return StepsWithin(box, scales, place, side, ahead);
 }
 
 // A search along the rays of a packet, which advance separately.
@@ -127,6 +131,7 @@ struct Search {
 template <class T, bool kNearest, bool kStretched>
 HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
+  const IntTag di;
   const RayBox& box = *work.box;
   const SampleBounds& bounds = *work.bounds;
   const auto inside = hn::And(hn::Ge(search.k, owned.begin), hn::Lt(search.k, owned.end));
@@ -141,14 +146,14 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   } else {
     const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
     const auto dull_block = hn::Le(block, found.best);
-    steps = hn::IfThenElse(dull_block, StepsToLeave<kStretched, kBlockShift>(box, search.leaps, place), steps);
-    sampled = hn::AndNot(dull_block, sampled);
-    if (!hn::AllFalse(df, sampled)) {
+    auto dull = dull_block;
+    if (!hn::AllFalse(df, hn::AndNot(dull_block, alive))) {
       const auto cell = hn::GatherIndex(df, bounds.cells.data(), CellOf<kCellShift>(place, box.cells, alive));
-      const auto dull_cell = hn::AndNot(dull_block, hn::Le(cell, found.best));
-      steps = hn::IfThenElse(dull_cell, StepsToLeave<kStretched, kCellShift>(box, search.leaps, place), steps);
-      sampled = hn::AndNot(dull_cell, sampled);
+      dull = hn::Or(dull, hn::Le(cell, found.best));
     }
+    sampled = hn::AndNot(dull, alive);
+    const auto side = hn::IfThenElse(hn::RebindMask(di, dull_block), SetInt(kBlockSide), SetInt(kCellSide));
+    steps = hn::IfThenElse(dull, StepsToLeave<kStretched>(box, search.leaps, place, side), steps);
     // Where no ray leaps, none will on the next few samples: they are mostly in the same cells.
     if (hn::AllFalse(df, hn::AndNot(sampled, alive))) search.blind = 2;
   }
@@ -269,12 +274,12 @@ HWY_INLINE void SumSamples(const ProjectWork& work, const RayPacket& among, cons
     if (std::is_integral_v<T> && blind-- <= 0) {
       const auto block = CommonValueOf(work, bounds.blocks, opposite.blocks, CellOf<kBlockShift>(place, bounds.block_counts, active));
       if (leaps_over(block)) {
-        leap(block, StepsToLeave<kStretched, kBlockShift>(box, leaps, place));
+        leap(block, StepsToLeave<kStretched>(box, leaps, place, SetInt(kBlockSide)));
         continue;
       }
       const auto cell = CommonValueOf(work, bounds.cells, opposite.cells, CellOf<kCellShift>(place, box.cells, active));
       if (leaps_over(cell)) {
-        leap(cell, StepsToLeave<kStretched, kCellShift>(box, leaps, place));
+        leap(cell, StepsToLeave<kStretched>(box, leaps, place, SetInt(kCellSide)));
         continue;
       }
       blind = 3;

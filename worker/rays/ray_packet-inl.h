@@ -353,85 +353,126 @@ HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
   return scales;
 }
 
-// Steps after which a ray may leave the cells less than `cells` away from its own; at least 1. All earlier samples lie within them.
-template <int kShift>
-HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Floats cells) {
+// Steps after which a ray may be `ahead` voxels from where it would enter the cube of `side` voxels (a power of two) that it is in; at
+// least
+// 1. All earlier samples lie nearer.
+HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
   const FloatTag df;
-  constexpr float kSide = float(1 << kShift);
+  const auto behind = hn::Sub(hn::ConvertTo(df, side), ahead);
+  const auto cube = hn::Neg(side);
   Floats steps = Set(1e9F);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto cell = hn::ConvertTo(df, hn::ShiftRight<kShift>(place.voxel[i]));
+    const auto low = hn::ConvertTo(df, hn::And(place.voxel[i], cube));
     const auto inside = hn::Sub(place.position[i], Set(float(box.origin[int(i)])));
-    const auto ahead = hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), hn::Sub(Set(1), cells), cells);
-    const auto way = hn::Sub(hn::Mul(hn::Add(cell, ahead), Set(kSide)), inside);
-    steps = hn::Min(steps, hn::Sub(hn::Mul(way, scales.inverse[i]), scales.margin[i]));
+    const auto plane = hn::Add(low, hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), behind, ahead));
+    steps = hn::Min(steps, hn::Sub(hn::Mul(hn::Sub(plane, inside), scales.inverse[i]), scales.margin[i]));
   }
   return hn::Add(hn::Floor(hn::Max(steps, hn::Zero(df))), Set(1));
 }
 
+// --- Reading by lanes. Gathers take longer than loads of 16 bytes that are put together.
+
+// Lanes as numbers in memory.
+struct LaneNumbers {
+  HWY_ALIGN std::int32_t number[kLanes];
+
+  // From a store that it sees the compiler would take them lane by lane, which takes registers longer.
+  HWY_INLINE void Set(Ints lanes) {
+    hn::Store(lanes, IntTag(), number);
+    asm("" : "+m"(number));
+  }
+  HWY_INLINE std::int32_t operator[](std::size_t lane) const { return number[lane]; }
+};
+
+// Four registers of four numbers a block as four registers of one number each, by block: 4x4 matrices turned over.
+template <class D>
+HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
+  const hn::RepartitionToWide<D> dw;
+  const auto lower = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveLower(d, a, b); };
+  const auto upper = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveUpper(d, a, b); };
+  const auto a = hn::BitCast(dw, lower(v[0], v[1])), b = hn::BitCast(dw, lower(v[2], v[3]));
+  const auto e = hn::BitCast(dw, upper(v[0], v[1])), f = hn::BitCast(dw, upper(v[2], v[3]));
+  v[0] = hn::BitCast(d, hn::InterleaveLower(dw, a, b));
+  v[1] = hn::BitCast(d, hn::InterleaveUpper(dw, a, b));
+  v[2] = hn::BitCast(d, hn::InterleaveLower(dw, e, f));
+  v[3] = hn::BitCast(d, hn::InterleaveUpper(dw, e, f));
+}
+
+// A register whose block b is what the 16 bytes at at(4 b) hold. `d`: its numbers.
+template <class Tag, class At>
+HWY_INLINE auto FromBlocks(Tag d, At&& at) {
+#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
+  // A load that leaves the other blocks takes no shuffle, of which there are many already.
+  const auto load = [&](std::size_t lane) HWY_ATTR { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at(lane))); };
+  auto blocks = _mm512_castsi128_si512(load(0));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x00F0, load(4));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x0F00, load(8));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0xF000, load(12));
+  return hn::BitCast(d, Ints{blocks});
+#else
+  using Number = hn::TFromD<Tag>;
+  const auto load = [&](std::size_t lane) HWY_ATTR {
+    return hn::LoadU(hn::FixedTag<Number, 16 / sizeof(Number)>(), reinterpret_cast<const Number*>(at(lane)));
+  };
+  if constexpr (kLanes == 4) {
+    return load(0);
+  } else {
+    return hn::Combine(d, load(4), load(0));
+  }
+#endif
+}
+
+// The first four numbers of 32 bits at `row` + at[lane]: one register each.
+struct FirstNumbers {
+  Ints of[4];
+};
+template <class T>
+HWY_INLINE FirstNumbers FirstNumbersAt(const T* row, const LaneNumbers& at) {
+  const IntTag di;
+  FirstNumbers numbers;
+  for (std::size_t group = 0; group < 4; ++group) {
+    numbers.of[group] = FromBlocks(di, [&](std::size_t lane) HWY_ATTR { return row + at[lane + group]; });
+  }
+  TurnBlocks(di, numbers.of);
+  return numbers;
+}
+
 // --- Interpolation. Four voxels along x around a sample: one before its floor, its floor, and two after it.
 
-struct InnerPair {
-  Floats a, b;  // the middle two
-  Ints word;    // 8-bit samples: all four
+struct SampleRow {
+  Floats first, a, b, last;
 };
 
-// `at`: index of the first of the four voxels, in samples.
-HWY_INLINE InnerPair LoadInner(const std::uint8_t* samples, Ints at) {
-  const FloatTag df;
-  const IntTag di;
-  const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(samples), at);
+// `at`: the first of the four voxels, in samples from `row`. Reads 16 bytes from there.
+HWY_INLINE SampleRow LoadRow(const std::uint8_t* row, const LaneNumbers& at) {
+  const auto word = FirstNumbersAt(row, at).of[0];
   const auto byte = SetInt(0xFF);
-  return {hn::ConvertTo(df, hn::And(hn::ShiftRight<8>(word), byte)), hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(word), byte)), word};
+  const auto number = [&](Ints v) HWY_ATTR { return hn::ConvertTo(FloatTag(), v); };
+  return {number(hn::And(word, byte)), number(hn::And(hn::ShiftRight<8>(word), byte)), number(hn::And(hn::ShiftRight<16>(word), byte)),
+          number(hn::BitCast(IntTag(), hn::ShiftRight<24>(hn::BitCast(hn::RebindToUnsigned<IntTag>(), word))))};
 }
-HWY_INLINE InnerPair LoadInner(const std::uint16_t* samples, Ints at) {
-  const FloatTag df;
-  const IntTag di;
-  const auto word = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(samples + 1), hn::Add(at, at));
+HWY_INLINE SampleRow LoadRow(const std::uint16_t* row, const LaneNumbers& at) {
+  const auto words = FirstNumbersAt(row, at);
   const auto low = SetInt(0xFFFF);
-  return {hn::ConvertTo(df, hn::And(word, low)), hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(word), low)), word};
+  const auto number = [&](Ints v) HWY_ATTR { return hn::ConvertTo(FloatTag(), hn::And(v, low)); };
+  return {number(words.of[0]), number(hn::ShiftRight<16>(words.of[0])), number(words.of[1]), number(hn::ShiftRight<16>(words.of[1]))};
 }
-HWY_INLINE InnerPair LoadInner(const float* samples, Ints at) {
-  const FloatTag df;
-  return {hn::GatherIndex(df, samples + 1, at), hn::GatherIndex(df, samples + 2, at), at};
-}
-
-// The outer two.
-struct OuterPair {
-  Floats first, last;
-};
-HWY_INLINE OuterPair LoadOuter(const std::uint8_t* /*samples*/, Ints /*at*/, const InnerPair& inner) {
-  const FloatTag df;
-  return {hn::ConvertTo(df, hn::And(inner.word, SetInt(0xFF))), hn::ConvertTo(df, hn::And(hn::ShiftRight<24>(inner.word), SetInt(0xFF)))};
-}
-HWY_INLINE OuterPair LoadOuter(const std::uint16_t* samples, Ints at, const InnerPair& /*inner*/) {
-  const FloatTag df;
-  const IntTag di;
-  const auto low = SetInt(0xFFFF), offset = hn::Add(at, at);
-  const auto* const words = reinterpret_cast<const std::int32_t*>(samples);
-  return {hn::ConvertTo(df, hn::And(hn::GatherOffset(di, words, offset), low)),
-          hn::ConvertTo(df, hn::And(hn::ShiftRight<16>(hn::GatherOffset(di, words + 1, offset)), low))};
-}
-HWY_INLINE OuterPair LoadOuter(const float* samples, Ints at, const InnerPair& /*inner*/) {
-  const FloatTag df;
-  return {hn::GatherIndex(df, samples, at), hn::GatherIndex(df, samples + 3, at)};
+HWY_INLINE SampleRow LoadRow(const float* row, const LaneNumbers& at) {
+  const auto words = FirstNumbersAt(row, at);
+  const auto number = [&](Ints v) HWY_ATTR { return hn::BitCast(FloatTag(), v); };
+  return {number(words.of[0]), number(words.of[1]), number(words.of[2]), number(words.of[3])};
 }
 
 // The eight voxels around a sample, in rows along x: [z][y].
 template <class T>
 struct Neighbours {
   const T* samples;
-  Ints row, slice;  // strides
-  Ints at;          // the first of the four voxels along x, one row and one slice before the sample's floor
-  InnerPair inner[2][2];
+  std::ptrdiff_t row, slice;  // strides
+  LaneNumbers at;             // the first of the four voxels along x, one row and one slice before the sample's floor
+  SampleRow inner[2][2];
 
   // Row y, z of 0 ... 3. Rows 1 and 2 are around the sample.
-  HWY_INLINE Ints RowAt(int y, int z) const {
-    auto index = at;
-    for (int i = 0; i < y; ++i) index = hn::Add(index, row);
-    for (int i = 0; i < z; ++i) index = hn::Add(index, slice);
-    return index;
-  }
+  HWY_INLINE SampleRow RowAt(int y, int z) const { return LoadRow(samples + y * row + z * slice, at); }
 };
 
 // Neighbours::at of samples; 0 where not `owned`.
@@ -445,11 +486,11 @@ template <class T>
 HWY_INLINE Neighbours<T> NeighboursAt(const RayBox& box, const T* samples, Ints at) {
   Neighbours<T> n;
   n.samples = samples;
-  n.row = SetInt(box.row);
-  n.slice = SetInt(box.slice);
-  n.at = at;
+  n.row = box.row;
+  n.slice = box.slice;
+  n.at.Set(at);
   for (int z = 0; z < 2; ++z) {
-    for (int y = 0; y < 2; ++y) n.inner[z][y] = LoadInner(n.samples, n.RowAt(y + 1, z + 1));
+    for (int y = 0; y < 2; ++y) n.inner[z][y] = n.RowAt(y + 1, z + 1);
   }
   return n;
 }
@@ -459,10 +500,77 @@ HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& pl
   return NeighboursAt(box, reinterpret_cast<const T*>(box.samples), IndexBefore(box, place, owned));
 }
 
+// The weights of a sample's eight corners among whole numbers: multiples of 2^-14, at least 0, whose sum is 1. So a sample lies between its
+// corners, as empty space requires. By pairs along x, in 2^-14: the first one in the lower half of a lane, the second in the upper one.
+struct CornerWeights {
+  Ints pairs[2][2];  // [z][y]
+};
+HWY_INLINE CornerWeights WeightsAt(const CellPlace& place) {
+  const IntTag di;
+  const hn::RepartitionToNarrow<IntTag> ds;
+  const auto in_both_halves = [&](Ints lower, Ints upper) HWY_ATTR { return hn::BitCast(ds, hn::Or(lower, hn::ShiftLeft<16>(upper))); };
+  // The share of the upper corner along an axis, in 2^-15.
+  const auto share = [&](std::size_t axis) HWY_ATTR {
+    const auto once = Nearest(hn::Mul(place.fraction[axis], Set(32767)));
+    return in_both_halves(once, once);
+  };
+  const auto second = Nearest(hn::Mul(place.fraction[0], Set(1 << 14)));
+  const auto along_x = in_both_halves(hn::Sub(SetInt(1 << 14), second), second);
+  const auto upper_y = hn::MulFixedPoint15(along_x, share(1)), lower_y = hn::Sub(along_x, upper_y);
+  const auto z = share(2);
+  CornerWeights weights;
+  for (int y = 0; y < 2; ++y) {
+    const auto both = y == 0 ? lower_y : upper_y;
+    const auto upper_z = hn::MulFixedPoint15(both, z);
+    weights.pairs[0][y] = hn::BitCast(di, hn::Sub(both, upper_z));
+    weights.pairs[1][y] = hn::BitCast(di, upper_z);
+  }
+  return weights;
+}
+
+// Samples of whole numbers. All sums are whole numbers, too: every instruction set gives the same bits.
+template <class T>
+HWY_INLINE Floats InterpolateWhole(const RayBox& box, const SamplePlace& place, Mask owned) {
+  const IntTag di;
+  const hn::RepartitionToNarrow<IntTag> ds;
+  const CornerWeights weights = WeightsAt(place);
+  Ints of_group[4] = {weights.pairs[0][0], weights.pairs[0][1], weights.pairs[1][0], weights.pairs[1][1]};
+  TurnBlocks(di, of_group);
+  LaneNumbers at;
+  at.Set(IndexBefore(box, place, owned));
+  const T* const first = reinterpret_cast<const T*>(box.samples) + 1 + box.row + box.slice;
+  for (std::size_t group = 0; group < 4; ++group) {
+    // Pairs along x: of a block's four rows, side by side.
+    const auto row = [&](std::ptrdiff_t y, std::ptrdiff_t z) HWY_ATTR {
+      const T* const from = first + y * box.row + z * box.slice;
+      return FromBlocks(ds, [&](std::size_t lane) HWY_ATTR { return from + at[lane + group]; });
+    };
+    const auto beside = [&](auto a, auto b)
+                            HWY_ATTR { return hn::BitCast(ds, hn::InterleaveLower(di, hn::BitCast(di, a), hn::BitCast(di, b))); };
+    hn::Vec<decltype(ds)> pairs;
+    if constexpr (sizeof(T) == 1) {
+      const hn::Repartition<std::uint8_t, IntTag> db;
+      const auto bytes = beside(hn::InterleaveLower(ds, row(0, 0), row(1, 0)), hn::InterleaveLower(ds, row(0, 1), row(1, 1)));
+      pairs = hn::BitCast(ds, hn::InterleaveLower(db, hn::BitCast(db, bytes), hn::Zero(db)));
+    } else {
+      const hn::Repartition<std::int64_t, IntTag> dl;
+      const auto lower = hn::BitCast(dl, beside(row(0, 0), row(1, 0))), upper = hn::BitCast(dl, beside(row(0, 1), row(1, 1)));
+      pairs = hn::Xor(hn::BitCast(ds, hn::InterleaveLower(dl, lower, upper)), hn::Set(ds, std::int16_t(-0x8000)));
+    }
+    auto rest = hn::Zero(di);
+    const auto sum = hn::ReorderWidenMulAccumulate(di, pairs, hn::BitCast(ds, of_group[group]), hn::Zero(di), rest);
+    of_group[group] = hn::RearrangeToOddPlusEven(sum, rest);
+  }
+  TurnBlocks(di, of_group);
+  auto sum = hn::Add(hn::Add(of_group[0], of_group[1]), hn::Add(of_group[2], of_group[3]));
+  if constexpr (sizeof(T) == 2) sum = hn::Add(sum, SetInt(32768 << 14));
+  return hn::Mul(hn::ConvertTo(FloatTag(), sum), Set(1.0F / (1 << 14)));
+}
+
 // Along x of the four rows, then along y, then along z.
 template <class T>
 HWY_INLINE Floats Interpolate(const Neighbours<T>& n, const CellPlace& place) {
-  const auto along_x = [&](const InnerPair& pair) HWY_ATTR { return Lerp(place.fraction[0], pair.a, pair.b); };
+  const auto along_x = [&](const SampleRow& pair) HWY_ATTR { return Lerp(place.fraction[0], pair.a, pair.b); };
   const auto low = Lerp(place.fraction[1], along_x(n.inner[0][0]), along_x(n.inner[0][1]));
   const auto high = Lerp(place.fraction[1], along_x(n.inner[1][0]), along_x(n.inner[1][1]));
   return Lerp(place.fraction[2], low, high);

@@ -65,10 +65,8 @@ HWY_INLINE Gradient GradientAmong(const Neighbours<T>& n, const CellPlace& place
         slopes[j] = values[j] = hn::Zero(FloatTag());
         continue;
       }
-      const Ints at = n.RowAt(j, k);
-      const InnerPair pair = inner ? n.inner[k - 1][j - 1] : LoadInner(n.samples, at);
-      const OuterPair outer = LoadOuter(n.samples, at, pair);
-      const Four row = {outer.first, pair.a, pair.b, outer.last};
+      const SampleRow four = inner ? n.inner[k - 1][j - 1] : n.RowAt(j, k);
+      const Four row = {four.first, four.a, four.b, four.last};
       slopes[j] = slope(0, row);
       values[j] = value(0, row);
     }

@@ -72,16 +72,15 @@ HWY_INLINE SamplePlace PlaceStretched(const RayPacket& packet, const RayBox& box
 }
 
 // StepsWithin in a rectilinear grid. `scales`: of the rays in data space.
-template <int kShift>
-HWY_INLINE Floats StretchedStepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Floats cells) {
+HWY_INLINE Floats StretchedStepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
   const FloatTag df;
-  constexpr float kSide = float(1 << kShift);
+  const auto behind = hn::Sub(hn::ConvertTo(df, side), ahead);
+  const auto cube = hn::Neg(side);
   Floats steps = Set(1e9F);
   for (std::size_t i = 0; i < 3; ++i) {
-    const StretchTable& table = box.stretch->axes[i];
-    const auto cell = hn::ConvertTo(df, hn::ShiftRight<kShift>(place.voxel[i]));
-    const auto ahead = hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), hn::Sub(Set(1), cells), cells);
-    const auto plane = PlaceOfVoxel(table, hn::Add(hn::Mul(hn::Add(cell, ahead), Set(kSide)), Set(float(box.origin[int(i)]))));
+    const auto low = hn::ConvertTo(df, hn::Add(hn::And(place.voxel[i], cube), SetInt(box.origin[int(i)])));
+    const auto plane =
+        PlaceOfVoxel(box.stretch->axes[i], hn::Add(low, hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), behind, ahead)));
     const auto margin = hn::Mul(hn::Abs(scales.inverse[i]), Set(box.stretch->margin));
     steps = hn::Min(steps, hn::Sub(hn::Mul(hn::Sub(plane, place.position[i]), scales.inverse[i]), margin));
   }

@@ -37,7 +37,8 @@ PaddedVoxels MakePaddedVoxels(const Box& box, ScalarType type) {
   const Index3 size = box.size();
   padded.row = size.x + 2 * kPad;
   padded.slice = std::int64_t{padded.row} * (size.y + 2 * kPad);
-  padded.samples = MakeLargeArray<std::byte>(std::size_t(padded.slice) * std::size_t(size.z + 2 * kPad) * BytesPerSample(type));
+  constexpr std::size_t kRegister = 16;  // bytes: ray kernels read so many from the last voxels on
+  padded.samples = MakeLargeArray<std::byte>(padded.bytes() + kRegister);
   return padded;
 }
 

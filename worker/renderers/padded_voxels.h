@@ -29,7 +29,7 @@ struct PaddedVoxels {
   }
   VoxelBricks bricks() const { return {box, type, At(box.begin), row, std::ptrdiff_t(slice)}; }  // without the padding
   std::size_t bytes() const {
-    return samples == nullptr ? 0 : std::size_t(slice) * std::size_t(box.size().z + 2 * kPad) * BytesPerSample(type);
+    return std::size_t(slice) * std::size_t(box.size().z + 2 * kPad) * BytesPerSample(type);
   }
 };
 

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "tests/worker/rays/pixel_ray.h"
+#include "tests/worker/rays/whole_weights.h"
 
 namespace slabstream::testing {
 namespace {
@@ -50,6 +51,11 @@ float SampleAt(const RayBox& box, const Float3& p, bool nearest) {
     return Lerp(u, a, b);
   };
   const float low = Lerp(v, row(0, 0), row(1, 0)), high = Lerp(v, row(0, 1), row(1, 1));
+  if (std::is_integral_v<T>) {
+    double sum = 0;
+    for (int corner = 0; corner < 8; ++corner) sum += double(WholeWeight({u, v, w}, corner)) * corners[std::size_t(corner)];
+    return float(sum / 16384);
+  }
   const float sample = Lerp(w, low, high);
   return std::isfinite(sample) ? std::clamp(sample, least, largest) : SampleOfFinite(corners, {u, v, w});
 }

@@ -1,9 +1,8 @@
 // Values and gradients at samples, interpolated from GradientBricks. Included once for each instruction set, hence the unusual include
 // guard.
 //
-// Whole voxels: a sample's eight corners have weights that are multiples of 2^-14, at least 0, and sum to 1. So a value lies between those
-// of its corners, as empty space requires. All sums are whole numbers. Floating-point voxels are interpolated as elsewhere (Lerp). Either
-// way every instruction set gives the same bits.
+// Whole voxels have the weights of WeightsAt, and all sums are whole numbers. Floating-point voxels are interpolated as elsewhere (Lerp).
+// Either way every instruction set gives the same bits.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -240,18 +239,6 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
 
 // --- Reading them.
 
-// Lanes as numbers in memory.
-struct LaneNumbers {
-  HWY_ALIGN std::int32_t number[kLanes];
-
-  // From a store that it sees the compiler would take them lane by lane, which takes registers longer.
-  HWY_INLINE void Set(Ints lanes) {
-    hn::Store(lanes, IntTag(), number);
-    asm("" : "+m"(number));
-  }
-  HWY_INLINE std::int32_t operator[](std::size_t lane) const { return number[lane]; }
-};
-
 // Samples among the corners of bricks.
 struct BrickPlace {
   Ints number;         // the brick's number
@@ -305,33 +292,6 @@ HWY_INLINE void FindInBricks(const RayBox& box, const SamplePlace& place, Mask i
   if (!hn::AllFalse(di, found.Find(bricks))) MakeBricks<T>(box, bricks, found, before);
 }
 
-// The weights of the two corners along x, in 2^-14: the first in the lower half of a lane, the second in the upper one.
-struct CornerWeights {
-  Ints pairs[2][2];  // [z][y]
-};
-HWY_INLINE CornerWeights WeightsAt(const CellPlace& place) {
-  const IntTag di;
-  const hn::RepartitionToNarrow<IntTag> ds;
-  const auto in_both_halves = [&](Ints lower, Ints upper) HWY_ATTR { return hn::BitCast(ds, hn::Or(lower, hn::ShiftLeft<16>(upper))); };
-  // The share of the upper corner along an axis, in 2^-15.
-  const auto share = [&](std::size_t axis) HWY_ATTR {
-    const auto once = Nearest(hn::Mul(place.fraction[axis], Set(32767)));
-    return in_both_halves(once, once);
-  };
-  const auto second = Nearest(hn::Mul(place.fraction[0], Set(1 << 14)));
-  const auto along_x = in_both_halves(hn::Sub(SetInt(1 << 14), second), second);
-  const auto upper_y = hn::MulFixedPoint15(along_x, share(1)), lower_y = hn::Sub(along_x, upper_y);
-  const auto z = share(2);
-  CornerWeights weights;
-  for (int y = 0; y < 2; ++y) {
-    const auto both = y == 0 ? lower_y : upper_y;
-    const auto upper_z = hn::MulFixedPoint15(both, z);
-    weights.pairs[0][y] = hn::BitCast(di, hn::Sub(both, upper_z));
-    weights.pairs[1][y] = hn::BitCast(di, upper_z);
-  }
-  return weights;
-}
-
 struct LitSample {
   Floats value;
   Gradient gradient;
@@ -347,42 +307,6 @@ HWY_INLINE Mask FiniteOf(Floats value) {
 struct Entries {
   Floats part[4];
 };
-
-// Four registers of four numbers a block as four registers of one number each, by block: 4x4 matrices turned over.
-template <class D>
-HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
-  const hn::RepartitionToWide<D> dw;
-  const auto lower = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveLower(d, a, b); };
-  const auto upper = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveUpper(d, a, b); };
-  const auto a = hn::BitCast(dw, lower(v[0], v[1])), b = hn::BitCast(dw, lower(v[2], v[3]));
-  const auto e = hn::BitCast(dw, upper(v[0], v[1])), f = hn::BitCast(dw, upper(v[2], v[3]));
-  v[0] = hn::BitCast(d, hn::InterleaveLower(dw, a, b));
-  v[1] = hn::BitCast(d, hn::InterleaveUpper(dw, a, b));
-  v[2] = hn::BitCast(d, hn::InterleaveLower(dw, e, f));
-  v[3] = hn::BitCast(d, hn::InterleaveUpper(dw, e, f));
-}
-
-// A register whose block b is what the 16 bytes at at(4 b) hold. `d`: its numbers.
-template <class Tag, class At>
-HWY_INLINE auto FromBlocks(Tag d, At&& at) {
-#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-  // A load that leaves the other blocks takes no shuffle, of which there are many already.
-  const auto load = [&](std::size_t lane) HWY_ATTR { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at(lane))); };
-  auto blocks = _mm512_castsi128_si512(load(0));
-  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x00F0, load(4));
-  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x0F00, load(8));
-  blocks = _mm512_mask_broadcast_i32x4(blocks, 0xF000, load(12));
-  return hn::BitCast(d, Ints{blocks});
-#else
-  using Number = hn::TFromD<Tag>;
-  const auto load = [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<Number, 16 / sizeof(Number)>(), at(lane)); };
-  if constexpr (kLanes == 4) {
-    return load(0);
-  } else {
-    return hn::Combine(d, load(4), load(0));
-  }
-#endif
-}
 
 HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
   const FloatTag df;

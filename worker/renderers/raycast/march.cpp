@@ -98,8 +98,10 @@ HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints 
   const IntTag di;
   const auto distance = DistanceAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, work.box->cells, inside));
   const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-  return {hn::AndNot(empty, inside),
-          hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
+  return {
+      hn::AndNot(empty, inside),
+      hn::IfThenElse(empty, StepsWithin(*work.box, leaps, place, SetInt(kCellSide), hn::ConvertTo(df, hn::ShiftLeft<kCellShift>(distance))),
+                     Set(1))};
 }
 
 // Samples of the volume, from bricks.

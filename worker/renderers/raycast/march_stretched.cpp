@@ -177,7 +177,8 @@ HWY_NOINLINE std::uint64_t MarchPart(const MarchWork& work, const StretchedSteps
       const auto distance = hn::ConvertTo(df, DistanceAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, box.cells, sampled)));
       const auto empty = hn::And(sampled, hn::Gt(distance, zero));
       if (!hn::AllFalse(df, empty)) {
-        const auto behind = block_at(hn::Add(k, StretchedStepsWithin<kCellShift>(box, scales, place, distance)));
+        const auto behind =
+            block_at(hn::Add(k, StretchedStepsWithin(box, scales, place, SetInt(kCellSide), hn::Mul(distance, Set(kCellSide)))));
         next = hn::IfThenElse(empty, hn::Max(next, behind), next);
       }
       sampled = hn::AndNot(empty, sampled);

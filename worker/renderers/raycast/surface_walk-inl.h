@@ -249,7 +249,7 @@ class SurfaceWalk {
       const Floats rest[3] = {hn::Sub(Set(1), at[0]), hn::Sub(Set(1), at[1]), hn::Sub(Set(1), at[2])};
       // Exact at both ends of t, unlike Lerp.
       const auto mix = [&](std::size_t i, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(rest[i], a), hn::Mul(at[i], b)); };
-      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(0, pair.a, pair.b); };
+      const auto row = [&](const SampleRow& pair) HWY_ATTR { return mix(0, pair.a, pair.b); };
       return mix(2, mix(1, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(1, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
     };
     return {value_at(way.begin), value_at(way.end)};
@@ -257,7 +257,7 @@ class SurfaceWalk {
   // The interpolant along the way: the product of its slopes along the axes, and its ends.
   static HWY_INLINE Cubic CubicAlong(const Way& way, const Neighbours<T>& voxels, const Ends& ends) {
     const auto& rows = voxels.inner;
-    const auto along_x = [&](const InnerPair& row) HWY_ATTR { return hn::Sub(row.b, row.a); };
+    const auto along_x = [&](const SampleRow& row) HWY_ATTR { return hn::Sub(row.b, row.a); };
     const auto lowest = along_x(rows[0][0]);
     const auto xy = hn::Sub(along_x(rows[0][1]), lowest), xz = hn::Sub(along_x(rows[1][0]), lowest);
     const auto xyz = hn::Sub(hn::Sub(along_x(rows[1][1]), along_x(rows[1][0])), xy);
@@ -375,7 +375,7 @@ class SurfaceWalk {
     const Neighbours<T> voxels = LoadNeighbours<T>(box_, place, rays);
     auto least = voxels.inner[0][0].a, greatest = least, magnitude = zero;
     for (const auto& slice : voxels.inner) {
-      for (const InnerPair& row : slice) {
+      for (const SampleRow& row : slice) {
         least = hn::Min(least, hn::Min(row.a, row.b));
         greatest = hn::Max(greatest, hn::Max(row.a, row.b));
         if constexpr (std::is_same_v<T, float>) magnitude = hn::Add(magnitude, hn::Add(hn::Abs(row.a), hn::Abs(row.b)));

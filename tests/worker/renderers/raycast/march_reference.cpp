@@ -9,6 +9,7 @@
 
 #include "common/frame/smooth_label.h"
 #include "tests/worker/rays/pixel_ray.h"
+#include "tests/worker/rays/whole_weights.h"
 
 namespace slabstream::testing {
 namespace {
@@ -425,16 +426,10 @@ class ReferenceMarch {
   }
   ValueAndGradient AtWholeWeights(const Float3& p) const {
     const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
-    // The part of a weight that is for one of two sides. Shares are whole numbers of 2^-15, but along x of 2^-14.
-    const auto split = [&](int weight, std::size_t axis, int side) {
-      const int upper = (weight * int(std::nearbyint((p[axis] - floor[axis]) * 32767.0F)) + 16384) >> 15;
-      return side == 1 ? upper : weight - upper;
-    };
-    const int second = int(std::nearbyint((p[0] - floor[0]) * 16384.0F));
     double sums[4] = {};
     for (int corner = 0; corner < 8; ++corner) {
       const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
-      const double weight = split(split(dx == 1 ? second : 16384 - second, 1, dy), 2, dz);
+      const double weight = WholeWeight({p[0] - floor[0], p[1] - floor[1], p[2] - floor[2]}, corner);
       const std::array<double, 4> voxel =
           VoxelAndGradient(std::int32_t(floor[0]) + dx, std::int32_t(floor[1]) + dy, std::int32_t(floor[2]) + dz);
       for (std::size_t i = 0; i < 4; ++i) sums[i] += weight / 16384 * voxel[i];
