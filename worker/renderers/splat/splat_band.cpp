@@ -240,11 +240,13 @@ void SplatBand::FindOctets(std::int32_t beam) {
   const std::uint32_t* masks = cells.Masks(number) + (pass_.first_octet / kCellOctets - cells.first_cell);
   const VoxelRecord* record = &cells.records[cells.first_record[number]];
   const OctetReach* const reached = pass_.Reached(slice_);
+  const SegmentSpan* const reached_by_cells = pass_.ReachedByCells(slice_);
   const SegmentWord* needed = &needed_[BeamWord(beam)];
   SegmentWord* filled = &filled_[BeamWord(beam)];
   float* shaded = ShadedBeam(beam) + 4 * std::ptrdiff_t{margin_};
   const float along_v = slopes_.AlongV(beam), across = 1 + along_v * along_v;
   constexpr std::uint32_t kAll = (1U << kOctet) - 1;
+  constexpr std::uint64_t kCellBits = (1U << kCellOctets) - 1;
   std::uint64_t drawn = 0;
   Index3 brick;
   brick[cells.axes.c] = slice_ / kBrick;
@@ -253,25 +255,35 @@ void SplatBand::FindOctets(std::int32_t beam) {
   if (cells.to_make != nullptr) bricks = cells.to_make->RowAt(brick.y, brick.z);
   for (std::int32_t first_cell = 0; first_cell < cell_count; first_cell += kSetCells) {
     const std::int32_t set_cells = std::min(kSetCells, cell_count - first_cell);
-    for (std::uint64_t rest = OccupiedOctets(masks + first_cell, set_cells); rest != 0; rest &= rest - 1) {
-      const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
-      const std::uint32_t occupied = masks[octet / kCellOctets] >> (octet % kCellOctets * kOctet) & kAll;
+    std::uint64_t left = OccupiedOctets(masks + first_cell, set_cells);
+    while (left != 0) {
+      const std::int32_t cell_of_set = std::countr_zero(left) / kCellOctets, cell = first_cell + cell_of_set;
+      const std::uint64_t in_cell = left & (kCellBits << cell_of_set * kCellOctets);
+      left ^= in_cell;
+      const std::uint32_t mask = masks[cell];
       const VoxelRecord* records = record;
-      record += kOctetCount[occupied];
-      SegmentSpan span = reached[octet].whole;
-      if (!AnyOf(needed, span)) continue;
-      if (occupied != kAll) {
-        span = reached[octet].Of(occupied);
+      for (std::int32_t octet = 0; octet < kCellOctets; ++octet) record += kOctetCount[mask >> octet * kOctet & kAll];
+      if (reached_by_cells != nullptr && !AnyOf(needed, reached_by_cells[cell])) continue;
+      for (std::uint64_t rest = in_cell; rest != 0; rest &= rest - 1) {
+        const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
+        const std::uint32_t occupied = mask >> (octet % kCellOctets * kOctet) & kAll;
+        const VoxelRecord* const of_octet = records;
+        records += kOctetCount[occupied];
+        SegmentSpan span = reached[octet].whole;
         if (!AnyOf(needed, span)) continue;
+        if (occupied != kAll) {
+          span = reached[octet].Of(occupied);
+          if (!AnyOf(needed, span)) continue;
+        }
+        brick[cells.axes.u] = (pass_.first_octet + octet) / kBrickOctets;
+        if (bricks && !bricks->Has(brick.x)) MakeRecords(brick);
+        __builtin_prefetch(of_octet);  // used for shading only after the slice's other octets
+        Insert(filled, span);
+        octets_.push_back({of_octet, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied,
+                           slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
+        if (clipped_ || pass_.light) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
+        drawn += kOctetCount[occupied];
       }
-      brick[cells.axes.u] = (pass_.first_octet + octet) / kBrickOctets;
-      if (bricks && !bricks->Has(brick.x)) MakeRecords(brick);
-      __builtin_prefetch(records);  // used for shading only after the slice's other octets
-      Insert(filled, span);
-      octets_.push_back(
-          {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
-      if (clipped_ || pass_.light) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
-      drawn += kOctetCount[occupied];
     }
   }
   report_.drawn_voxels += drawn;

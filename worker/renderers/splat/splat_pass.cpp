@@ -52,6 +52,17 @@ SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const Classification
       reach->whole = reach->Of(0xFF);
     }
   }
+  FindReachOfCells();
+}
+
+void SplatPass::FindReachOfCells() {
+  cells_reached.resize(reached.size() / kCellOctets);
+  for (std::size_t cell = 0; cell < cells_reached.size(); ++cell) {
+    const OctetReach* const octets = &reached[cell * kCellOctets];
+    const std::int32_t from = octets[0].begin.front(), to = octets[kCellOctets - 1].end.back();
+    if (to - from > kWordSegments) return cells_reached.clear();
+    if (from < to) cells_reached[cell] = MakeSpan(from, to);
+  }
 }
 
 }  // namespace slabstream

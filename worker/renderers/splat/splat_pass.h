@@ -43,6 +43,12 @@ struct SplatPass {
     return &reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count)];
   }
 
+  // The same of whole cells. Null: a cell may reach too many for a span.
+  const SegmentSpan* ReachedByCells(std::int32_t k) const {
+    if (cells_reached.empty()) return nullptr;
+    return &cells_reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count / kCellOctets)];
+  }
+
   const OccupiedVoxels& cells;
   const FrameSetup& setup;
   const Box box;
@@ -58,6 +64,10 @@ struct SplatPass {
   PixelBounds bounds;                             // the image's pixels, in whole segments; empty if nothing shows
   std::int32_t first_octet = 0, octet_count = 0;  // octets of whole cells
   std::vector<OctetReach> reached;                // [slice][octet]
+  std::vector<SegmentSpan> cells_reached;         // [slice][cell]
+
+ private:
+  void FindReachOfCells();
 };
 
 }  // namespace slabstream
