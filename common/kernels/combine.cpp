@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/image/finite.h"
 #include "common/image/run_payload.h"
+#include "common/parallel/parallel.h"
 
 namespace slabstream {
 namespace {
@@ -141,27 +143,37 @@ bool MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Si
   return valid;
 }
 
+// merge(y) for each row [begin, end), in parallel; false if it was for one of them. Others may be left out then.
+template <class Merge>
+bool AllRows(std::int32_t begin, std::int32_t end, Merge&& merge) {
+  constexpr std::int64_t kRowsOfTask = 16;
+  std::atomic<bool> valid = true;
+  ParallelForRanges(begin, end, kRowsOfTask, [&](std::int32_t first, std::int32_t last) {
+    for (std::int32_t y = first; y < last && valid; ++y) {
+      if (!merge(y)) valid = false;
+    }
+  });
+  return valid;
+}
+
 // False: as MergeRow, and the rest is left out.
 template <Values kOther>
 bool CombineRows(LocalImage& image, const ImageView& other, Side side, const PixelBounds& room) {
   CHECK_EQ(int(image.format), int(other.format));
   if (other.bounds.empty()) return true;
   if (image.bounds.Contains(other.bounds)) {
-    for (std::int32_t y = other.bounds.y_begin; y < other.bounds.y_end; ++y) {
-      if (!MergeInPlace<kOther>(image, y, RowOf(other, y, image.bounds.x_begin), side)) return false;
-    }
-    return true;
+    return AllRows(other.bounds.y_begin, other.bounds.y_end,
+                   [&](std::int32_t y) { return MergeInPlace<kOther>(image, y, RowOf(other, y, image.bounds.x_begin), side); });
   }
   const LocalImage old = std::move(image);
   const ImageView ours = ViewOf(old);
   CHECK(room.Contains(ours.bounds) && room.Contains(other.bounds));
   image = MakeEmptyRows(old.format, room);
-  for (std::int32_t y = room.y_begin; y < room.y_end; ++y) {
+  return AllRows(room.y_begin, room.y_end, [&](std::int32_t y) {
     const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
-    if (!MergeRow<kOther>(a, b, side, image, RowBegin(room, y), false)) return false;
     image.rows[std::size_t(y - room.y_begin)] = Hull(a.columns, b.columns);
-  }
-  return true;
+    return MergeRow<kOther>(a, b, side, image, RowBegin(room, y), false);
+  });
 }
 
 }  // namespace
