@@ -1,7 +1,6 @@
 #include "client/pictures/composed_picture.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include "common/base/check.h"
@@ -69,11 +68,7 @@ void ComposedPicture::StraightRow(int y, std::span<std::uint8_t> codes) const {
   if (image == nullptr) return CodeRow(y, codes);
   const PixelBounds& b = image->bounds;
   const bool inside = !b.empty() && y >= b.y_begin && y < b.y_end;
-  if (!inside || b.width() < size_.width) {
-    std::array<std::uint8_t, 4> beside;
-    StraightCodes(background_.data(), 1, beside.data());
-    for (std::size_t i = 0; i < codes.size(); i += beside.size()) std::ranges::copy(beside, &codes[i]);
-  }
+  if (!inside || b.width() < size_.width) FillStraightCodes(background_, codes);
   if (!inside) return;
   const std::size_t row = 4 * std::size_t(b.width());
   std::copy_n(image->codes.data() + std::size_t(y - b.y_begin) * row, row, codes.data() + 4 * std::size_t(b.x_begin));

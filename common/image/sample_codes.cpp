@@ -5,6 +5,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "common/image/sample_codes.h"
@@ -101,6 +102,11 @@ void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t*
 }
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes, const Premultiplied& behind) {
   HWY_DYNAMIC_DISPATCH(Straight16)(premultiplied, pixels, codes, behind);
+}
+void FillStraightCodes(const Premultiplied& color, std::span<std::uint8_t> codes) {
+  std::array<std::uint8_t, 4> code;
+  StraightCodes(color.data(), 1, code.data());
+  for (std::size_t i = 0; i < codes.size(); i += code.size()) std::ranges::copy(code, &codes[i]);
 }
 void FromStraightCodes(const std::uint8_t* codes, std::size_t pixels, float* premultiplied) {
   HWY_DYNAMIC_DISPATCH(FromStraight8)(codes, pixels, premultiplied);

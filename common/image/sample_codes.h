@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace slabstream {
 
@@ -17,6 +18,9 @@ using Premultiplied = std::array<float, 4>;
 // They are those of the pixels over `behind` (OverRow), which leaves them as they are if it is empty.
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes, const Premultiplied& behind = {});
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes, const Premultiplied& behind = {});
+
+// The codes of one colour, in every pixel of `codes`.
+void FillStraightCodes(const Premultiplied& color, std::span<std::uint8_t> codes);
 
 // The premultiplied colours that 8-bit codes stand for. StraightCodes of them are the same codes again, except that colours without alpha
 // become 0.

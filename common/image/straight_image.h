@@ -1,7 +1,6 @@
 // StraightImage: the pixels of a finished picture in the codes that a PNG of 8 bits holds (StraightCodes, sample_codes.h).
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
 #include "common/image/pixel_bounds.h"
@@ -19,10 +18,7 @@ struct StraightImage {
 // All pixels are `behind`.
 inline StraightImage MakeStraightImage(const PixelBounds& bounds, const Premultiplied& behind = {}) {
   StraightImage image{bounds, PooledVector<std::uint8_t>(4 * std::size_t(bounds.pixel_count()), 0), behind};
-  if (behind == Premultiplied{}) return image;
-  std::array<std::uint8_t, 4> code;
-  StraightCodes(behind.data(), 1, code.data());
-  for (std::size_t i = 0; i < image.codes.size(); i += code.size()) std::ranges::copy(code, image.codes.begin() + std::ptrdiff_t(i));
+  if (behind != Premultiplied{}) FillStraightCodes(behind, image.codes);
   return image;
 }
 
