@@ -70,6 +70,7 @@ Status EmbeddedService::AddWorker() {
   WorkerOptions options;
   options.coordinator_endpoint = coordinator_->worker_endpoint();
   options.machine = worker_config_;
+  options.find_held = [this](DatasetId dataset) { return coordinator_->FindHeld(dataset); };
   Result<std::unique_ptr<WorkerService>> worker = WorkerService::Start(context_, std::move(options));
   if (!worker.ok()) return worker.status();
   workers_.push_back(std::move(*worker));

@@ -442,6 +442,8 @@ std::string CoordinatorService::MetricsText() {
   return impl_->metrics.Text([this] { impl_->background.wakeup().Notify(); });
 }
 
+std::shared_ptr<const HeldVoxels> CoordinatorService::FindHeld(DatasetId dataset) { return impl_->voxels->FindHeld(dataset); }
+
 void CoordinatorService::WaitUntilStopped() { impl_->stopped.wait(false); }
 bool CoordinatorService::stopped() const { return impl_->stopped; }
 

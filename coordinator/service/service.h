@@ -43,6 +43,8 @@ class CoordinatorService {
 
   std::string MetricsText();  // for Prometheus; from any thread
 
+  std::shared_ptr<const HeldVoxels> FindHeld(DatasetId dataset);  // for workers of this process, from any thread, as FindHeldVoxels
+
   void RequestStop();       // from any thread or a signal-handling one; returns at once
   void WaitUntilStopped();  // until RequestStop or a client's ShutDown has been carried out
   bool stopped() const;

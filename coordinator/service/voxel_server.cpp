@@ -55,11 +55,6 @@ VoxelServer::~VoxelServer() {
 }
 
 void VoxelServer::Publish(DatasetId dataset, Samples samples) {
-  if (samples.volume != nullptr) {
-    samples.held = HeldVoxels::Publish(dataset, {samples.volume, samples.read_from});
-  } else if (samples.bricks != nullptr) {
-    samples.held = HeldVoxels::Publish(dataset, {samples.bricks, samples.read_from});
-  }
   const std::lock_guard lock(mutex_);
   if (samples.description) light_volume_of_[LightVolumeOf(dataset)] = dataset;
   samples_.insert_or_assign(dataset, std::move(samples));
@@ -82,6 +77,13 @@ VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);
   return found == samples_.end() ? Samples{} : found->second;
+}
+
+std::shared_ptr<const HeldVoxels> VoxelServer::FindHeld(DatasetId dataset) {
+  const Samples samples = Find(dataset);
+  if (samples.volume != nullptr) return std::make_shared<const HeldVoxels>(HeldVoxels{samples.volume, samples.read_from});
+  if (samples.bricks != nullptr) return std::make_shared<const HeldVoxels>(HeldVoxels{samples.bricks, samples.read_from});
+  return nullptr;
 }
 
 VoxelServer::Samples VoxelServer::LightVolume(DatasetId light) {

@@ -60,7 +60,6 @@ class VoxelServer {
     // What is known of these voxels alone, where their dataset has the range and histogram of several times.
     std::shared_ptr<const VolumeSummary> own = nullptr;
     std::optional<VolumeDescription> description = {};  // describes what is held; none: nobody can ask for its light volume
-    std::shared_ptr<const HeldVoxels> held = nullptr;   // so that workers of this process find the voxels; Publish sets it
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().
@@ -94,8 +93,9 @@ class VoxelServer {
   // From any thread. The same id means the same voxels. They are served until they are withdrawn. So is the light volume of samples that
   // are held (LightVolumeOf), which is made when it is first asked for.
   void Publish(DatasetId dataset, Samples samples);
-  void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
-  Samples Find(DatasetId dataset);   // from any thread; neither: not published
+  void Withdraw(DatasetId dataset);                               // from any thread; requests for it are refused from now on
+  Samples Find(DatasetId dataset);                                // from any thread; neither: not published
+  std::shared_ptr<const HeldVoxels> FindHeld(DatasetId dataset);  // from any thread, as FindHeldVoxels
   // From any thread: as Socket::EndConnections, soon.
   void EndConnections(const std::string& user);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <variant>
 
@@ -20,11 +21,9 @@ struct HeldVoxels {
     if (const auto* const volume = std::get_if<std::shared_ptr<const Volume>>(&voxels)) return (*volume)->block;
     return *std::get<std::shared_ptr<const BrickedVoxels>>(voxels);
   }
-
-  // Those of a dataset (DatasetId) can be found as long as somebody keeps what this returns. The same id means the same voxels. Any thread.
-  static std::shared_ptr<const HeldVoxels> Publish(std::uint64_t dataset, HeldVoxels held);
-  // Null: nobody in this process holds them. Any thread.
-  static std::shared_ptr<const HeldVoxels> Find(std::uint64_t dataset);
 };
+
+// Those of a dataset (DatasetId). Null: they are not held.
+using FindHeldVoxels = std::function<std::shared_ptr<const HeldVoxels>(std::uint64_t dataset)>;
 
 }  // namespace slabstream

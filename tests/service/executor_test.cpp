@@ -292,16 +292,13 @@ TEST(StoredBoxTest, VoxelsThatTheProcessHoldsAreReadWhereTheyLie) {
   volume->description.geometry.size = {40, 20, 10};
   volume->block = MakeVoxelBlock(volume->description.geometry.bounds(), ScalarType::kUint8);
   for (std::size_t i = 0; i < volume->block.bytes.size(); ++i) volume->block.bytes[i] = std::byte(i % 251);
-  constexpr std::uint64_t kDataset = 0x8E1D;
-  EXPECT_EQ(HeldVoxels::Find(kDataset), nullptr);
-  const BoxKey key{.dataset = kDataset, .box = {{3, 2, 1}, {30, 20, 9}}, .types = ScalarType::kUint8};
+  const BoxKey key{.dataset = 1, .box = {{3, 2, 1}, {30, 20, 9}}, .types = ScalarType::kUint8};
   StoredBox box(key, {}, false);
-  {
-    const auto held = HeldVoxels::Publish(kDataset, {std::shared_ptr<const Volume>(volume)});
-    box.Hold(HeldVoxels::Find(kDataset));
-  }
+  auto held = std::make_shared<const HeldVoxels>(HeldVoxels{std::shared_ptr<const Volume>(volume)});
+  const std::weak_ptr<const HeldVoxels> kept = held;
+  box.Hold(std::move(held));
   EXPECT_FALSE(box.Assemble()) << "nothing is copied";
-  EXPECT_NE(HeldVoxels::Find(kDataset), nullptr) << "the box keeps the voxels";
+  EXPECT_FALSE(kept.expired()) << "the box keeps the voxels";
   EXPECT_EQ(box.bytes(), 0U) << "they are not its own";
   {
     const StoredBox::Lease lease = box.Lend(1);
@@ -311,7 +308,7 @@ TEST(StoredBoxTest, VoxelsThatTheProcessHoldsAreReadWhereTheyLie) {
     EXPECT_EQ(view.Row(2, 1), volume->block.samples<std::uint8_t>() + volume->block.Offset({3, 2, 1}));
     EXPECT_EQ(lease.data().voxels().bytes, CutBlock(volume->block, key.box).bytes);
   }
-  EXPECT_EQ(HeldVoxels::Find(kDataset), nullptr) << "a block of its own has taken their place";
+  EXPECT_TRUE(kept.expired()) << "a block of its own has taken their place";
 }
 
 TEST(StoredBoxTest, WhatIsFilledHasItsSampleAndSoHasThePaddingBesideIt) {

@@ -329,9 +329,9 @@ void WorkerService::Impl::Perform(SendChunkRequest& action) {
 // A box keeps the whole volume there. A process with a limit counts the voxels of the box alone, so its boxes have copies.
 bool WorkerService::Impl::ReadsHeld(const SendChunkRequest& action) {
   const ChunkRequest& request = action.request;
-  const bool may_share = options.share_memory && options.machine.memory_bytes == 0 && voxels_endpoint.starts_with("inproc://");
+  const bool may_share = options.find_held && options.machine.memory_bytes == 0;
   if (!may_share || action.stored != nullptr || IsCellChunk(request.chunk)) return false;
-  std::shared_ptr<const HeldVoxels> held = HeldVoxels::Find(request.dataset);
+  std::shared_ptr<const HeldVoxels> held = options.find_held(request.dataset);
   if (held == nullptr) return false;
   const std::uint64_t stored_bytes = held->read_from == nullptr ? 0 : held->read_from->TakeStoredBytes();
   executor->BoxOf(action.padded)->Hold(std::move(held));

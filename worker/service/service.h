@@ -11,6 +11,7 @@
 
 #include "common/base/status.h"
 #include "common/transport/socket.h"
+#include "data/sources/held_voxels.h"
 #include "worker/machine/worker_machine.h"
 #include "worker/renderers/renderer.h"
 #include "worker/service/executor.h"
@@ -20,7 +21,8 @@ namespace slabstream {
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
-  bool share_memory = true;          // lend images to workers of this host, and read voxels of this process in place
+  bool share_memory = true;          // lend images to workers of this host
+  FindHeldVoxels find_held = {};     // the coordinator's, if it is of this process: its voxels are read where they lie
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;                             // called for the executor's tasks, and for "send"
   std::optional<ClientKeys> keys = std::nullopt;  // the worker's keys; none: the service has no keys
