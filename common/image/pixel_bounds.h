@@ -36,4 +36,10 @@ struct PixelRange {
   friend constexpr auto operator<=>(const PixelRange&, const PixelRange&) = default;
 };
 
+// The whole rows of a frame that hold the pixels.
+constexpr PixelBounds RowsOf(PixelRange pixels, const PixelBounds& frame) {
+  const auto width = std::uint64_t(frame.width());
+  return {0, std::int32_t(pixels.begin / width), frame.width(), std::int32_t((pixels.end + width - 1) / width)};
+}
+
 }  // namespace slabstream

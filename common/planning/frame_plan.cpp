@@ -204,6 +204,7 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   const bool several = plan.groups.size() > 1 || plan.groups.front().placements.size() > 1;
   if (several && UsesOcclusion(plan.setup)) plan.setup.front = FindOpaqueFront(plan.layout->extinction, plan.setup);
   if (Status status = AssignWorkers(roster, plan); !status.ok()) return status;
+  plan.tiles = PlanTiles(plan);
   return plan;
 }
 

@@ -73,7 +73,7 @@ struct FramePlan {
   std::string combine;            // the combining scheme, never empty
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
-  std::vector<TileOrder> tiles;   // of shapes
+  std::vector<TileOrder> tiles;   // of shapes; of a frame's first attempt alone
   Turn turn;
   ClientTakes client;
   WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible. In shares: the first one's

@@ -199,13 +199,13 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apar
     if (group.schedule.roots.size() > 1) plan.display = group.placements[group.schedule.roots.front()].worker;
     group.color = ChooseColor(plan, group);
   }
-  plan.tiles = PlanTiles(plan);
   return Status::Ok();
 }
 
 Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster, const SetApart& apart) {
   CHECK_EQ(roster.slots.size(), plan.slots) << "a plan's boxes belong to its slots";
   FramePlan changed = plan;
+  changed.tiles.clear();
   if (Status status = AssignWorkers(roster, changed, apart); !status.ok()) return status;
   return changed;
 }
@@ -216,6 +216,7 @@ FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn
   other.display = 0;
   const Status status = AssignWorkers(roster, other);
   CHECK(status.ok()) << status.message();
+  other.tiles = PlanTiles(other);
   return other;
 }
 

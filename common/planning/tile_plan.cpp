@@ -42,9 +42,7 @@ std::vector<TileOrder> PlanTiles(const FramePlan& plan) {
   for (std::size_t i = 0; i < displays.size(); ++i) {
     const PixelRange share = Share(WholeFrame(plan.setup), i, displays.size());
     if (share.begin == share.end) continue;
-    const auto width = std::uint64_t(grid.frame.width());
-    grid.ForEach({0, std::int32_t(share.begin / width), grid.frame.width(), std::int32_t((share.end - 1) / width) + 1},
-                 [&](std::uint32_t tile) { needed[tile].push_back(displays[i]); });
+    grid.ForEach(RowsOf(share, grid.frame), [&](std::uint32_t tile) { needed[tile].push_back(displays[i]); });
   }
   std::map<std::pair<WorkerId, WorkerId>, std::vector<std::uint32_t>> orders;
   for (std::uint32_t tile = 0; tile < needed.size(); ++tile) {

@@ -67,8 +67,7 @@ PixelBounds RoomFor(const PixelBounds& image, const PixelBounds& other, PixelRan
   if (both.empty()) return both;
   const bool outgrown = image.width() == frame.width() && image != both;
   if (outgrown || frame.pixel_count() <= kMostPixels) return frame;
-  const auto width = std::uint64_t(frame.width());
-  const PixelBounds rows = {0, std::int32_t(pixels.begin / width), frame.width(), std::int32_t((pixels.end + width - 1) / width)};
+  const PixelBounds rows = RowsOf(pixels, frame);
   return rows.pixel_count() <= kMostPixels ? Union(both, rows) : both;
 }
 

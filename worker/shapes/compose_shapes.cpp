@@ -54,12 +54,10 @@ void ForEachPixel(LocalImage& image, PixelRange pixels, std::int32_t frame_width
 }  // namespace
 
 LocalImage ComposeShapes(const LocalImage& frame, PixelRange pixels, const FrameSetup& setup, const FrameShapes& shapes) {
-  const std::int32_t width = FrameBounds(setup).width();
-  const PixelBounds rows = {0, std::int32_t(pixels.begin / std::uint64_t(width)), width,
-                            std::int32_t((pixels.end + std::uint64_t(width) - 1) / std::uint64_t(width))};
-  LocalImage image = Grown(frame, Intersection(shapes.bounds(), rows));
+  const PixelBounds bounds = FrameBounds(setup);
+  LocalImage image = Grown(frame, Intersection(shapes.bounds(), RowsOf(pixels, bounds)));
   const FragmentOrder order(setup);
-  ForEachPixel(image, pixels, width, shapes,
+  ForEachPixel(image, pixels, bounds.width(), shapes,
                [&](std::span<const ShapeFragment> fragments, std::size_t pixel, std::int32_t x, std::int32_t y) {
                  float* const at = &image.rgba[4 * pixel];
                  const Color volume = {at[0], at[1], at[2], at[3]};
