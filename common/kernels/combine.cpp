@@ -143,7 +143,7 @@ bool MergeInPlace(LocalImage& image, std::int32_t y, const RowPixels& theirs, Si
   return valid;
 }
 
-// merge(y) for each row [begin, end), in parallel; false if it was for one of them. Others may be left out then.
+// Calls merge(y) for the rows [begin, end), in parallel. Returns false if merge did for one of them; other rows may be left out then.
 template <class Merge>
 bool AllRows(std::int32_t begin, std::int32_t end, Merge&& merge) {
   constexpr std::int64_t kRowsOfTask = 16;

@@ -125,6 +125,7 @@ struct Search {
   Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
   LeapScales leaps;     // in this direction
   int blind = 0;        // next samples that are taken without a look at bounds
+  int in_blocks = 0;    // next looks that leave out the bounds of blocks
 };
 
 // Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
@@ -144,8 +145,15 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   if (search.blind > 0) {
     --search.blind;
   } else {
-    const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
-    const auto dull_block = hn::Le(block, found.best);
+    auto dull_block = hn::Lt(Set(1), hn::Zero(df));
+    if (search.in_blocks > 0) {
+      --search.in_blocks;
+    } else {
+      const auto block = hn::GatherIndex(df, bounds.blocks.data(), CellOf<kBlockShift>(place, bounds.block_counts, alive));
+      dull_block = hn::Le(block, found.best);
+      // Most of the next looks are in the same blocks.
+      if (hn::AllFalse(df, hn::And(dull_block, alive))) search.in_blocks = 4;
+    }
     auto dull = dull_block;
     if (!hn::AllFalse(df, hn::AndNot(dull_block, alive))) {
       const auto cell = hn::GatherIndex(df, bounds.cells.data(), CellOf<kCellShift>(place, box.cells, alive));

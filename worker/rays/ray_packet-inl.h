@@ -353,9 +353,8 @@ HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
   return scales;
 }
 
-// Steps after which a ray may be `ahead` voxels from where it would enter the cube of `side` voxels (a power of two) that it is in; at
-// least
-// 1. All earlier samples lie nearer.
+// The number of steps, at least 1, after which a ray may be `ahead` voxels past its entry into its cube (of `side` voxels, a power of two).
+// Earlier samples lie nearer.
 HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
   const FloatTag df;
   const auto behind = hn::Sub(hn::ConvertTo(df, side), ahead);
@@ -370,13 +369,13 @@ HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const
   return hn::Add(hn::Floor(hn::Max(steps, hn::Zero(df))), Set(1));
 }
 
-// --- Reading by lanes. Gathers take longer than loads of 16 bytes that are put together.
+// --- Reading by lanes. Gathers are slower than loads of 16 bytes that are then combined.
 
 // Lanes as numbers in memory.
 struct LaneNumbers {
   HWY_ALIGN std::int32_t number[kLanes];
 
-  // From a store that it sees the compiler would take them lane by lane, which takes registers longer.
+  // `asm` hides the store. Otherwise the compiler would extract each lane from the register, which is slower.
   HWY_INLINE void Set(Ints lanes) {
     hn::Store(lanes, IntTag(), number);
     asm("" : "+m"(number));
@@ -384,7 +383,7 @@ struct LaneNumbers {
   HWY_INLINE std::int32_t operator[](std::size_t lane) const { return number[lane]; }
 };
 
-// Four registers of four numbers a block as four registers of one number each, by block: 4x4 matrices turned over.
+// Transposes 4x4 matrices: block b of the four registers is one matrix.
 template <class D>
 HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
   const hn::RepartitionToWide<D> dw;
@@ -398,11 +397,11 @@ HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
   v[3] = hn::BitCast(d, hn::InterleaveUpper(dw, e, f));
 }
 
-// A register whose block b is what the 16 bytes at at(4 b) hold. `d`: its numbers.
+// A register whose block b holds the 16 bytes at address at(4 b). `d`: the type of its numbers.
 template <class Tag, class At>
 HWY_INLINE auto FromBlocks(Tag d, At&& at) {
 #if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-  // A load that leaves the other blocks takes no shuffle, of which there are many already.
+  // A masked load needs no shuffle, of which there are many already.
   const auto load = [&](std::size_t lane) HWY_ATTR { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at(lane))); };
   auto blocks = _mm512_castsi128_si512(load(0));
   blocks = _mm512_mask_broadcast_i32x4(blocks, 0x00F0, load(4));
@@ -422,7 +421,7 @@ HWY_INLINE auto FromBlocks(Tag d, At&& at) {
 #endif
 }
 
-// The first four numbers of 32 bits at `row` + at[lane]: one register each.
+// The first four numbers of 32 bits at `row` + at[lane]. of[i]: number i of every lane.
 struct FirstNumbers {
   Ints of[4];
 };
@@ -501,9 +500,9 @@ HWY_INLINE Neighbours<T> LoadNeighbours(const RayBox& box, const SamplePlace& pl
 }
 
 // The weights of a sample's eight corners among whole numbers: multiples of 2^-14, at least 0, whose sum is 1. So a sample lies between its
-// corners, as empty space requires. By pairs along x, in 2^-14: the first one in the lower half of a lane, the second in the upper one.
+// corners, as empty space requires.
 struct CornerWeights {
-  Ints pairs[2][2];  // [z][y]
+  Ints pairs[2][2];  // [z][y]: the two weights along x, in 2^-14. The lower half of a lane has the first, the upper half the second
 };
 HWY_INLINE CornerWeights WeightsAt(const CellPlace& place) {
   const IntTag di;
@@ -540,7 +539,7 @@ HWY_INLINE Floats InterpolateWhole(const RayBox& box, const SamplePlace& place, 
   at.Set(IndexBefore(box, place, owned));
   const T* const first = reinterpret_cast<const T*>(box.samples) + 1 + box.row + box.slice;
   for (std::size_t group = 0; group < 4; ++group) {
-    // Pairs along x: of a block's four rows, side by side.
+    // `pairs`: of the four rows of a lane, side by side, the two voxels along x; one lane a block.
     const auto row = [&](std::ptrdiff_t y, std::ptrdiff_t z) HWY_ATTR {
       const T* const from = first + y * box.row + z * box.slice;
       return FromBlocks(ds, [&](std::size_t lane) HWY_ATTR { return from + at[lane + group]; });

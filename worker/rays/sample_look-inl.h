@@ -30,7 +30,7 @@ HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
   return hn::ShiftLeft<2>(Truncated(hn::IfThenElseZero(finite, EntryAt(look, value))));
 }
 
-// Central differences, times two, of stored samples around a position, interpolated.
+// Differences of stored samples over two voxels, plain or smoothed, interpolated at a position: twice the slopes.
 struct Gradient {
   Floats x, y, z;
 };
@@ -76,7 +76,7 @@ HWY_INLINE Gradient GradientAmong(const Neighbours<T>& n, const CellPlace& place
   }
   return {value(2, x), value(2, y), slope(2, z)};
 }
-// Apart, and of copies, so that plain gradients stay in registers. `owned`: as of LoadNeighbours.
+// A function of its own that takes copies: so the code for plain gradients keeps them in registers. `owned`: as in IndexBefore.
 template <class T, class Scale = Unscaled>
 HWY_NOINLINE Gradient SmoothGradientAt(const RayBox& box, SamplePlace place, Mask owned, Scale scale = {}) {
   return GradientAmong<true>(LoadNeighbours<T>(box, place, owned), place, scale);

@@ -22,7 +22,7 @@ struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
   bool share_memory = true;          // lend images to workers of this host
-  FindHeldVoxels find_held = {};     // the coordinator's, if it is of this process: its voxels are read where they lie
+  FindHeldVoxels find_held = {};     // finds voxels that a coordinator of this process holds, which are read in place; empty: there is none
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;                             // called for the executor's tasks, and for "send"
   std::optional<ClientKeys> keys = std::nullopt;  // the worker's keys; none: the service has no keys

@@ -84,8 +84,8 @@ class RaycastKind : public RendererKind {
                                       .least = 0,
                                       .most = 1},
                                      {.name = "gradient",
-                                      .purpose = "Normals of light: differences of neighbouring voxels, or smoothed across them, which "
-                                                 "softens stripes and noise close up",
+                                      .purpose = "Gradients that light uses: plain differences of neighbouring voxels, or smoothed "
+                                                 "ones, so that stripes and noise get weaker close up",
                                       .standard = double(GradientKind::kCentral),
                                       .choices = {"central", "smooth"}}}}) {}
 

@@ -1,4 +1,4 @@
-// The parameters of ray casting, after the sampling rate.
+// The parameters of ray casting; the sampling rate is number 0.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace slabstream::raycast {
 
-// --gradient: of light (docs/rendering.md). By value of the parameter.
+// Which gradients light uses (docs/rendering.md). Enumerators are the parameter's values.
 enum class GradientKind { kCentral = 0, kSmooth = 1 };
 
 inline constexpr std::size_t kJitter = 1, kGradient = 2;  // places among the parameters

@@ -134,7 +134,7 @@ HWY_INLINE void MakeCorners(const BrickSource<T>& source, CornerOf<T>* corners) 
   }
 }
 
-// Sums of 8-bit samples stay whole: no step divides by four, but slope_unit() divides by all.
+// Sums of 8-bit samples stay whole: Smoothed() leaves out the division by 4, and slope_unit() makes up for it.
 HWY_INLINE Words Smoothed(Words before, Words at, Words after) { return hn::Add(hn::Add(before, after), hn::ShiftLeft<1>(at)); }
 HWY_INLINE ShortCorners SmoothCornersOf(std::uint8_t /*type*/, Words value, Words x, Words y, Words z) {
   const ShortTag ds;
@@ -161,7 +161,7 @@ HWY_INLINE void MakeSmoothCorners(const BrickSource<T>& source, CornerOf<T>* cor
   const hn::Rebind<decltype(corners->value), Tag> of_corners;
   constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(Tag())), kRow = GradientBricks::kRow;
   const auto [first, row, slice, rows, slices] = source;
-  // Of a row: its slopes along x and y, smoothed along y and x; z: its values, smoothed along both. What is left is to be done along z.
+  // Of a row: its slopes along x and y, smoothed along y and x; z: its values, smoothed along both. Work along z follows.
   struct Row {
     V x, y, z;
   };

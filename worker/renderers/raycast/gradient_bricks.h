@@ -1,6 +1,6 @@
 // GradientBricks: the voxels that rays of one thread passed last, each with its gradient, as rays read them: a voxel's four numbers lie
 // side by side. A brick is made where a ray first comes, and forgotten when there is no more room. So gradients take a fixed amount of
-// memory for a thread, and nothing where no ray comes.
+// memory for a thread, and nothing where no ray comes. A table takes 4 bytes for each brick of the volume.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,8 @@
 
 namespace slabstream {
 
-// A voxel and its gradient: central differences, next voxel minus the one before, or smoothed ones, in slope_unit().
+// A voxel and its gradient: central differences, next voxel minus the one before, or smoothed ones, as multiples of slope_unit(). Those of
+// 16-bit voxels may be halved, all three.
 template <class Number>
 struct GradientCorner {
   Number value, x, y, z;
@@ -34,7 +35,7 @@ class GradientBricks {
   // live as long as this.
   void Enter(const RayBox& box, bool smooth);
   bool smooth() const { return smooth_; }           // gradients are smoothed
-  float slope_unit() const { return slope_unit_; }  // what the slopes of corners count, in differences of samples
+  float slope_unit() const { return slope_unit_; }  // one unit of a corner's slopes, as a difference of samples
   const Index3& counts() const { return counts_; }  // bricks along each axis
 
   // By brick: its first corner, or kNone. Bricks are numbered from 1; the first corner of number 0 may be read and means nothing.
@@ -53,7 +54,8 @@ class GradientBricks {
 
  private:
   static constexpr float kSmoothUnit = 1.0F / 16;  // of 8-bit samples: their sums with weights 1, 2, 1 along two axes are whole
-  static constexpr std::size_t kBytes = std::size_t{256} * kCorners * 8;  // 1.5 MB. More do not fit the second cache, and take as long
+  static constexpr std::size_t kBytes =
+      std::size_t{256} * kCorners * 8;  // 1.5 MB. More would not fit the second-level cache, and would not be faster
 
   const std::byte* samples_ = nullptr;
   bool smooth_ = false;

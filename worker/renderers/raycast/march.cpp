@@ -144,7 +144,7 @@ struct Classified {
   std::conditional_t<kSamples == Samples::kMixed, LabelledSample, std::monostate> labelled;
 };
 
-// Opacities take gradients that are not smoothed. Apart, as few frames need it.
+// Opacity uses plain gradients. Not inlined: few frames need it.
 template <class T>
 HWY_NOINLINE Gradient CentralGradientAt(const RayBox& box, SamplePlace place, Mask sampled) {
   return GradientAt<T>(box, place, sampled, false);

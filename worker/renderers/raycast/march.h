@@ -3,10 +3,9 @@
 //
 //   sample      trilinear interpolation of stored samples (gradient_bricks-inl.h)
 //   classified  after interpolation, by RayLook::entries; a sample that is not finite is empty
-//   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume.
-//               If `smooth`, each of the two slices is smoothed along the other axes
-//   opacity     times the factor that the magnitude of the gradient, not smoothed, has (RayLook::gradient_factors), if there is such a
-//               curve
+//   gradient    central differences of stored samples over two voxels, interpolated like the samples. If `smooth`, each of the two slices
+//               is smoothed first
+//   opacity     times the factor of the plain gradient's magnitude (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
 //   light       shadows and ambient occlusion at the sample (LightAt), if there are any
 //   labels      the label of the nearest voxel, or of those around if labels are smoothed, changes the volume's sample as

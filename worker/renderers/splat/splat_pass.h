@@ -43,7 +43,7 @@ struct SplatPass {
     return &reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count)];
   }
 
-  // The same of whole cells. Null: a cell may reach too many for a span.
+  // The segments that each cell of a beam reaches. Null for every slice if some cell reaches more than kWordSegments.
   const SegmentSpan* ReachedByCells(std::int32_t k) const {
     if (cells_reached.empty()) return nullptr;
     return &cells_reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count / kCellOctets)];
