@@ -61,7 +61,7 @@ bool RoundsLabels(SampleType type, const ExactSamples& exact) {
 Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source) {
   const Result<SourceToConvert> opened = OpenToConvert(options, source, {});
   if (!opened.ok()) return opened.status();
-  Result<LoadedVolume> loaded = ReadVolume(*opened->source, source.path, source.options, true);
+  Result<LoadedVolume> loaded = ReadVolume(*opened->source, source.path, source.options, {.all_exact = true});
   if (loaded.ok()) WarnOfPart(source.path, source.options, loaded->info);
   if (!loaded.ok()) return loaded.status();
   return loaded;

@@ -117,7 +117,7 @@ Result<VolumeFacts> FactsOf(const std::string& source) {
     return VolumeFacts{std::move(info), opened->survey.summary, std::move(*opened)};
   }
   const LoadedSource& loaded = std::get<LoadedSource>(*read);
-  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(OverTimes(Summarize(*loaded.volume), loaded.other_times))};
+  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(OverTimes(loaded.Summary(), loaded.other_times))};
 }
 
 std::uint64_t CountedVoxels(const VolumeSummary& summary) {

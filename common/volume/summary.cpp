@@ -36,19 +36,19 @@ ValueRange ToDataValues(const StoredRange<T>& stored, const ValueMapping& mappin
   return {min, max};
 }
 
-// Of a piece of a volume, calls met(part, row of samples, their number) for each row, and found(part, brick, its range) for each brick.
+// Of a piece of a block, calls met(part, row of samples, their number) for each row, and found(part, brick, its range) for each brick.
 // Parallel: each row of bricks by one thread, which calls local() for its `part` first.
 template <class T, class Local, class Met, class Found>
-void ForEachRowOfBricks(const VoxelBlock& piece, Local&& local, Met&& met, Found&& found) {
-  const Index3 begin = piece.box.begin, end = piece.box.end;
-  const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
+void ForEachRowOfBricks(const VoxelBlock& block, const Box& piece, Local&& local, Met&& met, Found&& found) {
+  const Index3 begin = piece.begin, end = piece.end;
+  const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.size(), kBrick);
   ParallelFor(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
     auto* const part = local();
     ColumnRanges<T> columns(std::size_t(end.x - begin.x));
     const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
     for (std::int32_t z = row.z * kBrick; z < std::min((row.z + 1) * kBrick, end.z); ++z) {
       for (std::int32_t y = row.y * kBrick; y < std::min((row.y + 1) * kBrick, end.y); ++y) {
-        const T* const samples = piece.samples<T>() + piece.Offset({begin.x, y, z});
+        const T* const samples = block.samples<T>() + block.Offset({begin.x, y, z});
         columns.Fold(samples);
         met(*part, samples, end.x - begin.x);
       }
@@ -108,9 +108,9 @@ struct FloatPart {
 template <class T>
 class PiecesOf {
  public:
-  void Add(const VoxelBlock& piece, VolumeSummary& summary) {
+  void Add(const VoxelBlock& block, const Box& piece, VolumeSummary& summary) {
     ForEachRowOfBricks<T>(
-        piece, [&] { return &parts_.Mine(); }, [](Part<T>& part, const T* row, std::int32_t width) { part.counts.Add(row, width); },
+        block, piece, [&] { return &parts_.Mine(); }, [](Part<T>& part, const T* row, std::int32_t width) { part.counts.Add(row, width); },
         [&](Part<T>& part, const Index3& brick, const StoredRange<T>& range) {
           part.range.Include(range);
           summary.bricks[NumberIn(summary.brick_counts, brick)] = ToDataValues(range, summary.description.mapping, kNoFiniteValue);
@@ -238,7 +238,7 @@ ValueRange DataRange(const VolumeDescription& description, const ValueRange& sam
 void FindBrickRanges(const VoxelBlock& piece, const Index3& brick_counts, BrickRangeList& bricks) {
   VisitStoredType(piece.type, [&]<class T>(const T*) {
     ForEachRowOfBricks<T>(
-        piece, [&] { return &bricks; }, [](BrickRangeList&, const T*, std::int32_t) {},
+        piece, piece.box, [&] { return &bricks; }, [](BrickRangeList&, const T*, std::int32_t) {},
         [&](BrickRangeList& all, const Index3& brick, const StoredRange<T>& range) {
           all[NumberIn(brick_counts, brick)] = ToDataValues(range, ValueMapping{}, kNoFiniteValue);
         });
@@ -259,10 +259,10 @@ PiecewiseSummary::PiecewiseSummary(const VolumeDescription& description) : state
 
 PiecewiseSummary::~PiecewiseSummary() = default;
 
-void PiecewiseSummary::Add(const VoxelBlock& piece) {
+void PiecewiseSummary::Add(const VoxelBlock& block, const Box& piece) {
   VolumeSummary& summary = state_->summary;
   if (summary.bricks.empty()) summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(summary.description));
-  std::visit([&](auto& pieces) { pieces.Add(piece, summary); }, state_->pieces);
+  std::visit([&](auto& pieces) { pieces.Add(block, piece, summary); }, state_->pieces);
 }
 
 void PiecewiseSummary::AddSample(const VoxelBlock& piece) {

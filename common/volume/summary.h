@@ -99,8 +99,10 @@ class PiecewiseSummary {
   explicit PiecewiseSummary(const VolumeDescription& description);
   ~PiecewiseSummary();
 
-  // The box of a piece begins at multiples of kBrick, and ends at such or at the volume's border. No voxel is given twice.
-  void Add(const VoxelBlock& piece);
+  // A piece is the part of a block in this box, which begins at multiples of kBrick, and ends at such or at the volume's border. No voxel
+  // is given twice.
+  void Add(const VoxelBlock& block, const Box& piece);
+  void Add(const VoxelBlock& piece) { Add(piece, piece.box); }
   // Counts for range and histogram alone; the piece may begin and end anywhere.
   void AddSample(const VoxelBlock& piece);
   // True: the same pieces must be given once more.

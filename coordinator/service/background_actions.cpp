@@ -148,7 +148,7 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   VoxelServer::Samples samples;
   samples.cells = loaded.cells;
   if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
-  VolumeSummary found = Summarize(*volume);
+  VolumeSummary found = loaded.Summary();
   if (samples.cells != nullptr) SummarizeCells(samples.cells->Ranges(found.description.geometry.size), *volume, found);
   if (action.source.statistics != nullptr || !loaded.other_times.empty()) samples.own = std::make_shared<const VolumeSummary>(found);
   found = OverTimes(std::move(found), loaded.other_times);

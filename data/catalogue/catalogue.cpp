@@ -294,7 +294,7 @@ Result<std::shared_ptr<const LabelTable>> KnownLabels(const SourceText& text, co
 }
 
 Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const std::string& label_colors) {
-  Result<LoadedVolume> read = ReadVolume(source, text.path, text.options);
+  Result<LoadedVolume> read = ReadVolume(source, text.path, text.options, {.summary = true});
   if (!read.ok()) return read.status();
   if (!read->rounding.empty()) LogWarning(text.path + ": " + read->rounding);
   WarnOfComponents(text, read->info);
@@ -302,6 +302,7 @@ Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, c
   if (!labels.ok()) return labels.status();
   return ReadableSource(LoadedSource{.file = std::move(read->info),
                                      .volume = std::move(read->volume),
+                                     .summary = std::move(read->summary),
                                      .labels = *std::move(labels),
                                      .stamp = nullptr,
                                      .exact = std::move(read->exact),

@@ -83,13 +83,16 @@ struct OpenedSource {
 struct LoadedSource {
   SourceInfo file;  // its finest level is the volume; nothing if a function has loaded it
   std::shared_ptr<const Volume> volume;
-  std::shared_ptr<const LabelTable> labels = {};   // of labels
-  std::shared_ptr<const FileStamp> stamp;          // the state of its files when they were read; null: they never change
-  std::shared_ptr<const ExactSamples> exact = {};  // the whole numbers that the volume rounds; null: it rounds none
-  std::vector<VolumeSummary> other_times = {};     // SurveyOtherTimes
-  std::shared_ptr<VolumeSource> source = {};       // null: it can only be read in one order or as a whole, or a function has loaded it
-  std::shared_ptr<const GridCells> cells = {};     // LevelInMemory::cells
-  std::shared_ptr<const ShapeInfo> shape = {};     // it is a shape, and the volume is its bytes; null: it is a volume
+  std::shared_ptr<const VolumeSummary> summary = {};  // LevelInMemory::summary
+  std::shared_ptr<const LabelTable> labels = {};      // of labels
+  std::shared_ptr<const FileStamp> stamp;             // the state of its files when they were read; null: they never change
+  std::shared_ptr<const ExactSamples> exact = {};     // the whole numbers that the volume rounds; null: it rounds none
+  std::vector<VolumeSummary> other_times = {};        // SurveyOtherTimes
+  std::shared_ptr<VolumeSource> source = {};          // null: it can only be read in one order or as a whole, or a function has loaded it
+  std::shared_ptr<const GridCells> cells = {};        // LevelInMemory::cells
+  std::shared_ptr<const ShapeInfo> shape = {};        // it is a shape, and the volume is its bytes; null: it is a volume
+
+  VolumeSummary Summary() const { return summary != nullptr ? *summary : Summarize(*volume); }  // of the volume alone
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

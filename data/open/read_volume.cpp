@@ -15,16 +15,17 @@ namespace slabstream {
 Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options, bool all_exact) {
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();
-  Result<LoadedVolume> loaded = ReadVolume(**source, path, options, all_exact);
+  Result<LoadedVolume> loaded = ReadVolume(**source, path, options, {.all_exact = all_exact});
   if (loaded.ok()) WarnOfPart(path, options, loaded->info);
   return loaded;
 }
 
-Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, bool all_exact) try {
+Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, LevelWanted wanted) try {
   // What is decoded as a whole checks for itself what it takes.
   if (Status fits = source.info().whole ? Status::Ok() : CheckFitsMemory(source.info().finest().voxel_bytes(), path); !fits.ok())
     return fits;
-  Result<LevelInMemory> level = source.ReadLevel(0, options.progress, {.all_exact = all_exact, .narrow = true});
+  wanted.narrow = true;
+  Result<LevelInMemory> level = source.ReadLevel(0, options.progress, wanted);
   if (!level.ok()) return level.status();
   LoadedVolume loaded{*std::move(level), source.info()};
   loaded.info.levels.front().description = loaded.volume->description;

@@ -33,8 +33,8 @@ struct LoadedVolume : LevelInMemory {
 // Reads options.time, or else the first one if options.describe. Logs what PartTexts says. Errors of OpenSource and
 // VolumeSource::ReadLevel.
 Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options = {}, bool all_exact = false);
-// The finest level of a source that was opened with these options. Logs nothing.
-Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, bool all_exact = false);
+// The finest level of a source that was opened with these options, narrow in any case. Logs nothing.
+Result<LoadedVolume> ReadVolume(VolumeSource& source, const std::string& path, const ReadOptions& options, LevelWanted wanted = {});
 
 // The headers alone: the files that are read, `path` first, and if its header names one, the file of the samples; for many the folder.
 // Errors of OpenSource.

@@ -2,13 +2,18 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <future>
+#include <memory>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/parallel/task_arena.h"
 #include "common/volume/memory_budget.h"
+#include "common/volume/summary.h"
 #include "data/sources/copy_samples.h"
 #include "data/sources/volume_source.h"
 
@@ -17,10 +22,10 @@ namespace {
 
 constexpr std::int64_t kStretchBytes = std::int64_t{16} << 20;
 
-// Of whole slices, in the order of the source.
-std::vector<Box> StretchesOf(const SourceLevel& level, const SliceOrder& order) {
+// Of whole slices, in the order of the source, and of whole bricks if they are wanted.
+std::vector<Box> StretchesOf(const SourceLevel& level, const SliceOrder& order, bool of_bricks) {
   const Box bounds = level.description.geometry.bounds();
-  const std::int32_t size = bounds.end[order.along], block = level.block[order.along];
+  const std::int32_t size = bounds.end[order.along], block = std::lcm(level.block[order.along], of_bricks ? kBrick : 1);
   const std::int64_t slice_bytes = level.description.voxel_bytes() / size;
   const std::int32_t step = std::max(block, std::int32_t(std::min<std::int64_t>(kStretchBytes / slice_bytes, size)) / block * block);
   std::vector<Box> stretches;
@@ -122,6 +127,45 @@ class ExactCopy {
   std::vector<Box> done_;
 };
 
+// A read of a box. Whoever drops it waits for its end, since its voxels have a place until then.
+class ReadUnderWay {
+ public:
+  ReadUnderWay(VolumeSource& source, int level, const Box& box, const BoxRoom& room) {
+    source.Read(level, box, room, {}, [this](Status status) { end_.set_value(std::move(status)); });
+  }
+  ~ReadUnderWay() {
+    if (read_.valid()) read_.wait();
+  }
+  ReadUnderWay(const ReadUnderWay&) = delete;
+  ReadUnderWay& operator=(const ReadUnderWay&) = delete;
+
+  Status Wait() { return read_.get(); }
+
+ private:
+  std::promise<Status> end_;
+  std::future<Status> read_ = end_.get_future();
+};
+
+// Makes the summary of a volume of which one box after the other comes. On the calling thread alone, so that the reader keeps its core.
+class SummaryOfComing {
+ public:
+  explicit SummaryOfComing(const Volume& volume) : volume_(volume), pieces_(volume.description) {}
+
+  void Add(const Box& come) {
+    here_.Run([&] { pieces_.Add(volume_.block, come); });
+  }
+  // All boxes have come.
+  std::shared_ptr<const VolumeSummary> Take() {
+    if (pieces_.EndOfPieces()) pieces_.AddAgain(volume_.block);
+    return std::make_shared<const VolumeSummary>(pieces_.Take());
+  }
+
+ private:
+  const Volume& volume_;
+  PiecewiseSummary pieces_;
+  TaskArena here_{1};
+};
+
 }  // namespace
 
 Result<LevelInMemory> VolumeSource::DoReadLevel(int level, ReadProgress* progress, const LevelWanted& wanted) {
@@ -137,14 +181,28 @@ Result<LevelInMemory> VolumeSource::DoReadLevel(int level, ReadProgress* progres
   if (progress != nullptr) progress->Begin(of.description.voxel_bytes());
   const Index3& size = of.description.geometry.size;
   const std::size_t sample_bytes = BytesPerSample(of.description.type);
-  for (const Box& box : StretchesOf(of, info().slices.value_or(SliceOrder{}))) {
-    const Status read =
-        exact ? exact->Read(*this, level, box) : ReadNow(level, box, RoomIn(size, volume->block.bytes.data(), sample_bytes, box));
+  // A stream keeps one thread busy: this one counts what has come. Other sources are read by all.
+  std::optional<SummaryOfComing> summary;
+  if (wanted.summary && info().slices && !exact) summary.emplace(*volume);
+  Box come;
+  for (const Box& box : StretchesOf(of, info().slices.value_or(SliceOrder{}), summary.has_value())) {
+    Status read;
+    if (exact) {
+      read = exact->Read(*this, level, box);
+    } else {
+      ReadUnderWay reading(*this, level, box, RoomIn(size, volume->block.bytes.data(), sample_bytes, box));
+      if (summary) summary->Add(come);  // at first, nothing
+      read = reading.Wait();
+    }
     if (!read.ok()) return read;
     if (progress != nullptr) progress->Add(box.voxel_count() * std::int64_t(sample_bytes));
+    come = box;
   }
   if (exact) return exact->Take(std::move(volume));
-  return LevelInMemory{std::move(volume), nullptr, {}};
+  if (summary) summary->Add(come);
+  LevelInMemory read{.volume = volume};
+  if (summary) read.summary = summary->Take();
+  return read;
 }
 
 }  // namespace slabstream

@@ -102,11 +102,14 @@ struct LevelInMemory {
   std::shared_ptr<const ExactSamples> exact = {};
   std::string rounding = {};                         // what float32 has rounded, for people (RoundingText); "": nothing
   std::shared_ptr<const GridCells> cells = nullptr;  // of an unstructured grid, if they do not fit the memory; else the volume has them
+  // Summarize(*volume), if it was wanted and could be made while the voxels came; else null.
+  std::shared_ptr<const VolumeSummary> summary = nullptr;
 };
 struct LevelWanted {
   bool all_exact = false;  // exact samples of each type that float32 may round; else of whole numbers of which it rounds one
   // What `info` says to be float32 becomes uint16 if that holds all samples after a shift. What is decoded as a whole always does.
   bool narrow = false;
+  bool summary = false;  // LevelInMemory::summary
 };
 
 // Where the samples of a box go: x fastest.

@@ -237,7 +237,13 @@ TEST(PiecewiseSummaryTest, OfAnyPiecesIsThatOfTheWhole) {
     }
     const std::vector<Box> boxes = RandomPieces(random, volume.block.box);
     PiecewiseSummary pieces(volume.description);
-    for (const Box& box : boxes) pieces.Add(CutBlock(volume.block, box));
+    for (const Box& box : boxes) {
+      if (random.Chance(0.5)) {
+        pieces.Add(CutBlock(volume.block, box));
+      } else {
+        pieces.Add(volume.block, box);
+      }
+    }
     if (pieces.EndOfPieces()) {
       for (const Box& box : boxes) pieces.AddAgain(CutBlock(volume.block, box));
     }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "common/volume/box_assembly.h"
@@ -55,6 +56,15 @@ VoxelBlock Collect(VolumeSource& stream, const std::vector<Box>& boxes) {
   return all;
 }
 
+// Voxels are those of `whole`, and the summary that was made while they came is theirs.
+void ExpectLevelLikeWhole(VolumeSource& stream, const LoadedVolume& whole) {
+  const Result<LevelInMemory> level = stream.ReadLevel(0, nullptr, {.summary = true});
+  ASSERT_TRUE(level.ok()) << level.status().message();
+  EXPECT_TRUE(level->volume->block.bytes == whole.volume->block.bytes);
+  EXPECT_EQ(level->summary == nullptr, MayBeRounded(stream.info().exact.type)) << "the type of rounded samples is known at the end";
+  EXPECT_TRUE(level->summary == nullptr || *level->summary == Summarize(*level->volume));
+}
+
 void ExpectStreamLikeWhole(const std::string& path, const ReadOptions& options = {}) {
   const Result<LoadedVolume> whole = ReadDecoded(path, options);
   ASSERT_TRUE(whole.ok()) << whole.status().message();
@@ -64,6 +74,14 @@ void ExpectStreamLikeWhole(const std::string& path, const ReadOptions& options =
     EXPECT_TRUE(Collect(*stream, InOrder(*stream, slices)).bytes == whole->volume->block.bytes) << slices;
     EXPECT_EQ(stream->counts().stored_bytes % std::size_t(whole->info.finest().geometry.bounds().voxel_count()), 0U);
   }
+  ExpectLevelLikeWhole(*OpenedStream(path, options), *whole);
+}
+
+FileBytes GzippedNrrd(const Stored& stored) {
+  const FileBytes plain = NrrdFile(stored);
+  FileBytes header = plain.substr(0, plain.size() - stored.samples.size());
+  header.replace(header.find("raw"), 3, "gzip");
+  return header + Gzip(stored.samples);
 }
 
 TEST(SliceStream, GivesTheVolumeOfEveryFormatTypeAndByteOrder) {
@@ -81,13 +99,22 @@ TEST(SliceStream, TurnsSlicesOfEachOfThe48Storages) {
   const TemporaryDirectory directory;
   for (const Storage& storage : AllStorages()) {
     SCOPED_TRACE(Text(storage));
-    Stored stored = StoredAs({.size = {7, 5, 4}}, storage);
-    const FileBytes plain = NrrdFile(stored);
-    const std::size_t header = plain.size() - stored.samples.size();
-    FileBytes bytes = plain.substr(0, header);
-    bytes.replace(bytes.find("raw"), 3, "gzip");
-    WriteFile(directory / "v.nrrd", bytes + Gzip(stored.samples));
+    WriteFile(directory / "v.nrrd", GzippedNrrd(StoredAs({.size = {7, 5, 4}}, storage)));
     ExpectStreamLikeWhole(directory / "v.nrrd");
+  }
+}
+
+TEST(SliceStream, IsSummarizedAsItComesAlongAnyAxisFromBothEnds) {
+  const TemporaryDirectory directory;
+  constexpr std::int32_t kSlices = 36, kSide = 1024;  // read in stretches of 16 slices
+  const auto value = [](const Index3& v) { return std::uint8_t(v.x / 3 + v.y / 5 + v.z); };
+  for (const auto& [size, storage] : {std::pair(Index3{kSide, kSide, kSlices}, Storage{{0, 1, 2}, {false, false, true}}),
+                                      std::pair(Index3{kSlices, kSide, kSide}, Storage{{2, 1, 0}, {}})}) {
+    SCOPED_TRACE(Text(storage));
+    WriteFile(directory / "v.nrrd", GzippedNrrd(StoredAs({.size = size, .value = value}, storage)));
+    const std::shared_ptr<VolumeSource> stream = OpenedStream(directory / "v.nrrd");
+    EXPECT_EQ(stream->info().slices->from_end, storage.flipped[2]);
+    ExpectLevelLikeWhole(*stream, *ReadDecoded(directory / "v.nrrd"));
   }
 }
 
