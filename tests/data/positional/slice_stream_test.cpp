@@ -111,10 +111,13 @@ TEST(SliceStream, IsSummarizedAsItComesAlongAnyAxisFromBothEnds) {
   for (const auto& [size, storage] : {std::pair(Index3{kSide, kSide, kSlices}, Storage{{0, 1, 2}, {false, false, true}}),
                                       std::pair(Index3{kSlices, kSide, kSide}, Storage{{2, 1, 0}, {}})}) {
     SCOPED_TRACE(Text(storage));
-    WriteFile(directory / "v.nrrd", GzippedNrrd(StoredAs({.size = size, .value = value}, storage)));
+    const FileBytes file = GzippedNrrd(StoredAs({.size = size, .value = value}, storage));
+    WriteFile(directory / "v.nrrd", file);
     const std::shared_ptr<VolumeSource> stream = OpenedStream(directory / "v.nrrd");
     EXPECT_EQ(stream->info().slices->from_end, storage.flipped[2]);
     ExpectLevelLikeWhole(*stream, *ReadDecoded(directory / "v.nrrd"));
+    WriteFile(directory / "v.nrrd", file.substr(0, file.size() * 3 / 4));
+    EXPECT_EQ(OpenedStream(directory / "v.nrrd")->ReadLevel(0, nullptr, {.summary = true}).status().code(), StatusCode::kDataLoss);
   }
 }
 
