@@ -28,9 +28,7 @@ struct PaddedVoxels {
     return samples.get() + (offset.z * slice + std::int64_t{offset.y} * row + offset.x) * std::int64_t(BytesPerSample(type));
   }
   VoxelBricks bricks() const { return {box, type, At(box.begin), row, std::ptrdiff_t(slice)}; }  // without the padding
-  std::size_t bytes() const {
-    return std::size_t(slice) * std::size_t(box.size().z + 2 * kPad) * BytesPerSample(type);
-  }
+  std::size_t bytes() const { return std::size_t(slice) * std::size_t(box.size().z + 2 * kPad) * BytesPerSample(type); }
 };
 
 // All samples are 0. Those that are never written take no memory.
