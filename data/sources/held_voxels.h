@@ -23,7 +23,7 @@ struct HeldVoxels {
   }
 };
 
-// Those of a dataset (DatasetId). Null: they are not held.
+// Finds the held voxels of a dataset (DatasetId). Null: nobody holds them.
 using FindHeldVoxels = std::function<std::shared_ptr<const HeldVoxels>(std::uint64_t dataset)>;
 
 }  // namespace slabstream

@@ -421,18 +421,19 @@ HWY_INLINE auto FromBlocks(Tag d, At&& at) {
 #endif
 }
 
-// The first four numbers of 32 bits at `row` + at[lane]. of[i]: number i of every lane.
-struct FirstNumbers {
-  Ints of[4];
+// Four numbers of 32 bits for each lane. of[i]: number i of every lane.
+template <class D>
+struct FourNumbers {
+  hn::Vec<D> of[4];
 };
-template <class T>
-HWY_INLINE FirstNumbers FirstNumbersAt(const T* row, const LaneNumbers& at) {
-  const IntTag di;
-  FirstNumbers numbers;
+// Those that follow `from` + at[lane].
+template <class D, class T>
+HWY_INLINE FourNumbers<D> FourNumbersAt(D d, const T* from, const LaneNumbers& at) {
+  FourNumbers<D> numbers;
   for (std::size_t group = 0; group < 4; ++group) {
-    numbers.of[group] = FromBlocks(di, [&](std::size_t lane) HWY_ATTR { return row + at[lane + group]; });
+    numbers.of[group] = FromBlocks(d, [&](std::size_t lane) HWY_ATTR { return from + at[lane + group]; });
   }
-  TurnBlocks(di, numbers.of);
+  TurnBlocks(d, numbers.of);
   return numbers;
 }
 
@@ -444,22 +445,21 @@ struct SampleRow {
 
 // `at`: the first of the four voxels, in samples from `row`. Reads 16 bytes from there.
 HWY_INLINE SampleRow LoadRow(const std::uint8_t* row, const LaneNumbers& at) {
-  const auto word = FirstNumbersAt(row, at).of[0];
+  const auto word = FourNumbersAt(IntTag(), row, at).of[0];
   const auto byte = SetInt(0xFF);
   const auto number = [&](Ints v) HWY_ATTR { return hn::ConvertTo(FloatTag(), v); };
   return {number(hn::And(word, byte)), number(hn::And(hn::ShiftRight<8>(word), byte)), number(hn::And(hn::ShiftRight<16>(word), byte)),
           number(hn::BitCast(IntTag(), hn::ShiftRight<24>(hn::BitCast(hn::RebindToUnsigned<IntTag>(), word))))};
 }
 HWY_INLINE SampleRow LoadRow(const std::uint16_t* row, const LaneNumbers& at) {
-  const auto words = FirstNumbersAt(row, at);
+  const auto words = FourNumbersAt(IntTag(), row, at);
   const auto low = SetInt(0xFFFF);
   const auto number = [&](Ints v) HWY_ATTR { return hn::ConvertTo(FloatTag(), hn::And(v, low)); };
   return {number(words.of[0]), number(hn::ShiftRight<16>(words.of[0])), number(words.of[1]), number(hn::ShiftRight<16>(words.of[1]))};
 }
 HWY_INLINE SampleRow LoadRow(const float* row, const LaneNumbers& at) {
-  const auto words = FirstNumbersAt(row, at);
-  const auto number = [&](Ints v) HWY_ATTR { return hn::BitCast(FloatTag(), v); };
-  return {number(words.of[0]), number(words.of[1]), number(words.of[2]), number(words.of[3])};
+  const auto [first, a, b, last] = FourNumbersAt(FloatTag(), row, at).of;
+  return {first, a, b, last};
 }
 
 // The eight voxels around a sample, in rows along x: [z][y].

@@ -69,7 +69,7 @@ HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask vis
   const FloatTag df;
   const RayLook& look = *field.look;
   const Entries entries = EntriesAt(look.entries.data(), entry);
-  const auto& opacity = entries.part[3];
+  const auto& opacity = entries.of[3];
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return;
   Light light = {Set(1), hn::Zero(df)};
@@ -84,7 +84,7 @@ HWY_INLINE void MixSamples(const RayField& field, const FieldPlace& at, Mask vis
     const bool by_step = field.steps_a_length == 1;
     mixture.Cover(visible, by_step ? opacity : hn::Sub(Set(1), PowerOfFraction(hn::Sub(Set(1), opacity), Set(field.steps_a_length))));
   }
-  mixture.Add(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
+  mixture.Add(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.of[channel], light); });
 }
 
 // The samples of `sampled` that lie where a field shows.

@@ -303,20 +303,9 @@ HWY_INLINE Mask FiniteOf(Floats value) {
   return hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
 }
 
-// The table's entries, four floats each: lane by lane `at`, in floats.
-struct Entries {
-  Floats part[4];
-};
-
-HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
-  const FloatTag df;
-  Entries entries;
-  for (std::size_t group = 0; group < 4; ++group) {
-    entries.part[group] = FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return table + index[lane + group]; });
-  }
-  TurnBlocks(df, entries.part);
-  return entries;
-}
+// Entries of a table, four floats each. `index`: where they begin, in floats.
+using Entries = FourNumbers<FloatTag>;
+HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) { return FourNumbersAt(FloatTag(), table, index); }
 
 // `index`: BrickPlace::corner.
 template <class T>

@@ -72,7 +72,7 @@ HWY_INLINE Light LightOfLabels(const MarchWork& work, PlaceOf&& place_of, const 
 // The colours of samples with labels.
 HWY_INLINE Floats LabelledColor(const MarchWork& work, const Entries& entries, const LabelledSample& sample, const Light& light,
                                 std::size_t channel) {
-  auto color = entries.part[channel];
+  auto color = entries.of[channel];
   if (work.labels != nullptr) {
     color = Lerp(sample.tint, color, hn::GatherIndex(FloatTag(), work.labels->tables.entries.data() + channel, sample.entry));
   }
@@ -158,7 +158,7 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
   const auto zero = hn::Zero(df);
   const auto finite = FiniteOf<T>(sample.value);
   of.entries = EntriesAt(look.entries.data(), step.entry);
-  of.opacity = of.entries.part[3];
+  of.opacity = of.entries.of[3];
   of.visible = hn::And(hn::And(step.sampled, finite), hn::Gt(of.opacity, zero));
   if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
     const Gradient gradient = work.smooth ? CentralGradientAt<T>(*work.box, place_of(), step.sampled) : sample.gradient;
@@ -166,7 +166,7 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
       LaneNumbers region;
       region.Set(RegionOf(look, hn::IfThenElseZero(finite, sample.value), gradient));
       of.entries = EntriesAt(look.regions->entries.data(), region);
-      of.opacity = of.entries.part[3];
+      of.opacity = of.entries.of[3];
     } else {
       of.opacity = OpacityByGradient(look, of.opacity, gradient);
     }
@@ -214,7 +214,7 @@ HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, Plac
     add(samples.visible, opacity,
         [&](std::size_t channel) HWY_ATTR { return LabelledColor(work, samples.entries, samples.labelled, light, channel); });
   } else {
-    add(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.part[channel], light); });
+    add(samples.visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.of[channel], light); });
   }
 }
 

@@ -94,7 +94,7 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
     entry.Set(EntryOf(look, value));
   }
   Entries entries = EntriesAt(look.entries.data(), entry);
-  auto visible = hn::And(sampled, hn::Gt(entries.part[3], hn::Zero(df)));
+  auto visible = hn::And(sampled, hn::Gt(entries.of[3], hn::Zero(df)));
   if (hn::AllFalse(df, visible)) return 0;
   Gradient gradient = {Set(0), Set(0), Set(0)};
   const auto differences = [&]() HWY_ATTR { return DifferencesAt(*work.box, place); };
@@ -105,15 +105,15 @@ HWY_INLINE std::uint64_t AddSamples(const MarchWork& work, const PacketPart& par
     entries = EntriesAt(look.regions->entries.data(), region);
   }
   const auto opacity = look.gradient_factors.empty()
-                           ? hn::Sub(Set(1), ExpOfMinus(hn::Mul(entries.part[3], length)))
-                           : OpacityByGradient(look, entries.part[3], gradient, hn::Mul(Set(look.step_exponent), length));
+                           ? hn::Sub(Set(1), ExpOfMinus(hn::Mul(entries.of[3], length)))
+                           : OpacityByGradient(look, entries.of[3], gradient, hn::Mul(Set(look.step_exponent), length));
   visible = hn::And(visible, hn::Gt(opacity, hn::Zero(df)));
   Light light = {Set(1), hn::Zero(df)};
   if (look.phong) {
     if (work.smooth) gradient = SmoothGradientAt<T>(*work.box, place, sampled, differences());
     light = LightOf(look, Choose(hn::Lt(k, part.face_end), {part.face[0], part.face[1], part.face[2]}, gradient));
   }
-  sums.AddChannels(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.part[channel], light); });
+  sums.AddChannels(visible, opacity, [&](std::size_t channel) HWY_ATTR { return Sums::Lit(entries.of[channel], light); });
   return hn::CountTrue(df, visible);
 }
 

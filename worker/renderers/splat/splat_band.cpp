@@ -261,14 +261,15 @@ void SplatBand::FindOctets(std::int32_t beam) {
       const std::uint64_t in_cell = left & (kCellBits << cell_of_set * kCellOctets);
       left ^= in_cell;
       const std::uint32_t mask = masks[cell];
-      const VoxelRecord* records = record;
-      for (std::int32_t octet = 0; octet < kCellOctets; ++octet) record += kOctetCount[mask >> octet * kOctet & kAll];
-      if (reached_by_cells != nullptr && !AnyOf(needed, reached_by_cells[cell])) continue;
+      if (reached_by_cells != nullptr && !AnyOf(needed, reached_by_cells[cell])) {
+        for (std::int32_t octet = 0; octet < kCellOctets; ++octet) record += kOctetCount[mask >> octet * kOctet & kAll];
+        continue;
+      }
       for (std::uint64_t rest = in_cell; rest != 0; rest &= rest - 1) {
         const std::int32_t octet = first_cell * kCellOctets + std::countr_zero(rest);
         const std::uint32_t occupied = mask >> (octet % kCellOctets * kOctet) & kAll;
-        const VoxelRecord* const of_octet = records;
-        records += kOctetCount[occupied];
+        const VoxelRecord* const records = record;
+        record += kOctetCount[occupied];
         SegmentSpan span = reached[octet].whole;
         if (!AnyOf(needed, span)) continue;
         if (occupied != kAll) {
@@ -277,10 +278,10 @@ void SplatBand::FindOctets(std::int32_t beam) {
         }
         brick[cells.axes.u] = (pass_.first_octet + octet) / kBrickOctets;
         if (bricks && !bricks->Has(brick.x)) MakeRecords(brick);
-        __builtin_prefetch(of_octet);  // used for shading only after the slice's other octets
+        __builtin_prefetch(records);  // used for shading only after the slice's other octets
         Insert(filled, span);
-        octets_.push_back({of_octet, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied,
-                           slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
+        octets_.push_back(
+            {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
         if (clipped_ || pass_.light) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
         drawn += kOctetCount[occupied];
       }
