@@ -64,6 +64,8 @@ void DeclareBench(const CommandLine& line) {
       .Range({rate.least, rate.most})
       .TypeName("NUMBER")
       .Default("1 for spheres, otherwise the renderer's own");
+  AddNumber(sub, "--termination", options->termination, {0, kMaxTermination},
+            "Skip what lies behind material whose remaining transmittance is below this, in every case");
   sub.AddOption(
          "--shape",
          [options](const std::string& option, const std::vector<std::string>& texts) {

@@ -90,6 +90,7 @@ Result<ServiceConnection> Connect(const BenchCase& c, const ConnectionOptions& c
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
   FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), {}, {}};
   job.request.dataset = dataset;
+  job.request.termination = options.termination;
   job.request.shapes = options.shapes;
   return job;
 }

@@ -23,6 +23,7 @@ struct BenchOptions {
   int turns = 2;                                                // [1, kMaxTurns]
   std::optional<const RendererKind*> renderer;                  // replaces that of each case
   ParameterTexts parameters;                                    // parameters for the renderers of all cases
+  double termination = kDefaultTermination;                     // of all frames, as in FrameRequest
   std::vector<ShapeChoice> shapes;                              // that all pictures show
   std::string json_path, pictures_directory, export_directory;  // empty: not wanted
   bool list = false;

@@ -108,6 +108,7 @@ std::string BenchJson(const BenchRun& run, const std::vector<BenchResult>& resul
                {"size", o.size},
                {"frames", o.frames},
                {"turns", o.turns},
+               {"termination", o.termination},
                {"endpoint", o.connection.service.text()},  // empty: in this process, with the numbers of workers and threads below
                {"workers", o.connection.local_workers},
                {"threads", o.connection.local_workers > 0 ? LocalThreads(o.connection) : 0},
