@@ -82,17 +82,16 @@ HWY_INLINE PacketPixels PixelsOf(std::int32_t x, std::int32_t y) {
   return {hn::Add(SetInt(x), lane_x), hn::Add(SetInt(y), lane_y)};
 }
 
-// The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid.
+// The rays of pixels, all of them valid.
 // Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
 // ray, so that nothing cancels if the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
-HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t y, std::int32_t x_end, std::int32_t y_end) {
+HWY_INLINE RayPacket RaysOf(const ViewRays& view, Ints pixel_x, Ints pixel_y) {
   const FloatTag df;
-  const auto [pixel_x, pixel_y] = PixelsOf(x, y);
   const auto px = hn::ConvertTo(df, pixel_x), py = hn::ConvertTo(df, pixel_y);
   const auto from_x = hn::Sub(px, Set(view.centre_x)), from_y = hn::Sub(py, Set(view.centre_y));
   RayPacket packet;
-  packet.valid = hn::And(hn::Lt(px, Set(float(x_end))), hn::Lt(py, Set(float(y_end))));
   const auto one = Set(1);
+  packet.valid = hn::Lt(hn::Zero(df), one);
   const auto square = hn::Mul(hn::Add(hn::Mul(from_x, from_x), hn::Mul(from_y, from_y)), Set(view.bend));
   const auto length = hn::Sqrt(hn::Add(one, square));
   const auto lag = hn::Div(square, hn::Add(one, length)), scale = hn::Div(Set(view.step), length),
@@ -112,6 +111,14 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
     const auto shift_k = JitterAt(view, pixel_x, pixel_y);
     for (std::size_t i = 0; i < 3; ++i) packet.first[i] = hn::Add(packet.first[i], hn::Mul(shift_k, packet.move[i]));
   }
+  return packet;
+}
+
+// The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid.
+HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t y, std::int32_t x_end, std::int32_t y_end) {
+  const auto [pixel_x, pixel_y] = PixelsOf(x, y);
+  RayPacket packet = RaysOf(view, pixel_x, pixel_y);
+  packet.valid = hn::RebindMask(FloatTag(), hn::And(hn::Lt(pixel_x, SetInt(x_end)), hn::Lt(pixel_y, SetInt(y_end))));
   return packet;
 }
 
@@ -355,7 +362,7 @@ HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
 
 // The number of steps, at least 1, after which a ray may be `ahead` voxels past its entry into its cube (of `side` voxels, a power of two).
 // Earlier samples lie nearer.
-HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
+HWY_INLINE Floats StepsTo(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
   const FloatTag df;
   const auto behind = hn::Sub(hn::ConvertTo(df, side), ahead);
   const auto cube = hn::Neg(side);
@@ -366,7 +373,10 @@ HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const
     const auto plane = hn::Add(low, hn::IfThenElse(hn::Lt(scales.inverse[i], hn::Zero(df)), behind, ahead));
     steps = hn::Min(steps, hn::Sub(hn::Mul(hn::Sub(plane, inside), scales.inverse[i]), scales.margin[i]));
   }
-  return hn::Add(hn::Floor(hn::Max(steps, hn::Zero(df))), Set(1));
+  return steps;
+}
+HWY_INLINE Floats StepsWithin(const RayBox& box, const LeapScales& scales, const SamplePlace& place, Ints side, Floats ahead) {
+  return hn::Add(hn::Floor(hn::Max(StepsTo(box, scales, place, side, ahead), hn::Zero(FloatTag()))), Set(1));
 }
 
 // --- Reading by lanes. Gathers are slower than loads of 16 bytes that are then combined.

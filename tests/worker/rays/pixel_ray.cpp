@@ -10,10 +10,14 @@ PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y) {
   const float square = (from_x * from_x + from_y * from_y) * rays.bend;
   const float length = std::sqrt(1 + square);
   const float lag = square / (1 + length), scale = rays.step / length, shift = rays.start_distance / length;
+  const double plastic = 1.3247179572447460;  // its cube is 1 more
+  const double sum = x / plastic + y / (plastic * plastic);
+  const auto share = float(sum - std::floor(sum));
   for (std::size_t i = 0; i < 3; ++i) {
     const float offset = from_x * rays.right[i] + from_y * rays.down[i];
     ray.first[i] = rays.start[i] + (rays.perspective ? shift * (offset - lag * rays.forward[i]) : offset);
     ray.move[i] = rays.perspective ? scale * (rays.forward[i] + offset) : rays.step * rays.forward[i];
+    ray.first[i] += share * rays.jitter * ray.move[i];
   }
   return ray;
 }

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
+#include "worker/renderers/raycast/beams-inl.h"
 #include "worker/renderers/raycast/field_samples-inl.h"
 #include "worker/renderers/raycast/gradient_bricks-inl.h"
 #include "worker/renderers/raycast/label_samples-inl.h"
@@ -98,6 +99,7 @@ HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints 
   const IntTag di;
   const auto distance = DistanceAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, work.box->cells, inside));
   const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
+  if (hn::AllFalse(df, empty)) return {inside, Set(1)};
   return {
       hn::AndNot(empty, inside),
       hn::IfThenElse(empty, StepsWithin(*work.box, leaps, place, SetInt(kCellSide), hn::ConvertTo(df, hn::ShiftLeft<kCellShift>(distance))),
@@ -421,12 +423,14 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
   return shaded;
 }
 
-// The rays of one packet.
+// The rays of one packet. `start`: BeamStarts.
 template <class T>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, const PacketShapes* shapes, GradientBricks* bricks,
-                                     float* HWY_RESTRICT rgba) {
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float start, const PacketShapes* shapes,
+                                     GradientBricks* bricks, float* HWY_RESTRICT rgba) {
+  if (start == kRayEnd && shapes == nullptr && work.to_surfaces == nullptr) return 0;
   const auto zero = hn::Zero(FloatTag());
-  const SampleInterval owned = OwnedSamples(of_frame, *work.box);
+  SampleInterval owned = OwnedSamples(of_frame, *work.box);
+  owned.begin = hn::Max(owned.begin, Set(start));
   const RayPacket among = AmongVoxels(of_frame, *work.box);
   const LeapScales leaps = LeapScalesOf(among);
   const MarchingPacket packet = {of_frame, among, leaps, bricks};
@@ -453,10 +457,29 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
   std::uint64_t shaded = 0;
   const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
   PacketShapes shapes;
+  const std::int32_t columns = (tile.width() + kPacketWidth - 1) / kPacketWidth;
+  const std::int32_t last = columns * ((tile.height() + kPacketHeight - 1) / kPacketHeight) - 1;
+  std::int32_t number = 0;
+  alignas(64) float starts[kLanes];  // of as many packets as there are lanes
+  const auto start_of_next = [&]() HWY_ATTR {
+    const std::size_t lane = std::size_t(number) % kLanes;
+    if (lane == 0) {
+      LaneNumbers x, y;
+      for (std::int32_t i = 0; i < std::int32_t(kLanes); ++i) {
+        const std::int32_t packet = std::min(number + i, last);
+        x.number[i] = tile.x_begin + packet % columns * kPacketWidth;
+        y.number[i] = tile.y_begin + packet / columns * kPacketHeight;
+      }
+      hn::Store(BeamStarts(*work.rays, *work.box, *work.to_samples, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number)), FloatTag(),
+                starts);
+    }
+    ++number;
+    return starts[lane];
+  };
   ForEachPacket(*work.rays, tile, rgba, floats_a_row,
                 [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
                   const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
-                  const std::uint64_t found = MarchPacket<T>(work, packet, cut ? &shapes : nullptr, bricks, pixels);
+                  const std::uint64_t found = MarchPacket<T>(work, packet, start_of_next(), cut ? &shapes : nullptr, bricks, pixels);
                   shaded += found;
                   return found != 0 || (cut && shapes.any_owned);
                 });

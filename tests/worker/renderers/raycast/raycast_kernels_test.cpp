@@ -117,6 +117,32 @@ TEST(MarchTile, AgreesWithTheReference) {
   }
 }
 
+// Rays leap to a few voxels with nothing between them, whatever the angle between neighbouring rays.
+TEST(MarchTile, MissesNoVoxelInEmptySpace) {
+  Random random(85);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(85);
+  for (int i = 0; i < 150; ++i) {
+    const VolumeGeometry geometry = {{random.Integer(5, 60), random.Integer(5, 60), random.Integer(5, 60)}, {1, random.Real(0.5, 2), 1}};
+    Volume volume = MakeVolume(geometry, ScalarType::kUint8, [](const Index3&) { return 0; });
+    std::uint8_t* const samples = volume.block.samples<std::uint8_t>();
+    for (int voxels = random.Integer(1, 20); voxels > 0; --voxels)
+      samples[random.Integer<std::int64_t>(0, CountIn(geometry.size) - 1)] = 255;
+    SetupOptions options;
+    options.view = RandomView(i % 3 == 0 ? Projection::kOrthographic : Projection::kPerspective, views);
+    options.view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
+    options.view.zoom = random.Real(0.5, 1.5);
+    const int side = i % 2 == 0 ? 70 : 9;
+    options.size = {random.Integer(1, side), random.Integer(1, side)};
+    FrameSetup setup = MakeSetup(volume, options);
+    setup.camera = MakeCamera(options.view, options.size, geometry);
+    Scene scene(volume, i % 4 == 0 ? RandomBox(random, volume.block.box) : volume.block.box, setup, random.Real(0.5, 3));
+    if (i % 5 == 0) scene.rays.jitter = 1;
+    const LocalImage expected = MarchedByReference(scene);
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-5F) << "case " << i; });
+  }
+}
+
 TEST(MarchTile, AgreesWithTheReferenceOnClippedVolumes) {
   Random random(84);
   SCOPED_TRACE(random.trace());

@@ -1,0 +1,102 @@
+// Beams: where packets of rays leave the empty space in front of them, before any of their rays is marched. A beam is a packet's rays taken
+// together: at each step they lie within a box that moves along. Beams are followed one to a lane, so that as many packets as there are
+// lanes take the leaps of one; those that meet nothing need no rays at all.
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
+#else
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include "worker/renderers/raycast/surface_walk-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream {
+namespace HWY_NAMESPACE {
+
+// The corners of the boxes of beams at sample k: first + k * move. `back` is the corner that comes last along the rays, `front` the one
+// that goes ahead.
+struct Beams {
+  RayPacket back, front;
+  Mask one_octant;  // all rays of the beam move in one octant of directions; the corners of others mean nothing
+};
+
+// `x`, `y`: the first pixels of packets.
+HWY_INLINE Beams BeamsOf(const ViewRays& view, const RayBox& box, Ints x, Ints y) {
+  // Between corners of a packet, orthographic rays lie within those of the corners.
+  const bool corners = !view.perspective && !(view.jitter > 0);
+  const std::int32_t step_x = corners ? kPacketWidth - 1 : 1, step_y = corners ? std::max(kPacketHeight - 1, 1) : 1;
+  RayPacket low = AmongVoxels(RaysOf(view, x, y), box), high = low;
+  for (std::int32_t j = 0; j < kPacketHeight; j += step_y) {
+    for (std::int32_t i = 0; i < kPacketWidth; i += step_x) {
+      const RayPacket rays = AmongVoxels(RaysOf(view, hn::Add(x, SetInt(i)), hn::Add(y, SetInt(j))), box);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low.first[axis] = hn::Min(low.first[axis], rays.first[axis]);
+        low.move[axis] = hn::Min(low.move[axis], rays.move[axis]);
+        high.first[axis] = hn::Max(high.first[axis], rays.first[axis]);
+        high.move[axis] = hn::Max(high.move[axis], rays.move[axis]);
+      }
+    }
+  }
+  const auto zero = hn::Zero(FloatTag());
+  Beams beams = {low, high, low.valid};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto down = hn::Lt(high.move[axis], zero);
+    beams.one_octant = hn::And(beams.one_octant, hn::Or(down, hn::Ge(low.move[axis], zero)));
+    beams.back.first[axis] = hn::IfThenElse(down, high.first[axis], low.first[axis]);
+    beams.back.move[axis] = hn::IfThenElse(down, high.move[axis], low.move[axis]);
+    beams.front.first[axis] = hn::IfThenElse(down, low.first[axis], high.first[axis]);
+    beams.front.move[axis] = hn::IfThenElse(down, low.move[axis], high.move[axis]);
+  }
+  return beams;
+}
+
+// By packet, a sample before which none of its rays has one in a visible cell; kRayEnd: they have none at all. `x`, `y`: as for BeamsOf.
+HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& to_samples, Ints x, Ints y) {
+  constexpr float kMargin = 1.0F / 64;  // voxels: covers the rounding of positions
+  const FloatTag df;
+  const IntTag di;
+  const auto zero = hn::Zero(df), samples = Set(float(view.sample_count));
+  const Beams beams = BeamsOf(view, box, x, y);
+  // Distances are found only for octants of rays.
+  const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, beams.one_octant), OctantStart(to_samples, beams.back));
+  const LeapScales leaps = LeapScalesOf(beams.front);
+  // Where the front reaches the cells.
+  auto k = zero;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto low = Set(float(box.origin[int(axis)])), high = hn::Add(low, Set(float(box.cells[int(axis)] * kCellSide)));
+    const auto side = hn::IfThenElse(hn::Lt(leaps.inverse[axis], zero), high, low);
+    const auto reached = hn::Sub(hn::Mul(hn::Sub(side, beams.front.first[axis]), leaps.inverse[axis]), leaps.margin[axis]);
+    k = hn::Max(k, hn::Floor(hn::Min(reached, samples)));
+  }
+  auto going = hn::And(beams.one_octant, hn::Lt(k, samples));
+  while (!hn::AllFalse(df, going)) {
+    SamplePlace place;  // the cell of the back corner, and the front corner
+    auto gone = hn::Lt(zero, zero);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto down = hn::Lt(beams.back.move[axis], zero);
+      const auto back = hn::Add(PositionOf(beams.back, axis, k), hn::IfThenElse(down, Set(kMargin), Set(-kMargin)));
+      const auto voxel = hn::Sub(Truncated(hn::Floor(back)), SetInt(box.origin[int(axis)]));
+      const auto last = SetInt(box.cells[int(axis)] * kCellSide - 1);
+      const auto below = hn::RebindMask(df, hn::Lt(voxel, hn::Zero(di))), above = hn::RebindMask(df, hn::Gt(voxel, last));
+      gone = hn::Or(gone, hn::Or(hn::And(down, below), hn::AndNot(down, above)));
+      place.voxel[axis] = hn::Min(hn::Max(voxel, hn::Zero(di)), last);
+      place.position[axis] = PositionOf(beams.front, axis, k);
+    }
+    k = hn::IfThenElse(hn::And(going, gone), Set(kRayEnd), k);
+    going = hn::AndNot(gone, going);
+    const auto distance = DistanceAt(to_samples, octant_start, CellOf<kCellShift>(place, box.cells, going));
+    const auto steps = StepsTo(box, leaps, place, SetInt(kCellSide), hn::ConvertTo(df, hn::ShiftLeft<kCellShift>(distance)));
+    going = hn::And(going, hn::And(hn::RebindMask(df, hn::Gt(distance, hn::Zero(di))), hn::Ge(steps, zero)));
+    k = hn::Add(k, hn::IfThenElseZero(going, hn::Add(hn::Floor(steps), Set(1))));
+    going = hn::And(going, hn::Lt(k, samples));
+  }
+  return hn::IfThenElse(hn::Lt(k, samples), k, Set(kRayEnd));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace slabstream
+HWY_AFTER_NAMESPACE();
+#endif
