@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/function_ref.h"
 #include "common/math/vec.h"
 #include "worker/renderers/padded_voxels.h"
 
@@ -28,5 +29,11 @@ struct MacrocellRanges {
 
 // Parallel.
 MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels);
+
+// By macrocell, which of its eighths, cubes of half its side, may show: a set with bit o for eighth o, which has bit i of o where it is the
+// upper half along axis i. `visible`: 0 for macrocells of which any_between(least, greatest value) is true; the others have none.
+// `counts`: MacrocellRanges::counts of the voxels. Parallel.
+std::vector<std::uint8_t> VisibleEighths(const PaddedVoxels& voxels, const Index3& counts, const std::vector<std::uint8_t>& visible,
+                                         FunctionRef<bool(float, float)> any_between);
 
 }  // namespace slabstream

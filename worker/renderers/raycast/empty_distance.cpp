@@ -8,8 +8,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kPadding = 3;  // bytes after the last distance: kernels read four at a time
-
 // A distance transform in one sweep over all cells, from those that rays of the octant reach last: exact for this distance (Borgefors
 // 1986).
 class Sweep {
@@ -80,23 +78,35 @@ OctantSet OctantsOf(const ViewRays& rays) {
   return octants;
 }
 
-EmptyDistances::EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible) : counts_(counts), visible_(std::move(visible)) {}
+EmptyDistances::EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible) : counts_(counts), visible_(std::move(visible)) {
+  eighths_.resize(visible_.size());
+  std::ranges::transform(visible_, eighths_.begin(), [](std::uint8_t cell) { return std::uint8_t(~cell); });
+}
+
+void EmptyDistances::SetEighths(std::vector<std::uint8_t> eighths) {
+  eighths_ = std::move(eighths);
+  found_ = 0;
+}
 
 void EmptyDistances::Find(OctantSet octants) {
   if ((octants & ~found_) == 0) return;
   found_ = octants;
-  const std::size_t cells = visible_.size();
-  distances_.resize(std::size_t(std::popcount(octants)) * cells + kPadding);
+  const std::size_t count = visible_.size();
+  cells_.resize(std::size_t(std::popcount(octants)) * count + 1);  // kernels read two at a time
   const auto shown = std::size_t(std::ranges::count(visible_, 0));
-  const bool mixed = shown != 0 && shown != cells;  // unlike in most boxes of a large volume
-  std::uint8_t* distance = distances_.data();
+  const bool mixed = shown != 0 && shown != count;  // unlike in most boxes of a large volume
+  std::vector<unsigned> wanted;
   for (unsigned octant = 0; octant < kOctants; ++octant) {
     if ((octants >> octant & 1) == 0) continue;
-    starts_[octant] = std::int32_t(distance - distances_.data());
-    std::ranges::copy(visible_, distance);
-    if (mixed) Sweep(counts_, octant, distance).Run();
-    distance += cells;
+    starts_[octant] = std::int32_t(wanted.size() * count);
+    wanted.push_back(octant);
   }
+  ParallelFor(0, wanted.size(), [&](std::size_t i) {
+    std::vector<std::uint8_t> distances = visible_;
+    if (mixed) Sweep(counts_, wanted[i], distances.data()).Run();
+    std::ranges::transform(distances, eighths_, cells_.begin() + std::ptrdiff_t(i * count),
+                           [](std::uint8_t distance, std::uint8_t eighths) { return std::uint16_t(distance << 8 | eighths); });
+  });
 }
 
 }  // namespace slabstream

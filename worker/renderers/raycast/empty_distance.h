@@ -1,6 +1,7 @@
 // EmptyDistances: how far rays may leap. For each cell, and each octant of directions, the Chebyshev distance in cells to the nearest
 // visible cell in that octant; 0 in a visible cell. A ray of the octant that is in a cell of distance d may leap over all cells less than d
-// away: proximity clouds (Zuiderveld et al. 1992) for each direction. A ray that has left an object leaps to its end.
+// away: proximity clouds (Zuiderveld et al. 1992) for each direction. A ray that has left an object leaps to its end. Of a visible cell,
+// the eighths that are visible, over the others of which it may leap.
 #pragma once
 
 #include <array>
@@ -40,17 +41,22 @@ class EmptyDistances {
   // `visible`: VisibleCells, of a grid of cells with these counts.
   EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible);
 
-  // Finds the distances of these octants, and forgets others if some are new.
+  // VisibleEighths; before, all eighths of visible cells are. For octants that Find finds from now on.
+  void SetEighths(std::vector<std::uint8_t> eighths);
+  // Finds the distances of these octants, and forgets others if some are new. Parallel.
   void Find(OctantSet octants);
 
-  // By octant, where its distances [z][y][x] begin in data(), at most 255 each. Kernels may read three bytes more.
+  const std::vector<std::uint8_t>& visible() const { return visible_; }
+  // By octant, where its cells [z][y][x] begin in data(): 256 times the distance, at most 255, plus VisibleEighths. Kernels may read two
+  // bytes more.
   const OctantStarts& starts() const { return starts_; }
-  const std::uint8_t* data() const { return distances_.data(); }
-  std::size_t bytes() const { return visible_.capacity() + distances_.capacity(); }
+  const std::uint16_t* data() const { return cells_.data(); }
+  std::size_t bytes() const { return visible_.capacity() + eighths_.capacity() + sizeof(cells_[0]) * cells_.capacity(); }
 
  private:
   Index3 counts_;
-  std::vector<std::uint8_t> visible_, distances_;
+  std::vector<std::uint8_t> visible_, eighths_;
+  std::vector<std::uint16_t> cells_;
   OctantStarts starts_{};
   OctantSet found_ = 0;
 };

@@ -97,13 +97,19 @@ struct Stride {
 HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints octant_start, const SamplePlace& place, Mask inside) {
   const FloatTag df;
   const IntTag di;
-  const auto distance = DistanceAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, work.box->cells, inside));
-  const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-  if (hn::AllFalse(df, empty)) return {inside, Set(1)};
-  return {
-      hn::AndNot(empty, inside),
-      hn::IfThenElse(empty, StepsWithin(*work.box, leaps, place, SetInt(kCellSide), hn::ConvertTo(df, hn::ShiftLeft<kCellShift>(distance))),
-                     Set(1))};
+  const auto zero = hn::Zero(di), two = SetInt(kCellSide / 2);
+  const auto cell = EmptyAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, work.box->cells, inside));
+  // Bit i of an eighth is the one of value two of the voxel along axis i.
+  const auto x = hn::ShiftRight<1>(hn::And(place.voxel[0], two)), y = hn::And(place.voxel[1], two),
+             z = hn::ShiftLeft<1>(hn::And(place.voxel[2], two));
+  const auto shown = hn::And(hn::Shr(cell, hn::Or(x, hn::Or(y, z))), SetInt(1));
+  const auto empty = hn::Eq(shown, zero);
+  if (hn::AllFalse(di, empty)) return {inside, Set(1)};
+  const auto distance = hn::ShiftRight<8>(cell);
+  const auto whole = hn::Gt(distance, zero);
+  const auto side = hn::IfThenElse(whole, SetInt(kCellSide), two), ahead = hn::IfThenElse(whole, hn::ShiftLeft<kCellShift>(distance), two);
+  const auto leap = StepsWithin(*work.box, leaps, place, side, hn::ConvertTo(df, ahead));
+  return {hn::AndNot(hn::RebindMask(df, empty), inside), hn::IfThenElse(hn::RebindMask(df, empty), leap, Set(1))};
 }
 
 // Samples of the volume, from bricks.
@@ -186,11 +192,11 @@ HWY_INLINE void ClassifySamples(const MarchWork& work, const Step<Voxels>& step,
 // The opacity of samples k if the first and the last one of a ray stand for more or less than a step.
 HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, Floats opacity) {
   const auto one = Set(1);
-  const auto is_first = hn::Eq(k, ends.first), is_last = hn::Eq(k, ends.last);
-  if (hn::AllFalse(FloatTag(), hn::And(visible, hn::Or(is_first, is_last)))) return opacity;
+  const auto is_first = hn::Eq(k, ends.first), is_last = hn::Eq(k, ends.last), is_end = hn::Or(is_first, is_last);
+  if (hn::AllFalse(FloatTag(), hn::And(visible, is_end))) return opacity;
   const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
   const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
-  return hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
+  return hn::IfThenElse(is_end, hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power)), opacity);
 }
 
 // Lights samples and adds those that are visible to Sums or to a Mixture: add(mask, opacity, color(channel)).

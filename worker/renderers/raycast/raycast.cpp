@@ -119,6 +119,14 @@ class VisibilityCache : public BoxCache {
       for (std::size_t i = 0; i < pieces.size(); ++i) {
         pieces_.push_back(VisibilityOf(pieces[i], *visible_, labels, fields));
       }
+      has_eighths_ = visible_->labels || !fields.empty();  // those are of the volume alone
+    } else if (!has_eighths_) {                            // they pay only where several frames show the same
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        EmptyDistances& to_samples = pieces_[i].to_samples;
+        to_samples.SetEighths(VisibleEighths(pieces[i].voxels, pieces[i].cells.counts, to_samples.visible(),
+                                             [&](float low, float high) { return visible.volume.AnyMatterBetween(low, high); }));
+      }
+      has_eighths_ = true;
     }
     for (Visibility& piece : pieces_) {
       piece.to_samples.Find(octants);
@@ -139,6 +147,7 @@ class VisibilityCache : public BoxCache {
  private:
   std::optional<VisibleValues> visible_;
   std::vector<Visibility> pieces_;
+  bool has_eighths_ = false;
 };
 
 // The table of the transfer function's regions, kept until another one is asked for.

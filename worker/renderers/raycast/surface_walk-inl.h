@@ -43,10 +43,14 @@ HWY_INLINE Ints OctantStart(const EmptyDistances& distances, const RayPacket& pa
   }
   return hn::GatherIndex(di, distances.starts().data(), octant);
 }
-// The distances of cells, which lie at `cell` from there.
+// EmptyDistances::data() of cells, which lie at `cell` from there.
+HWY_INLINE Ints EmptyAt(const EmptyDistances& distances, Ints octant_start, Ints cell) {
+  const auto two =
+      hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(distances.data()), hn::ShiftLeft<1>(hn::Add(octant_start, cell)));
+  return hn::And(two, SetInt(0xFFFF));
+}
 HWY_INLINE Ints DistanceAt(const EmptyDistances& distances, Ints octant_start, Ints cell) {
-  const auto four = hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(distances.data()), hn::Add(octant_start, cell));
-  return hn::And(four, SetInt(0xFF));
+  return hn::ShiftRight<8>(EmptyAt(distances, octant_start, cell));
 }
 
 // f(x) along a ray, x from 0 where it enters a cell to 1 where it leaves.
