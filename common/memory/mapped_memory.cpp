@@ -15,7 +15,7 @@ bool IsMapped(std::size_t bytes, std::size_t mapped_from) { return !kWatched && 
 }  // namespace
 
 void* MapMemory(std::size_t bytes) {
-  const bool huge = bytes >= 2 * kHugePage;
+  const bool huge = bytes >= kHugePage;
   const std::size_t mapped = bytes + (huge ? kHugePage : 0);
   void* const all = ::mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (all == MAP_FAILED) throw std::bad_alloc();
