@@ -1,71 +1,182 @@
 #include "common/volume/light_volume.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "common/volume/light_volume.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 #include <vector>
 
+#include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 
+#ifndef SLABSTREAM_COMMON_VOLUME_LIGHT_VOLUME_CPP_  // shared by all instruction sets
+#define SLABSTREAM_COMMON_VOLUME_LIGHT_VOLUME_CPP_
+namespace slabstream {
+
+inline constexpr std::size_t kMostLanes = 16;  // numbers that kernels may write beyond a row
+
+// Rows along x that are added up, column by column.
+template <class T>
+struct ColumnsOfRows {
+  const T* first = nullptr;
+  std::size_t width = 0;
+  std::int32_t rows = 0, slices = 0;  // rows in a slice
+  std::ptrdiff_t slice = 0;           // samples from slice to slice; rows follow each other
+};
+
+}  // namespace slabstream
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Sums of columns of integers, which are exact: a slice has less than 2^15 rows.
+template <class T>
+void AddIntegers(const ColumnsOfRows<T>& columns, double* sums) {
+  const hn::CappedTag<std::int32_t, kMostLanes> di;
+  const hn::Half<decltype(di)> dh;
+  const hn::Rebind<T, decltype(di)> dt;
+  const hn::Rebind<double, decltype(dh)> dd;
+  const std::size_t lanes = hn::Lanes(di), half = lanes / 2;
+  const auto add = [&](std::size_t x, auto&& load) HWY_ATTR {
+    auto low = hn::Zero(dd), high = low;
+    for (std::int32_t slice = 0; slice < columns.slices; ++slice) {
+      const T* row = columns.first + slice * columns.slice + x;
+      auto sum = hn::Zero(di);
+      for (std::int32_t i = 0; i < columns.rows; ++i, row += columns.width) sum = hn::Add(sum, hn::PromoteTo(di, load(row)));
+      low = hn::Add(low, hn::PromoteTo(dd, hn::LowerHalf(dh, sum)));
+      high = hn::Add(high, hn::PromoteTo(dd, hn::UpperHalf(dh, sum)));
+    }
+    hn::StoreU(low, dd, sums + x);
+    hn::StoreU(high, dd, sums + x + half);
+  };
+  std::size_t x = 0;
+  for (; x + lanes <= columns.width; x += lanes) add(x, [&](const T* from) HWY_ATTR { return hn::LoadU(dt, from); });
+  if (x == columns.width) return;
+  add(x, [&](const T* from) HWY_ATTR {
+    HWY_ALIGN T rest[kMostLanes] = {};
+    std::copy_n(from, columns.width - x, rest);
+    return hn::Load(dt, rest);
+  });
+}
+void AddBytes(const ColumnsOfRows<std::uint8_t>& columns, double* sums) { AddIntegers(columns, sums); }
+void AddShorts(const ColumnsOfRows<std::uint16_t>& columns, double* sums) { AddIntegers(columns, sums); }
+
+// Means of `count` integers each, from their sums; halves round up.
+template <class T>
+void MeansOfIntegers(const double* sums, std::size_t blocks, double count, T* means) {
+  const hn::CappedTag<double, kMostLanes / 2> dd;
+  const hn::Rebind<std::int32_t, decltype(dd)> di;
+  const hn::Rebind<T, decltype(dd)> dt;
+  // What is cut off a whole number lies at least half of 1 / count below the next one, far more than what the factor is off by.
+  const auto half = hn::Set(dd, std::floor(count / 2) + 0.5), factor = hn::Set(dd, 1 / count);
+  for (std::size_t i = 0; i < blocks; i += hn::Lanes(dd)) {
+    const auto mean = hn::Mul(hn::Add(hn::LoadU(dd, sums + i), half), factor);
+    hn::StoreU(hn::DemoteTo(dt, hn::DemoteTo(di, mean)), dt, means + i);
+  }
+}
+void MeansOfBytes(const double* sums, std::size_t blocks, double count, std::uint8_t* means) {
+  MeansOfIntegers(sums, blocks, count, means);
+}
+void MeansOfShorts(const double* sums, std::size_t blocks, double count, std::uint16_t* means) {
+  MeansOfIntegers(sums, blocks, count, means);
+}
+
+// Sums of the finite samples of columns, and how many there are.
+void AddFloats(const ColumnsOfRows<float>& columns, double* sums, double* counts) {
+  const hn::CappedTag<double, kMostLanes / 2> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  const std::size_t lanes = hn::Lanes(dd);
+  const auto add = [&](std::size_t x, auto&& load) HWY_ATTR {
+    auto sum = hn::Zero(dd), count = sum;
+    for (std::int32_t slice = 0; slice < columns.slices; ++slice) {
+      const float* row = columns.first + slice * columns.slice + x;
+      for (std::int32_t i = 0; i < columns.rows; ++i, row += columns.width) {
+        const auto each = load(row);
+        const auto finite = hn::IsFinite(each);
+        sum = hn::Add(sum, hn::PromoteTo(dd, hn::IfThenElseZero(finite, each)));
+        count = hn::Add(count, hn::PromoteTo(dd, hn::IfThenElseZero(finite, hn::Set(df, 1))));
+      }
+    }
+    hn::StoreU(sum, dd, sums + x);
+    hn::StoreU(count, dd, counts + x);
+  };
+  std::size_t x = 0;
+  for (; x + lanes <= columns.width; x += lanes) add(x, [&](const float* from) HWY_ATTR { return hn::LoadU(df, from); });
+  if (x == columns.width) return;
+  add(x, [&](const float* from) HWY_ATTR {
+    HWY_ALIGN float rest[kMostLanes] = {};
+    std::copy_n(from, columns.width - x, rest);
+    return hn::Load(df, rest);
+  });
+}
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace slabstream {
 namespace {
 
+HWY_EXPORT(AddBytes);
+HWY_EXPORT(AddShorts);
+HWY_EXPORT(AddFloats);
+HWY_EXPORT(MeansOfBytes);
+HWY_EXPORT(MeansOfShorts);
+
 Index3 BlockOf(const Index3& size) { return CubesOver(size, kMaxLightSide); }
 
-// Adds samples to columns, and counts the finite ones. Lengths that the compiler knows let it take whole registers.
-template <class T, class Sum>
-void AddRow(const T* __restrict row, std::size_t count, Sum* __restrict columns, std::uint32_t* __restrict counts) {
-  const auto add = [&](std::size_t x) {
-    if constexpr (std::is_same_v<T, float>) {
-      const bool finite = std::isfinite(row[x]);
-      columns[x] += finite ? row[x] : 0;
-      counts[x] += finite ? 1 : 0;
-    } else {
-      columns[x] += row[x];
-    }
-  };
-  constexpr std::size_t kAtOnce = 16;
-  std::size_t x = 0;
-  for (; x + kAtOnce <= count; x += kAtOnce) {
-    for (std::size_t i = 0; i < kAtOnce; ++i) add(x + i);
+// Turns sums of columns into those of blocks, each of `length` columns, the last one perhaps of fewer.
+void JoinColumns(std::size_t width, std::size_t length, std::vector<double>& sums) {
+  if (length == 1) return;
+  for (std::size_t i = 0; i * length < width; ++i) {
+    double sum = 0;
+    for (std::size_t x = i * length; x < std::min((i + 1) * length, width); ++x) sum += sums[x];
+    sums[i] = sum;
   }
-  for (; x < count; ++x) add(x);
 }
 
-// Means of one slice of blocks, from the samples of `slab`, the voxels in it. Columns of a block are added up first, which whole registers
-// do.
+// Means of one slice of blocks, from the samples of `slab`, the voxels in it.
 template <class T>
 void AverageBlocks(const T* samples, const Index3& slab, const Index3& block, const Index3& blocks, T* means) {
-  constexpr bool kFloat = std::is_same_v<T, float>;
-  // Of integers exact: the slice has at most 512 slices, and a block as many rows.
-  using Sum = std::conditional_t<kFloat, double, std::uint32_t>;
-  std::vector<Sum> columns(std::size_t(slab.x));
-  std::vector<std::uint32_t> counts(kFloat ? columns.size() : 0);  // of finite samples
-  for (std::int32_t j = 0; j < blocks.y; ++j) {
-    std::ranges::fill(columns, Sum{});
-    std::ranges::fill(counts, 0U);
+  const auto width = std::size_t(slab.x), length = std::size_t(block.x), count = std::size_t(blocks.x);
+  std::vector<double> sums(width + kMostLanes), counts(std::is_same_v<T, float> ? sums.size() : 0);
+  std::vector<T> row(count + kMostLanes);
+  for (std::int32_t j = 0; j < blocks.y; ++j, means += count) {
     const std::int32_t y_begin = j * block.y, y_end = std::min(y_begin + block.y, slab.y);
-    for (std::int32_t z = 0; z < slab.z; ++z) {
-      for (std::int32_t y = y_begin; y < y_end; ++y) {
-        const T* const row = samples + (std::size_t(z) * std::size_t(slab.y) + std::size_t(y)) * columns.size();
-        AddRow(row, columns.size(), columns.data(), counts.data());
+    const ColumnsOfRows<T> columns = {samples + std::size_t(y_begin) * width, width, y_end - y_begin, slab.z,
+                                      std::ptrdiff_t{slab.x} * slab.y};
+    if constexpr (std::is_same_v<T, float>) {
+      HWY_DYNAMIC_DISPATCH(AddFloats)(columns, sums.data(), counts.data());
+      JoinColumns(width, length, sums);
+      JoinColumns(width, length, counts);
+      for (std::size_t i = 0; i < count; ++i) {
+        means[i] = counts[i] == 0 ? std::numeric_limits<float>::quiet_NaN() : float(sums[i] / counts[i]);
       }
-    }
-    const auto column_voxels = std::uint64_t(y_end - y_begin) * std::uint64_t(slab.z);
-    for (std::int32_t i = 0; i < blocks.x; ++i, ++means) {
-      const auto begin = std::size_t(i) * std::size_t(block.x), end = std::min(begin + std::size_t(block.x), columns.size());
-      std::conditional_t<kFloat, double, std::uint64_t> sum{};
-      std::uint64_t count = kFloat ? 0 : (end - begin) * column_voxels;
-      for (std::size_t x = begin; x < end; ++x) {
-        sum += columns[x];
-        if constexpr (kFloat) count += counts[x];
-      }
-      if constexpr (kFloat) {
-        *means = count == 0 ? std::numeric_limits<float>::quiet_NaN() : float(sum / double(count));
+    } else {
+      const double column = double(columns.rows) * columns.slices;
+      const auto divide = [&](const double* from, std::size_t many, double each, T* to) {
+        if constexpr (std::is_same_v<T, std::uint8_t>) {
+          HWY_DYNAMIC_DISPATCH(MeansOfBytes)(from, many, each, to);
+        } else {
+          HWY_DYNAMIC_DISPATCH(MeansOfShorts)(from, many, each, to);
+        }
+      };
+      if constexpr (std::is_same_v<T, std::uint8_t>) {
+        HWY_DYNAMIC_DISPATCH(AddBytes)(columns, sums.data());
       } else {
-        *means = T(double(sum + count / 2) / double(count));  // cut to a whole number: exact, and faster than a division of integers
+        HWY_DYNAMIC_DISPATCH(AddShorts)(columns, sums.data());
       }
+      JoinColumns(width, length, sums);
+      divide(sums.data(), count, column * double(length), row.data());
+      divide(&sums[count - 1], 1, column * double(width - (count - 1) * length), &row[count - 1]);  // the last block may have fewer columns
+      std::copy_n(row.data(), count, means);
     }
   }
 }
@@ -118,3 +229,4 @@ Volume MakeLightVolume(const BrickedVoxels& voxels, const VolumeDescription& des
 }
 
 }  // namespace slabstream
+#endif

@@ -89,6 +89,33 @@ TEST(LightVolume, HasTheMeansOfBlocksAndLiesWhereTheVolumeLies) {
   EXPECT_EQ(samples[light.block.Offset({0, 0, 64})], 3 + 7 * 128) << "the last block has one slice";
 }
 
+TEST(LightVolume, OfIntegersHasExactMeansOnEveryInstructionSet) {
+  std::mt19937 random(7);
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16}) {
+    for (const Index3& size : {Index3{128, 3, 200}, Index3{141, 300, 1}, Index3{387, 130, 5}, Index3{5, 129, 140}}) {
+      const auto of_any = [&](const Index3&) { return random() >> (type == ScalarType::kUint8 ? 24 : 16); };
+      const Volume volume = MakeVolume({size}, type, of_any);
+      Volume expected = MakeLightVolume(volume.block, volume.description);
+      const Index3 blocks = expected.description.geometry.size, block = CubesOver(size, kMaxLightSide), one = {1, 1, 1};
+      VisitScalarType(type, [&]<class T>(const T*) {
+        for (const Index3& voxel : IndicesIn(Box{{0, 0, 0}, blocks})) {
+          std::uint64_t sum = 0, count = 0;
+          for (const Index3& v : IndicesIn(Intersection({voxel * block, (voxel + one) * block}, volume.block.box))) {
+            sum += volume.block.samples<T>()[volume.block.Offset(v)];
+            ++count;
+          }
+          expected.block.samples<T>()[expected.block.Offset(voxel)] = T((sum + count / 2) / count);
+        }
+      });
+      ForEachTarget([&] {
+        EXPECT_EQ(MakeLightVolume(volume.block, volume.description).block.bytes, expected.block.bytes);
+        const BrickedVoxels bricks(volume.block);
+        EXPECT_EQ(MakeLightVolume(bricks, volume.description).block.bytes, expected.block.bytes);
+      });
+    }
+  }
+}
+
 TEST(LightVolume, LeavesOutSamplesThatAreNotFinite) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const Volume volume = MakeVolume({{256, 2, 2}}, ScalarType::kFloat32, [&](const Index3& v) { return v.x < 2 || v.x == 5 ? nan : 4.0; });
