@@ -5,6 +5,7 @@
 
 #include "common/base/check.h"
 #include "common/parallel/parallel.h"
+#include "common/volume/indices.h"
 
 namespace slabstream {
 namespace {
@@ -128,6 +129,25 @@ void VoxelBricks::Read(const Box& box, std::uint64_t begin, std::span<std::byte>
       CopyRun(to, view.Row(voxel.y, voxel.z) + (voxel.x - view.begin.x), count);
     });
   });
+}
+
+VoxelBlock VoxelBricks::Block() const {
+  VoxelBlock block = MakeVoxelBlock(box(), type_);
+  VisitStoredType(type_, [&]<class T>(const T*) {
+    ParallelFor(0, grid_.counts.z, [&](std::int32_t layer) {
+      const Index3 first = grid_.first + Index3{0, 0, layer};
+      for (const Index3& brick : IndicesIn(Box{first, first + Index3{grid_.counts.x, grid_.counts.y, 1}})) {
+        const Box part = grid_.BoxOf(brick);
+        const BrickView<T> view = View<T>(brick);
+        for (std::int32_t z = part.begin.z; z < part.end.z; ++z) {
+          for (std::int32_t y = part.begin.y; y < part.end.y; ++y) {
+            CopyRun(block.samples<T>() + block.Offset({part.begin.x, y, z}), view.Row(y, z), part.size().x);
+          }
+        }
+      }
+    });
+  });
+  return block;
 }
 
 }  // namespace slabstream

@@ -109,6 +109,7 @@ class VoxelBricks {
 
   // Reads part of the samples of `box`, which lies inside this one: whole samples, x fastest, from byte `begin` of the box's samples on.
   void Read(const Box& box, std::uint64_t begin, std::span<std::byte> samples) const;
+  VoxelBlock Block() const;  // all samples; parallel
 
   template <class T>
   BrickView<T> View(const Index3& brick) const {

@@ -7,10 +7,7 @@ namespace slabstream {
 BoxVoxels::Samples BoxVoxels::Block() {
   const std::lock_guard lock(mutex_);
   if (samples_.block == nullptr) {
-    const VoxelBricks bricks = samples_.view();
-    VoxelBlock block = MakeVoxelBlock(bricks.box(), bricks.type());
-    bricks.Read(block.box, 0, block.bytes);
-    samples_ = {std::make_shared<const VoxelBlock>(std::move(block)), nullptr, nullptr, nullptr};
+    samples_ = {std::make_shared<const VoxelBlock>(samples_.view().Block()), nullptr, nullptr, nullptr};
   }
   return samples_;
 }

@@ -134,10 +134,7 @@ std::shared_ptr<const FrameLight> LightFrom(const std::vector<std::shared_ptr<St
       [&](std::size_t field) {
         lights[field]->Assemble();
         const StoredBox::Lease lease = lights[field]->Lend(client);
-        const VoxelBricks bricks = lease.data().bricks();
-        VoxelBlock values = MakeVoxelBlock(bricks.box(), bricks.type());
-        bricks.Read(values.box, 0, values.bytes);
-        return values;
+        return lease.data().bricks().Block();
       },
       setup, shapes);
 }

@@ -180,6 +180,8 @@ TEST(VoxelBricks, APartIsTheSameVoxelsInPlace) {
       VoxelBlock read = MakeVoxelBlock(box, part.type());
       part.Read(box, 0, read.bytes);
       EXPECT_EQ(read.bytes, expected.bytes);
+      EXPECT_EQ(part.Block().box, box);
+      EXPECT_EQ(part.Block().bytes, expected.bytes);
       VisitScalarType(part.type(), [&]<class T>(const T*) {
         for (std::size_t number = 0; number < part.grid().size(); ++number) {
           const Index3 brick = part.grid().first + PlaceIn(part.grid().counts, number);
