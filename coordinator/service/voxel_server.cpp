@@ -56,21 +56,21 @@ VoxelServer::~VoxelServer() {
 
 void VoxelServer::Publish(DatasetId dataset, Samples samples) {
   const std::lock_guard lock(mutex_);
-  if (samples.description) light_volume_of_[LightVolumeOf(dataset)] = dataset;
+  if (samples.description) {
+    light_volumes_[LightVolumeOf(dataset)] = std::make_shared<const LazyVolume>([samples] {
+      return samples.volume != nullptr ? MakeLightVolume(samples.volume->block, *samples.description)
+                                       : MakeLightVolume(*samples.bricks, *samples.description);
+    });
+  }
   samples_.insert_or_assign(dataset, std::move(samples));
 }
 
 void VoxelServer::Withdraw(DatasetId dataset) {
-  Samples unused, unused_light;  // freed without the lock
+  decltype(samples_)::node_type unused;  // freed without the lock
+  decltype(light_volumes_)::node_type unused_light;
   const std::lock_guard lock(mutex_);
-  const auto take = [this](DatasetId id, Samples& to) {
-    const auto found = samples_.find(id);
-    if (found == samples_.end()) return;
-    to = std::move(found->second);
-    samples_.erase(found);
-  };
-  take(dataset, unused);
-  if (light_volume_of_.erase(LightVolumeOf(dataset)) > 0) take(LightVolumeOf(dataset), unused_light);
+  unused = samples_.extract(dataset);
+  unused_light = light_volumes_.extract(LightVolumeOf(dataset));
 }
 
 VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
@@ -79,26 +79,18 @@ VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
   return found == samples_.end() ? Samples{} : found->second;
 }
 
+std::shared_ptr<const LazyVolume> VoxelServer::FindLight(DatasetId light) {
+  const std::lock_guard lock(mutex_);
+  const auto found = light_volumes_.find(light);
+  return found == light_volumes_.end() ? nullptr : found->second;
+}
+
 std::shared_ptr<const HeldVoxels> VoxelServer::FindHeld(DatasetId dataset) {
+  if (const auto light = FindLight(dataset)) return std::make_shared<const HeldVoxels>(HeldVoxels{light});
   const Samples samples = Find(dataset);
   if (samples.volume != nullptr) return std::make_shared<const HeldVoxels>(HeldVoxels{samples.volume, samples.read_from});
   if (samples.bricks != nullptr) return std::make_shared<const HeldVoxels>(HeldVoxels{samples.bricks, samples.read_from});
   return nullptr;
-}
-
-VoxelServer::Samples VoxelServer::LightVolume(DatasetId light) {
-  Samples of;
-  {
-    const std::lock_guard lock(mutex_);
-    const auto found = light_volume_of_.find(light);
-    if (found == light_volume_of_.end()) return {};
-    of = samples_.at(found->second);
-  }
-  const Samples made = {.volume = std::make_shared<const Volume>(of.volume != nullptr ? MakeLightVolume(of.volume->block, *of.description)
-                                                                                      : MakeLightVolume(*of.bricks, *of.description))};
-  const std::lock_guard lock(mutex_);
-  if (light_volume_of_.contains(light)) samples_.insert_or_assign(light, made);  // the dataset is still there
-  return made;
 }
 
 void VoxelServer::EndConnections(const std::string& user) {
@@ -230,9 +222,9 @@ void VoxelServer::Answer(const Incoming& incoming) {
   const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
   if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
   Samples samples = Find(request.dataset);
-  if (!samples.any()) {
+  if (const auto light = FindLight(request.dataset)) {
     const Status made = Guarded("a light volume", [&] {
-      samples = LightVolume(request.dataset);
+      samples.volume = {light, &light->Get()};
       return Status::Ok();
     });
     if (!made.ok()) return Reply(incoming.identity, request, made);

@@ -104,7 +104,7 @@ class VoxelServer {
   void Run(const std::stop_token& stop);
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
-  Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
+  std::shared_ptr<const LazyVolume> FindLight(DatasetId light);  // null: it is the light volume of no dataset
   // Reads the next voxels that must be read first; Reply follows when they are there.
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
@@ -158,10 +158,10 @@ class VoxelServer {
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, Samples> samples_;                                         // guarded by mutex_
-  std::map<DatasetId, DatasetId> light_volume_of_;                               // by LightVolumeOf; guarded by mutex_
-  std::vector<std::string> unwanted_;                                            // users whose connections are to end; guarded by mutex_
-  LruMap<std::pair<const GridCells*, Box>, KeptCells> kept_cells_;               // a box is asked for chunk by chunk; the thread's
+  std::map<DatasetId, Samples> samples_;                                  // guarded by mutex_
+  std::map<DatasetId, std::shared_ptr<const LazyVolume>> light_volumes_;  // of samples that are held, by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;                                     // users whose connections are to end; guarded by mutex_
+  LruMap<std::pair<const GridCells*, Box>, KeptCells> kept_cells_;        // a box is asked for chunk by chunk; the thread's
   std::map<std::pair<const GridCells*, Box>, std::vector<Asked>> awaits_cells_;  // that are being cut, no two the same; the thread's
   FairTasks cuts_{2};                                                            // by dataset, so that one box of each is cut at a time
   LimitedLog complaints_;                                                        // the thread's

@@ -17,6 +17,7 @@
 
 #include "common/mesh/mesh_part.h"
 #include "common/transport/socket.h"
+#include "common/volume/light_volume.h"
 #include "common/volume/sphere.h"
 #include "common/wire/limits.h"
 #include "common/wire/payload.h"
@@ -291,6 +292,25 @@ TEST_F(VoxelServerTest, ChunksPutTogetherAreTheBox) {
     }
     EXPECT_EQ(std::memcmp(samples.data(), volume_->block.bytes.data(), samples.size()), 0) << "dataset " << dataset;
   }
+}
+
+TEST_F(VoxelServerTest, WorkersOfTheProcessAndOthersGetOneLightVolume) {
+  server_->Publish(6, {.volume = volume_, .description = volume_->description});
+  const std::shared_ptr<const HeldVoxels> held = server_->FindHeld(LightVolumeOf(6));
+  ASSERT_NE(held, nullptr);
+  const Volume expected = MakeLightVolume(volume_->block, volume_->description);
+  const Box box = expected.block.box;
+  Bytes payload;
+  const AnyMessage answer = Ask({.epoch = kEpoch, .worker = 1, .dataset = LightVolumeOf(6), .box = box, .chunk = 0}, &payload);
+  const auto* chunk = std::get_if<Chunk>(&answer);
+  ASSERT_NE(chunk, nullptr) << NameOf(answer);
+  VoxelBlock sent = MakeVoxelBlock(box, ScalarType::kUint8);
+  ASSERT_EQ(chunk->raw_bytes, sent.bytes.size());
+  ASSERT_TRUE(UnpackChunk(*chunk, payload.span(), sent.bytes).ok());
+  EXPECT_EQ(sent.bytes, expected.block.bytes);
+  server_->Withdraw(6);
+  EXPECT_EQ(server_->FindHeld(LightVolumeOf(6)), nullptr);
+  EXPECT_EQ(held->view().Block().bytes, expected.block.bytes) << "whoever found it before keeps it";
 }
 
 TEST_F(VoxelServerTest, LabelsOf64BitsArriveAsTheyAre) {
