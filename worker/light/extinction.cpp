@@ -216,41 +216,52 @@ Extinction ExtinctionOfField(const VoxelBlock& values, const VolumeDescription& 
                            square(row.beside[2][x], row.beside[3][x]) * per_square.z));
   };
 
+  constexpr std::int64_t kSlicesAtOnce = 8;  // few, so that threads share them; each task reads two more
   Extinction extinction{.size = size, .spacing = light.spacing, .each = UnwrittenVector<float>(CountIn(size))};
   VisitScalarType(values.type, [&]<class T>(const T*) {
     const T* const samples = values.samples<T>();
-    ParallelFor(0, size.z, [&](std::int32_t z) {
-      const auto row_room = std::size_t(size.x + 2 * kRowMargin);
-      std::vector<float> room(5 * row_room), found(row_room);
-      const auto load = [&](std::size_t number, std::int32_t row_y, std::int32_t row_z) {
-        float* const row = room.data() + number * row_room + kRowMargin;
-        std::copy_n(samples + NumberIn(size, {0, row_y, row_z}), size.x, row);
-        row[-1] = row[0];
-        row[size.x] = row[size.x - 1];
-        return row;
+    ParallelForRanges(0, size.z, kSlicesAtOnce, [&](std::int32_t z_begin, std::int32_t z_end) {
+      // Of each of three neighbouring slices the rows as floats, with their margins.
+      const std::ptrdiff_t row_room = size.x + 2 * kRowMargin;
+      const auto row_floats = std::size_t(row_room);
+      std::vector<float> room(3 * std::size_t(size.y) * row_floats), found(row_floats);
+      const auto row_of = [&](std::int32_t y, std::int32_t z) {
+        y = std::clamp(y, 0, size.y - 1);
+        z = std::clamp(z, 0, size.z - 1);
+        return room.data() + (z % 3 * size.y + y) * row_room + kRowMargin;
       };
-      for (std::int32_t y = 0; y < size.y; ++y) {
-        const SampleRow row = {load(0, y, z),
-                               {load(1, std::max(y - 1, 0), z), load(2, std::min(y + 1, size.y - 1), z), load(3, y, std::max(z - 1, 0)),
-                                load(4, y, std::min(z + 1, size.z - 1))}};
-        if (of_regions) {
-          std::ranges::fill(found, 0.0F);
-        } else {
-          HWY_DYNAMIC_DISPATCH(ExtinctionOfRow)(of_values, row, size.x, found.data());
+      const auto load = [&](std::int32_t z) {
+        for (std::int32_t y = 0; y < size.y; ++y) {
+          float* const row = row_of(y, z);
+          std::copy_n(samples + NumberIn(size, {0, y, z}), size.x, row);
+          row[-1] = row[0];
+          row[size.x] = row[size.x - 1];
         }
-        for (std::int32_t x = 0; x < size.x && (of_regions || !surfaces.empty()); ++x) {
-          if (!std::isfinite(row.at[x])) continue;
-          const NearbyValues near(row, x);
-          float& sum = found[std::size_t(x)];
+      };
+      for (std::int32_t z = std::max(z_begin - 1, 0); z <= z_begin; ++z) load(z);
+      for (std::int32_t z = z_begin; z < z_end; ++z) {
+        if (z + 1 < size.z) load(z + 1);
+        for (std::int32_t y = 0; y < size.y; ++y) {
+          const SampleRow row = {row_of(y, z), {row_of(y - 1, z), row_of(y + 1, z), row_of(y, z - 1), row_of(y, z + 1)}};
           if (of_regions) {
-            const float slope = slope_at(row, x);
-            if (std::isfinite(slope)) sum = of_regions->Mean(near.low, near.value, near.high, slope);
+            std::ranges::fill(found, 0.0F);
+          } else {
+            HWY_DYNAMIC_DISPATCH(ExtinctionOfRow)(of_values, row, size.x, found.data());
           }
-          for (const SurfaceExtinction& surface : surfaces) {
-            if (near.low < surface.value && surface.value <= near.high) sum += float(surface.each);
+          for (std::int32_t x = 0; x < size.x && (of_regions || !surfaces.empty()); ++x) {
+            if (!std::isfinite(row.at[x])) continue;
+            const NearbyValues near(row, x);
+            float& sum = found[std::size_t(x)];
+            if (of_regions) {
+              const float slope = slope_at(row, x);
+              if (std::isfinite(slope)) sum = of_regions->Mean(near.low, near.value, near.high, slope);
+            }
+            for (const SurfaceExtinction& surface : surfaces) {
+              if (near.low < surface.value && surface.value <= near.high) sum += float(surface.each);
+            }
           }
+          std::copy_n(found.data(), size.x, extinction.each.data() + NumberIn(size, {0, y, z}));
         }
-        std::copy_n(found.data(), size.x, extinction.each.data() + NumberIn(size, {0, y, z}));
       }
     });
   });

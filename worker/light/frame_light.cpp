@@ -104,7 +104,6 @@ class Matter {
  private:
   static constexpr std::size_t kMostMade = 2;
 
-  // A flat surface, which has an openness of about 1/2, keeps its light.
   void FindOpen(const Shading& shading) {
     const std::pair wanted(shading.ambient_occlusion, shading.occlusion_radius);
     if (open_of_ == wanted) return;
@@ -116,11 +115,7 @@ class Matter {
     open_.resize(extinction_->each.size());
     const float strength = shading.ambient_occlusion;
     FindOpenness(*extinction_, shading.occlusion_radius * std::max({sides.x, sides.y, sides.z}),
-                 [&](std::size_t first, std::span<const float> row) {
-                   std::ranges::transform(row, open_.begin() + std::ptrdiff_t(first), [strength](float open) {
-                     return std::uint8_t(std::int32_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F));
-                   });
-                 });
+                 [&](std::size_t first, std::span<const float> row) { KeepOpen(row, strength, open_.data() + first); });
   }
 
   const Bytes255& OpenAlong(int fast) {

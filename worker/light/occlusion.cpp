@@ -21,14 +21,37 @@ namespace slabstream {
 
 inline constexpr std::ptrdiff_t kRegister = 16;  // floats that kernels may touch beyond a row
 
-// Extinction with a margin of empty voxels that no way leaves.
-struct PaddedExtinction {
+// A grid of extinction. Rows follow each other along y, slices along z.
+struct ExtinctionGrid {
   Index3 size;
-  std::int32_t margin = 0;
+  Vec3 spacing;
+  const float* first = nullptr;
   std::ptrdiff_t row = 0, slice = 0;
-  AlignedVector<float> each;
 
-  std::ptrdiff_t At(std::int32_t x, std::int32_t y, std::int32_t z) const { return (z + margin) * slice + (y + margin) * row + x + margin; }
+  const float* Row(std::int32_t y, std::int32_t z) const { return first + z * slice + y * row; }
+};
+
+// Extinction with a margin of empty voxels that no way leaves. All are empty at first.
+class PaddedExtinction {
+ public:
+  PaddedExtinction() = default;
+  PaddedExtinction(const Index3& size, const Vec3& spacing) : grid_{.size = size, .spacing = spacing} {
+    const Index3 whole = size + Uniform(2 * kMostOcclusionSteps);
+    grid_.row = whole.x;
+    grid_.slice = grid_.row * whole.y;
+    each_.resize(CountIn(whole) + std::size_t(kRegister));
+    grid_.first = each_.data() + kMostOcclusionSteps * (grid_.slice + grid_.row + 1);
+  }
+
+  PaddedExtinction(PaddedExtinction&&) = default;
+  PaddedExtinction& operator=(PaddedExtinction&&) = default;
+
+  const ExtinctionGrid& grid() const { return grid_; }
+  float* Row(std::int32_t y, std::int32_t z) { return each_.data() + (grid_.Row(y, z) - each_.data()); }
+
+ private:
+  ExtinctionGrid grid_;
+  AlignedVector<float> each_;
 };
 
 // A way in one direction: `count` voxels, one every `stride`.
@@ -40,7 +63,7 @@ struct Way {
 };
 
 // Where voxels of a fine grid lie in a coarse one along an axis: `share` of the way from voxel `below` to the next one. kRegister more than
-// there are voxels.
+// there are voxels, like the last one. `below` grows by at most 1 from voxel to voxel.
 struct Places {
   std::vector<std::int32_t> below;
   std::vector<float> share;
@@ -61,11 +84,11 @@ namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Openness of the voxels of a slice; `out` has room for kRegister more.
-void OpennessOfSlice(const PaddedExtinction& extinction, const std::array<Way, 26>& ways, std::int32_t z, float* out) {
+void OpennessOfSlice(const ExtinctionGrid& extinction, const std::array<Way, 26>& ways, std::int32_t z, float* out) {
   const hn::CappedTag<float, 16> d;
   for (std::int32_t y = 0; y < extinction.size.y; ++y, out += extinction.size.x) {
     for (std::int32_t x = 0; x < extinction.size.x; x += std::int32_t(hn::Lanes(d))) {
-      const float* const at = extinction.each.data() + extinction.At(x, y, z);
+      const float* const at = extinction.Row(y, z) + x;
       auto open = hn::Zero(d);
       for (const Way& way : ways) {
         auto sum = hn::Zero(d);
@@ -92,7 +115,8 @@ void AddTransmitted(const float* each, std::int32_t count, float length, float* 
   add(rest, sums + x);
 }
 
-// A row of the fine grid, from the rows of the coarse one around it. `room` (of a coarse row) and `out` have room for kRegister more.
+// A row of the fine grid, from the rows of the coarse one around it. `out` has room for kRegister more, `room` (of a coarse row) for twice
+// as many.
 void InterpolateRow(const CoarseRows& rows, const Places& along_x, std::int32_t count, float* room, float* out) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> di;
@@ -104,9 +128,32 @@ void InterpolateRow(const CoarseRows& rows, const Places& along_x, std::int32_t 
   }
   room[rows.count] = room[rows.count - 1];
   for (std::int32_t x = 0; x < count; x += std::int32_t(hn::Lanes(d))) {
-    const auto at = hn::LoadU(di, along_x.below.data() + x);
-    hn::StoreU(lerp(hn::LoadU(d, along_x.share.data() + x), hn::GatherIndex(d, room, at), hn::GatherIndex(d, room + 1, at)), d, out + x);
+    const std::int32_t begin = along_x.below[std::size_t(x)];
+    const auto lane = hn::IndicesFromVec(d, hn::Sub(hn::LoadU(di, along_x.below.data() + x), hn::Set(di, begin)));
+    const auto from = hn::TableLookupLanes(hn::LoadU(d, room + begin), lane),
+               to = hn::TableLookupLanes(hn::LoadU(d, room + begin + 1), lane);
+    hn::StoreU(lerp(hn::LoadU(d, along_x.share.data() + x), from, to), d, out + x);
   }
+}
+
+void BytesOfOpen(const float* open, std::size_t count, float strength, std::uint8_t* out) {
+  const hn::CappedTag<float, 16> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const hn::Rebind<std::uint8_t, decltype(d)> db;
+  const auto one = hn::Set(d, 1);
+  const auto bytes_of = [&](const float* from) HWY_ATTR {
+    const auto closed = hn::Sub(one, hn::Min(hn::Mul(hn::Set(d, 2), hn::LoadU(d, from)), one));
+    const auto kept = hn::Mul(hn::Set(d, 255), hn::Sub(one, hn::Mul(hn::Set(d, strength), closed)));
+    return hn::DemoteTo(db, hn::ConvertTo(di, hn::Add(kept, hn::Set(d, 0.5F))));
+  };
+  std::size_t i = 0;
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) hn::StoreU(bytes_of(open + i), db, out + i);
+  if (i == count) return;
+  HWY_ALIGN float rest[16] = {};
+  HWY_ALIGN std::uint8_t bytes[16];
+  std::copy_n(open + i, count - i, rest);
+  hn::Store(bytes_of(rest), db, bytes);
+  std::copy_n(bytes, count - i, out + i);
 }
 
 }  // namespace slabstream::HWY_NAMESPACE
@@ -119,27 +166,27 @@ namespace {
 HWY_EXPORT(OpennessOfSlice);
 HWY_EXPORT(AddTransmitted);
 HWY_EXPORT(InterpolateRow);
+HWY_EXPORT(BytesOfOpen);
 
 // Half as many voxels along the axes of `halved`. What a voxel transmits is the mean of the voxels in it: beside opaque matter half of the
 // light passes.
-Extinction Halved(const Extinction& fine, const Index3& halved) {
+PaddedExtinction Halved(const ExtinctionGrid& fine, const Index3& halved) {
   const Index3 block = Uniform(1) + halved;
-  Extinction coarse{.size = (fine.size + block - Uniform(1)) / block, .spacing = fine.spacing * ToVec3(block), .each = {}};
-  coarse.each.resize(CountIn(coarse.size));
-  const double length = std::cbrt(coarse.spacing.x * coarse.spacing.y * coarse.spacing.z);
-  ParallelFor(0, coarse.size.z, [&](std::int32_t z) {
+  PaddedExtinction coarse((fine.size + block - Uniform(1)) / block, fine.spacing * ToVec3(block));
+  const ExtinctionGrid& grid = coarse.grid();
+  const double length = std::cbrt(grid.spacing.x * grid.spacing.y * grid.spacing.z);
+  ParallelFor(0, grid.size.z, [&](std::int32_t z) {
     AlignedVector<float> sums(std::size_t(fine.size.x + kRegister));
-    float* out = coarse.each.data() + NumberIn(coarse.size, {0, 0, z});
-    for (std::int32_t y = 0; y < coarse.size.y; ++y) {
+    for (std::int32_t y = 0; y < grid.size.y; ++y) {
       const Index3 begin = Index3{0, y, z} * block, end = Min(begin + block, fine.size);
       std::ranges::fill(sums, 0.0F);
       for (std::int32_t k = begin.z; k < end.z; ++k) {
         for (std::int32_t j = begin.y; j < end.y; ++j) {
-          const float* const row = fine.each.data() + NumberIn(fine.size, {0, j, k});
-          HWY_DYNAMIC_DISPATCH(AddTransmitted)(row, fine.size.x, float(length), sums.data());
+          HWY_DYNAMIC_DISPATCH(AddTransmitted)(fine.Row(j, k), fine.size.x, float(length), sums.data());
         }
       }
       const std::int32_t rows = (end.z - begin.z) * (end.y - begin.y);
+      float* out = coarse.Row(y, z);
       for (std::int32_t i = 0; i < fine.size.x; i += block.x) {
         const std::int32_t columns = std::min(block.x, fine.size.x - i);
         double transmitted = 0;
@@ -152,22 +199,15 @@ Extinction Halved(const Extinction& fine, const Index3& halved) {
   return coarse;
 }
 
-PaddedExtinction Padded(const Extinction& extinction) {
-  PaddedExtinction padded{.size = extinction.size, .margin = kMostOcclusionSteps, .each = {}};
-  const Index3 whole = extinction.size + Uniform(2 * padded.margin);
-  padded.row = whole.x;
-  padded.slice = padded.row * whole.y;
-  padded.each.assign(CountIn(whole) + std::size_t(kRegister), 0.0F);
-  const float* from = extinction.each.data();
-  for (std::int32_t z = 0; z < extinction.size.z; ++z) {
-    for (std::int32_t y = 0; y < extinction.size.y; ++y, from += extinction.size.x) {
-      std::copy_n(from, extinction.size.x, padded.each.data() + padded.At(0, y, z));
-    }
-  }
+PaddedExtinction Padded(const ExtinctionGrid& grid) {
+  PaddedExtinction padded(grid.size, grid.spacing);
+  ParallelFor(0, grid.size.z, [&](std::int32_t z) {
+    for (std::int32_t y = 0; y < grid.size.y; ++y) std::copy_n(grid.Row(y, z), grid.size.x, padded.Row(y, z));
+  });
   return padded;
 }
 
-std::array<Way, 26> WaysOf(const PaddedExtinction& extinction, const Vec3& spacing, double radius) {
+std::array<Way, 26> WaysOf(const ExtinctionGrid& extinction, double radius) {
   // Lebedev's weights of the six directions of faces, the twelve of edges and the eight of corners.
   constexpr std::array<double, 3> kWeights = {1.0 / 21, 4.0 / 105, 9.0 / 280};
   std::array<Way, 26> ways;
@@ -175,7 +215,7 @@ std::array<Way, 26> WaysOf(const PaddedExtinction& extinction, const Vec3& spaci
   for (const Index3& to : IndicesIn(Box{Uniform(-1), Uniform(2)})) {
     const int axes = std::abs(to.x) + std::abs(to.y) + std::abs(to.z);
     if (axes == 0) continue;
-    const double step = Length(ToVec3(to) * spacing);
+    const double step = Length(ToVec3(to) * extinction.spacing);
     const auto count = std::clamp(std::int32_t(std::lround(radius / step)), 1, kMostOcclusionSteps);
     // A way of a whole number of steps stands for one of the radius.
     ways[number++] = {.stride = to.z * extinction.slice + to.y * extinction.row + to.x,
@@ -196,7 +236,7 @@ std::array<Places, 3> PlacesOf(const Index3& size, const GridMap& map, const Ind
       along.below.push_back(std::clamp(std::int32_t(at), 0, std::max(coarse[axis] - 2, 0)));
       along.share.push_back(float(at - along.below.back()));
     }
-    along.below.resize(along.below.size() + std::size_t(kRegister));
+    along.below.resize(along.below.size() + std::size_t(kRegister), along.below.back());
     along.share.resize(along.below.size());
   }
   return places;
@@ -205,38 +245,40 @@ std::array<Places, 3> PlacesOf(const Index3& size, const GridMap& map, const Ind
 }  // namespace
 
 void FindOpenness(const Extinction& extinction, double radius, const TakeOpenness& take) {
-  const Extinction* used = &extinction;
-  Extinction coarse;
+  ExtinctionGrid used = {extinction.size, extinction.spacing, extinction.each.data(), extinction.size.x,
+                         std::ptrdiff_t{extinction.size.x} * extinction.size.y};
+  PaddedExtinction padded;
   GridMap map;  // from voxels of `extinction` to those of `used`
   for (;;) {
     Index3 halved;
     for (const Axis axis : kAxes) {
-      const bool too_many = used->size[axis] > kMaxOcclusionSide || radius > (kMostOcclusionSteps + 0.5) * used->spacing[axis];
-      halved[axis] = too_many && used->size[axis] > 1 ? 1 : 0;
-    }
-    if (halved == Index3{}) break;
-    coarse = Halved(*used, halved);
-    used = &coarse;
-    for (const Axis axis : kAxes) {
+      const bool too_many = used.size[axis] > kMaxOcclusionSide || radius > (kMostOcclusionSteps + 0.5) * used.spacing[axis];
+      halved[axis] = too_many && used.size[axis] > 1 ? 1 : 0;
       if (halved[axis] == 0) continue;
       map.scale[axis] /= 2;
       map.offset[axis] = (map.offset[axis] - 0.5) / 2;
     }
+    if (halved == Index3{}) break;
+    padded = Halved(used, halved);
+    used = padded.grid();
   }
-  const PaddedExtinction padded = Padded(*used);
-  const std::array<Way, 26> ways = WaysOf(padded, used->spacing, radius);
-  const Index3& size = used->size;
+  if (used.first == extinction.each.data()) {
+    padded = Padded(used);
+    used = padded.grid();
+  }
+  const std::array<Way, 26> ways = WaysOf(used, radius);
+  const Index3& size = used.size;
   AlignedVector<float> open(CountIn(size) + std::size_t(kRegister));
   const std::size_t slice = std::size_t(size.x) * std::size_t(size.y);
   ParallelFor(0, size.z, [&](std::int32_t z) {
     AlignedVector<float> of_slice(slice + std::size_t(kRegister));
-    HWY_DYNAMIC_DISPATCH(OpennessOfSlice)(padded, ways, z, of_slice.data());
+    HWY_DYNAMIC_DISPATCH(OpennessOfSlice)(used, ways, z, of_slice.data());
     std::copy_n(of_slice.data(), slice, open.data() + std::size_t(z) * slice);
   });
 
   const std::array<Places, 3> places = PlacesOf(extinction.size, map, size);
   ParallelFor(0, extinction.size.z, [&](std::int32_t z) {
-    AlignedVector<float> room(std::size_t(size.x + kRegister)), row(std::size_t(extinction.size.x + kRegister));
+    AlignedVector<float> room(std::size_t(size.x + 2 * kRegister)), row(std::size_t(extinction.size.x + kRegister));
     const std::int32_t below_z = places[2].below[std::size_t(z)];
     for (std::int32_t y = 0; y < extinction.size.y; ++y) {
       const std::int32_t below_y = places[1].below[std::size_t(y)];
@@ -249,6 +291,10 @@ void FindOpenness(const Extinction& extinction, double radius, const TakeOpennes
       take(NumberIn(extinction.size, {0, y, z}), {row.data(), std::size_t(extinction.size.x)});
     }
   });
+}
+
+void KeepOpen(std::span<const float> open, float strength, std::uint8_t* out) {
+  HWY_DYNAMIC_DISPATCH(BytesOfOpen)(open.data(), open.size(), strength, out);
 }
 
 }  // namespace slabstream

@@ -24,4 +24,8 @@ using TakeOpenness = std::function<void(std::size_t first, std::span<const float
 // flat surface of opaque matter has about 1/2. Parallel; the result is the same for any number of threads and any instruction set.
 void FindOpenness(const Extinction& extinction, double radius, const TakeOpenness& take);
 
+// What ambient occlusion of this strength, [0, 1], leaves of the light, in 1/255, by openness. A flat surface, which has an openness of
+// about 1/2, keeps its light.
+void KeepOpen(std::span<const float> open, float strength, std::uint8_t* out);
+
 }  // namespace slabstream

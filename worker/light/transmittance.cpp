@@ -56,6 +56,32 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// to[x][y] = from[y][x] for x < width, y < height; rows are so far apart.
+void TurnPlane(const float* __restrict from, std::ptrdiff_t from_row, std::int32_t width, std::int32_t height, float* __restrict to,
+               std::ptrdiff_t to_row) {
+  const hn::FixedTag<float, 4> d;
+  const auto turn_square = [&](const float* at, float* out) HWY_ATTR {
+    const auto row = [&](std::int32_t y) HWY_ATTR { return hn::LoadU(d, at + y * from_row); };
+    const auto low_even = hn::InterleaveLower(d, row(0), row(2)), low_odd = hn::InterleaveLower(d, row(1), row(3));
+    const auto high_even = hn::InterleaveUpper(d, row(0), row(2)), high_odd = hn::InterleaveUpper(d, row(1), row(3));
+    hn::StoreU(hn::InterleaveLower(d, low_even, low_odd), d, out);
+    hn::StoreU(hn::InterleaveUpper(d, low_even, low_odd), d, out + to_row);
+    hn::StoreU(hn::InterleaveLower(d, high_even, high_odd), d, out + 2 * to_row);
+    hn::StoreU(hn::InterleaveUpper(d, high_even, high_odd), d, out + 3 * to_row);
+  };
+  constexpr std::int32_t kRows = 64;  // as many as stay in the cache
+  for (std::int32_t y_begin = 0; y_begin < height; y_begin += kRows) {
+    const std::int32_t y_end = std::min(y_begin + kRows, height);
+    for (std::int32_t x = 0; x < width; x += 4) {
+      std::int32_t y = y_begin;
+      for (; x + 4 <= width && y + 4 <= y_end; y += 4) turn_square(from + y * from_row + x, to + x * to_row + y);
+      for (; y < y_end; ++y) {
+        for (std::int32_t i = x; i < std::min(x + 4, width); ++i) to[i * to_row + y] = from[y * from_row + i];
+      }
+    }
+  }
+}
+
 // Follows rows [b_begin, b_end) of rays, and writes the voxels between row b and row b + 1 of these. Row b_end is followed, too.
 void FollowBand(const Sweep& s, std::int32_t b_begin, std::int32_t b_end) {
   const hn::CappedTag<float, 16> d;
@@ -165,6 +191,7 @@ namespace slabstream {
 namespace {
 
 HWY_EXPORT(FollowBand);
+HWY_EXPORT(TurnPlane);
 
 void Run(const Sweep& sweep) {
   // Rows of rays that any voxel lies on.
@@ -211,14 +238,9 @@ LightRows RowsAlongY(const Extinction& extinction) {
   const Index3& size = extinction.size;
   LightRows rows{.each = nullptr, .turned = UnwrittenVector<float>(extinction.each.size()), .matter = {}};
   ParallelFor(0, size.z, [&](std::int32_t z) {
-    constexpr std::int32_t kSquare = 16;
-    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
-      for (std::int32_t x = 0; x < size.x; ++x) {
-        for (std::int32_t y = y_begin; y < std::min(y_begin + kSquare, size.y); ++y) {
-          rows.turned[NumberIn({size.y, size.z, size.x}, {y, z, x})] = extinction.each[NumberIn(size, {x, y, z})];
-        }
-      }
-    }
+    HWY_DYNAMIC_DISPATCH(TurnPlane)
+    (extinction.each.data() + NumberIn(size, {0, 0, z}), size.x, size.x, size.y, rows.turned.data() + std::ptrdiff_t{z} * size.y,
+     std::ptrdiff_t{size.z} * size.y);
   });
   rows.each = rows.turned.data();
   FindMatter(size.y, std::int64_t{size.z} * size.x, rows);

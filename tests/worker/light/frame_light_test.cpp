@@ -283,10 +283,21 @@ TEST(Transmittance, IsTheSameOnEveryInstructionSet) {
   const Extinction extinction = ExtinctionIn(volume, SetupOf(volume, 0.2));
   for (const Vec3& to_light : {Vec3{1, 0.3, -0.4}, Vec3{0.1, -1, 0.7}, Vec3{0.5, 0.6, 1}}) {
     const std::vector<std::uint8_t> expected = Transmitted(extinction, to_light);
-    const std::vector<float> open = OpennessIn(extinction, 5);
+    ForEachTarget([&] { EXPECT_EQ(Transmitted(extinction, to_light), expected); });
+  }
+}
+
+TEST(Openness, AndItsBytesAreTheSameOnEveryInstructionSet) {
+  const Volume volume = MakeBlobs({{37, 33, 41}}, ScalarType::kUint8, 5);
+  const Extinction extinction = ExtinctionIn(volume, SetupOf(volume, 0.2));
+  for (const double radius : {5.0, 12.0, 25.0}) {  // on the grid itself, and on coarser ones
+    const std::vector<float> open = OpennessIn(extinction, radius);
+    std::vector<std::uint8_t> expected, bytes(open.size());
+    for (const float each : open) expected.push_back(std::uint8_t(255 * (1 - 0.75F * (1 - std::min(2 * each, 1.0F))) + 0.5F));
     ForEachTarget([&] {
-      EXPECT_EQ(Transmitted(extinction, to_light), expected);
-      EXPECT_EQ(OpennessIn(extinction, 5), open);
+      EXPECT_EQ(OpennessIn(extinction, radius), open);
+      KeepOpen(open, 0.75F, bytes.data());
+      EXPECT_EQ(bytes, expected);
     });
   }
 }
