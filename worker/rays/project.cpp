@@ -10,6 +10,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "worker/rays/ray_sections-inl.h"
 #include "worker/rays/stretched_place-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -100,7 +101,7 @@ HWY_INLINE RaysThere RaysAmongVoxels(const ProjectWork& work, const RayPacket& p
   return {among, {hn::Max(owned.begin, shown.begin), hn::Min(owned.end, shown.end)}};
 }
 
-// What a packet's rays have found: the largest sign * sample so far, and which sample it was.
+// What a packet's rays have found: the largest sign * sample so far, and, in a rectilinear grid, which sample it was.
 struct Findings {
   Floats best, at;
   Mask any;
@@ -120,7 +121,7 @@ HWY_INLINE Floats StepsToLeave(const RayBox& box, const LeapScales& scales, cons
   return StepsWithin(box, scales, place, side, ahead);
 }
 
-// A search along the rays of a packet, which advance separately.
+// A search along the rays of a packet in a rectilinear grid. They advance separately: where voxels are far apart, each leaps far.
 struct Search {
   Floats k, direction;  // next sample of each ray; 1: forwards, -1: backwards
   LeapScales leaps;     // in this direction
@@ -129,7 +130,7 @@ struct Search {
 };
 
 // Goes on by one sample or leap. Returns false if there is none: all rays have left the box or found its extreme.
-template <class T, bool kNearest, bool kStretched>
+template <class T, bool kNearest>
 HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Search& search, Findings& found) {
   const FloatTag df;
   const IntTag di;
@@ -138,7 +139,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   const auto inside = hn::And(hn::Ge(search.k, owned.begin), hn::Lt(search.k, owned.end));
   const auto alive = hn::And(inside, hn::Lt(found.best, Set(bounds.most)));
   if (hn::AllFalse(df, alive)) return false;
-  const SamplePlace place = PlaceAt<kStretched>(packet, box, search.k);
+  const SamplePlace place = PlaceStretched(packet, box, search.k);
   // Rays leap over blocks and cells whose bound does not exceed what was found; the others go on to their next sample.
   auto sampled = alive;
   auto steps = Set(1);
@@ -161,7 +162,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
     }
     sampled = hn::AndNot(dull, alive);
     const auto side = hn::IfThenElse(hn::RebindMask(di, dull_block), SetInt(kBlockSide), SetInt(kCellSide));
-    steps = hn::IfThenElse(dull, StepsToLeave<kStretched>(box, search.leaps, place, side), steps);
+    steps = hn::IfThenElse(dull, StepsToLeave<true>(box, search.leaps, place, side), steps);
     // Where no ray leaps, none will on the next few samples: they are mostly in the same cells.
     if (hn::AllFalse(df, hn::AndNot(sampled, alive))) search.blind = 2;
   }
@@ -178,14 +179,15 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   return true;
 }
 
-// The samples at which the searches of a packet begin. Together they pass all samples if behind >= ahead - 1.
+// The samples at which the searches of a packet begin. Together they pass all samples if behind >= ahead - 1. The nearer they are to the
+// extremes of its rays, the more is leapt over.
 struct Hint {
   Floats ahead, behind;
 };
 
-template <class T, bool kNearest, bool kStretched>
-HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
-                              Findings& found) {
+template <class T, bool kNearest>
+HWY_INLINE void SearchBothWays(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
+                               Findings& found) {
   const auto one = Set(1);
   RayPacket reversed = packet;
   for (Floats& move : reversed.move) move = hn::Neg(move);
@@ -193,13 +195,53 @@ HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, 
   Search backwards = {hn::Min(hint.behind, hn::Sub(owned.end, one)), Set(-1), LeapScalesOf(reversed)};
   // In turns: while one waits for memory, the other goes on.
   for (bool ahead = true, behind = true; ahead || behind;) {
-    ahead = ahead && Advance<T, kNearest, kStretched>(work, packet, owned, forwards, found);
-    behind = behind && Advance<T, kNearest, kStretched>(work, packet, owned, backwards, found);
+    ahead = ahead && Advance<T, kNearest>(work, packet, owned, forwards, found);
+    behind = behind && Advance<T, kNearest>(work, packet, owned, backwards, found);
   }
 }
 
-// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all. The nearer the hint is to the extremes of
-// its rays, the more is leapt over. It becomes their mean place, for the next packet.
+// Searches an even grid. The section with the largest bound comes first: after it, most others have nothing larger.
+template <class T, bool kNearest>
+HWY_INLINE void SearchSections(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, Findings& found) {
+  const FloatTag df;
+  const RayBox& box = *work.box;
+  const auto some = hn::Lt(owned.begin, owned.end);
+  const float end = LargestOf(hn::IfThenElse(some, owned.end, Set(-kRayEnd)));
+  Sections sections;
+  for (float begin = LeastOf(hn::IfThenElse(some, owned.begin, Set(kRayEnd))); begin < end;
+       begin += float(sections.count) * sections.length) {
+    FindSections(work, packet, begin, end, sections);
+    for (int i = 0; i < sections.count; ++i) {
+      // From the first one on, and then back from it.
+      const int number = i < sections.count - sections.first ? sections.first + i : sections.count - 1 - i;
+      if (hn::AllFalse(df, hn::And(some, hn::Lt(found.best, Set(sections.bounds[number]))))) continue;
+      const float from = begin + float(number) * sections.length, to = std::min(from + sections.length, end);
+      for (float k = from; k < to; ++k) {
+        const auto sample = Set(k);
+        const auto inside = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
+        const SamplePlace place = PlaceSample(packet, box, sample);
+        const auto bound = hn::GatherIndex(df, work.bounds->cells.data(), CellOf<kCellShift>(place, box.cells, inside));
+        if (hn::AllFalse(df, hn::And(inside, hn::Lt(found.best, bound)))) continue;
+        const ProjectedSamples samples = SamplesAt<T, kNearest>(box, place, inside);
+        const auto candidate = hn::Mul(samples.values, Set(work.sign));
+        found.best = hn::IfThenElse(hn::And(samples.valid, hn::Gt(candidate, found.best)), candidate, found.best);
+        found.any = hn::Or(found.any, samples.valid);
+      }
+    }
+  }
+}
+
+template <class T, bool kNearest, bool kStretched>
+HWY_INLINE void SearchSamples(const ProjectWork& work, const RayPacket& packet, const SampleInterval& owned, const Hint& hint,
+                              Findings& found) {
+  if constexpr (kStretched) {
+    SearchBothWays<T, kNearest>(work, packet, owned, hint, found);
+  } else {
+    SearchSections<T, kNearest>(work, packet, owned, found);
+  }
+}
+
+// Returns whether any of a packet's rays has a sample in the box; `pixels` then holds them all.
 template <class T, bool kNearest, bool kStretched>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Floats ray_ends, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
@@ -213,9 +255,11 @@ HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet
     PartsOf(work.rays->clip, packet, parts);
     for (const PacketPart& part : parts) SearchSamples<T, kNearest, kStretched>(work, among, part.Of(owned), hint, found);
   }
-  // One hint for all: rays that stay together read the same memory.
-  const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
-  hint = {mean, hn::Sub(mean, one)};
+  if constexpr (kStretched) {
+    // The mean place of the extremes, for the next packet. One hint for all: rays that stay together read the same memory.
+    const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
+    hint = {mean, hn::Sub(mean, one)};
+  }
   if (hn::AllFalse(df, found.any)) return false;
   auto value = ValueOf(work, hn::Mul(found.best, Set(work.sign)));
   if (work.complement) value = hn::Sub(one, value);
@@ -262,8 +306,8 @@ HWY_INLINE void SumSamples(const ProjectWork& work, const RayPacket& among, cons
   const SampleBounds &bounds = *work.bounds, &opposite = *work.opposite;
   const LeapScales leaps = LeapScalesOf(among);
   const auto some = hn::Lt(owned.begin, owned.end);
-  const float end = hn::GetLane(hn::MaxOfLanes(df, hn::IfThenElse(some, owned.end, Set(-kRayEnd))));
-  float k = hn::GetLane(hn::MinOfLanes(df, hn::IfThenElse(some, owned.begin, Set(kRayEnd))));
+  const float end = LargestOf(hn::IfThenElse(some, owned.end, Set(-kRayEnd)));
+  float k = LeastOf(hn::IfThenElse(some, owned.begin, Set(kRayEnd)));
   for (int blind = 0; k < end;) {
     const auto sample = Set(k);
     const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
@@ -272,7 +316,7 @@ HWY_INLINE void SumSamples(const ProjectWork& work, const RayPacket& among, cons
     const auto leap = [&](const CommonValue& value, Floats steps) HWY_ATTR {
       const auto later = hn::And(some, hn::Lt(sample, owned.begin));
       const auto limited = hn::IfThenElse(active, steps, hn::IfThenElse(later, hn::Sub(owned.begin, sample), Set(kRayEnd)));
-      const float next = k + hn::GetLane(hn::MinOfLanes(df, limited));
+      const float next = k + LeastOf(limited);
       const auto samples = hn::IfThenElseZero(active, hn::Sub(hn::Min(owned.end, Set(next)), sample));
       sums.Add(value.fixed, hn::ConvertTo(di, samples));
       k = next;

@@ -24,12 +24,14 @@ namespace slabstream {
 // Bounds of what a ray may find: an upper bound of sign * sample for each cell of kCellSide voxels, and for each block of kBlockSide.
 inline constexpr int kBlockShift = 4;
 inline constexpr std::int32_t kBlockSide = 1 << kBlockShift;
+inline constexpr int kWindowStep = 2;
 struct SampleBounds {
-  std::vector<float> cells, blocks;  // lowest float: no finite sample
-  float most = 0;                    // the bound for all samples
+  std::vector<float> cells, blocks;                // lowest float: no finite sample
+  std::vector<float> cell_windows, block_windows;  // of each one and those after it, up to kWindowStep farther on along each axis
+  float most = 0;                                  // the bound for all samples
   Index3 block_counts;
 
-  std::size_t bytes() const { return (cells.capacity() + blocks.capacity()) * sizeof(float); }
+  std::size_t bytes() const { return 2 * (cells.capacity() + blocks.capacity()) * sizeof(float); }
 };
 SampleBounds BoundSamples(const MacrocellRanges& cells, float sign);
 

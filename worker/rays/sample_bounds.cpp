@@ -4,6 +4,19 @@
 #include "worker/rays/project.h"
 
 namespace slabstream {
+namespace {
+
+// The bounds of windows. At the end of a row, a window goes on with the next row: its bound is too large there, never too small.
+std::vector<float> WindowsOf(std::vector<float> bounds, const Index3& counts) {
+  for (const std::size_t stride : {std::size_t(1), std::size_t(counts.x), std::size_t(counts.x) * std::size_t(counts.y)}) {
+    for (int step = 0; step < kWindowStep; ++step) {
+      for (std::size_t i = stride; i < bounds.size(); ++i) bounds[i - stride] = std::max(bounds[i - stride], bounds[i]);
+    }
+  }
+  return bounds;
+}
+
+}  // namespace
 
 SampleBounds BoundSamples(const MacrocellRanges& cells, float sign) {
   constexpr int kCellsABlock = kBlockShift - kCellShift;  // log2
@@ -23,6 +36,8 @@ SampleBounds BoundSamples(const MacrocellRanges& cells, float sign) {
       }
     }
   }
+  bounds.cell_windows = WindowsOf(bounds.cells, counts);
+  bounds.block_windows = WindowsOf(bounds.blocks, bounds.block_counts);
   bounds.most = *std::max_element(bounds.blocks.begin(), bounds.blocks.end());
   return bounds;
 }

@@ -76,6 +76,22 @@ TEST(ProjectTile, IsTheReferenceBitForBit) {
   }
 }
 
+// The rays of a packet lie many voxels apart, and have many samples.
+TEST(ProjectTile, SmallPicturesAreTheReferenceBitForBit) {
+  std::mt19937 views(94);
+  for (int i = 0; i < 12; ++i) {
+    const Volume volume = MakeBlobs({{70, 52, 61}, {1, 1, 1.3}}, ScalarType(1 + i % 3), unsigned(i));
+    const ViewParameters view = RandomView(i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective, views);
+    const int side = i % 3 == 0 ? 25 : i % 3 == 1 ? 9 : 5;
+    const Camera camera = MakeCamera(view, {side, side - 1}, volume.description.geometry);
+    for (const Mode mode : {Mode::kMaximum, Mode::kMinimum}) {
+      const Scene scene(volume, volume.block.box, camera, i < 6 ? 1 : 16, mode);
+      const LocalImage expected = scene.Projected(true);
+      ForEachTarget([&] { EXPECT_TRUE(scene.Projected().rgba == expected.rgba) << "case " << i << " mode " << int(mode); });
+    }
+  }
+}
+
 TEST(ProjectTile, BoxesCombineToTheImageOfTheWholeBitForBit) {
   std::mt19937 random(92);
   for (int i = 0; i < 8; ++i) {
