@@ -344,18 +344,19 @@ HWY_INLINE Ints CellOf(const SamplePlace& place, const Index3& cells, Mask owned
   return hn::IfThenElseZero(hn::RebindMask(IntTag(), owned), index);
 }
 
+constexpr float kPlaceMargin = 1.0F / 64;  // voxels: covers the rounding of positions
+
 // Constants for leaps: 1 / move by axis, and the steps of a safety margin.
 struct LeapScales {
   Floats inverse[3], margin[3];
 };
 HWY_INLINE LeapScales LeapScalesOf(const RayPacket& packet) {
-  constexpr float kMargin = 1.0F / 64;  // voxels: covers the rounding of positions
   LeapScales scales;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto least = Set(1e-9F);
     const auto move = hn::IfThenElse(hn::Lt(hn::Abs(packet.move[i]), least), least, packet.move[i]);
     scales.inverse[i] = hn::Div(Set(1), move);
-    scales.margin[i] = hn::Mul(hn::Abs(scales.inverse[i]), Set(kMargin));
+    scales.margin[i] = hn::Mul(hn::Abs(scales.inverse[i]), Set(kPlaceMargin));
   }
   return scales;
 }

@@ -61,13 +61,12 @@ HWY_INLINE float SamplesWithin(const PacketExtent& extent, float samples, float 
 // Divides the samples [begin, end) of a packet, or the first of them, into sections. Each is bounded by a window of cells or of blocks that
 // holds all its samples, or by the bound for all samples.
 HWY_INLINE void FindSections(const ProjectWork& work, const RayPacket& packet, float begin, float end, Sections& sections) {
-  constexpr float kMargin = 1.0F / 64;  // voxels: covers the rounding of positions
-  constexpr float kFew = 2;             // samples: sections of cells that are so short are not worth their bounds
+  constexpr float kFew = 2;  // samples: sections of cells that are so short are not worth their bounds
   const FloatTag df;
   const IntTag di;
   const RayBox& box = *work.box;
   const SampleBounds& bounds = *work.bounds;
-  const PacketExtent extent = ExtentOf(packet, begin, kMargin);
+  const PacketExtent extent = ExtentOf(packet, begin, kPlaceMargin);
   sections.length = SamplesWithin(extent, end - begin, kWindowStep * kCellSide);
   if (sections.length < kFew) sections.length = std::max(SamplesWithin(extent, end - begin, kWindowStep * kBlockSide), kFew);
   sections.count = int(std::min(std::ceil((end - begin) / sections.length), float(Sections::kMost)));

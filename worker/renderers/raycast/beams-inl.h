@@ -55,7 +55,6 @@ HWY_INLINE Beams BeamsOf(const ViewRays& view, const RayBox& box, Ints x, Ints y
 
 // By packet, a sample before which none of its rays has one in a visible cell; kRayEnd: they have none at all. `x`, `y`: as for BeamsOf.
 HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& to_samples, Ints x, Ints y) {
-  constexpr float kMargin = 1.0F / 64;  // voxels: covers the rounding of positions
   const FloatTag df;
   const IntTag di;
   const auto zero = hn::Zero(df), samples = Set(float(view.sample_count));
@@ -77,7 +76,7 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
     auto gone = hn::Lt(zero, zero);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto down = hn::Lt(beams.back.move[axis], zero);
-      const auto back = hn::Add(PositionOf(beams.back, axis, k), hn::IfThenElse(down, Set(kMargin), Set(-kMargin)));
+      const auto back = hn::Add(PositionOf(beams.back, axis, k), hn::IfThenElse(down, Set(kPlaceMargin), Set(-kPlaceMargin)));
       const auto voxel = hn::Sub(Truncated(hn::Floor(back)), SetInt(box.origin[int(axis)]));
       const auto last = SetInt(box.cells[int(axis)] * kCellSide - 1);
       const auto below = hn::RebindMask(df, hn::Lt(voxel, hn::Zero(di))), above = hn::RebindMask(df, hn::Gt(voxel, last));
@@ -95,6 +94,42 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
   }
   return hn::IfThenElse(hn::Lt(k, samples), k, Set(kRayEnd));
 }
+
+// BeamStarts of the packets of a tile, in the order of ForEachPacket.
+class TileStarts {
+ public:
+  TileStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& to_samples, const PixelBounds& tile)
+      : view_(view), box_(box), to_samples_(to_samples), tile_(tile) {}
+
+  HWY_INLINE float Next() {
+    const std::int32_t lane = number_ % std::int32_t(kLanes);
+    if (lane == 0) FindMore();
+    ++number_;
+    return starts_[lane];
+  }
+
+ private:
+  // Of the next packets, as many as there are lanes.
+  HWY_INLINE void FindMore() {
+    const std::int32_t columns = (tile_.width() + kPacketWidth - 1) / kPacketWidth;
+    const std::int32_t last = columns * ((tile_.height() + kPacketHeight - 1) / kPacketHeight) - 1;
+    LaneNumbers x, y;
+    for (std::int32_t i = 0; i < std::int32_t(kLanes); ++i) {
+      const std::int32_t packet = std::min(number_ + i, last);
+      x.number[i] = tile_.x_begin + packet % columns * kPacketWidth;
+      y.number[i] = tile_.y_begin + packet / columns * kPacketHeight;
+    }
+    const auto starts = BeamStarts(view_, box_, to_samples_, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number));
+    hn::Store(starts, FloatTag(), starts_);
+  }
+
+  const ViewRays& view_;
+  const RayBox& box_;
+  const EmptyDistances& to_samples_;
+  const PixelBounds tile_;
+  std::int32_t number_ = 0;  // of the next packet
+  HWY_ALIGN float starts_[kLanes];
+};
 
 }  // namespace HWY_NAMESPACE
 }  // namespace slabstream

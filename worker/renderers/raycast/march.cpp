@@ -463,29 +463,11 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
   std::uint64_t shaded = 0;
   const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
   PacketShapes shapes;
-  const std::int32_t columns = (tile.width() + kPacketWidth - 1) / kPacketWidth;
-  const std::int32_t last = columns * ((tile.height() + kPacketHeight - 1) / kPacketHeight) - 1;
-  std::int32_t number = 0;
-  alignas(64) float starts[kLanes];  // of as many packets as there are lanes
-  const auto start_of_next = [&]() HWY_ATTR {
-    const std::size_t lane = std::size_t(number) % kLanes;
-    if (lane == 0) {
-      LaneNumbers x, y;
-      for (std::int32_t i = 0; i < std::int32_t(kLanes); ++i) {
-        const std::int32_t packet = std::min(number + i, last);
-        x.number[i] = tile.x_begin + packet % columns * kPacketWidth;
-        y.number[i] = tile.y_begin + packet / columns * kPacketHeight;
-      }
-      hn::Store(BeamStarts(*work.rays, *work.box, *work.to_samples, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number)), FloatTag(),
-                starts);
-    }
-    ++number;
-    return starts[lane];
-  };
+  TileStarts starts(*work.rays, *work.box, *work.to_samples, tile);
   ForEachPacket(*work.rays, tile, rgba, floats_a_row,
                 [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
                   const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
-                  const std::uint64_t found = MarchPacket<T>(work, packet, start_of_next(), cut ? &shapes : nullptr, bricks, pixels);
+                  const std::uint64_t found = MarchPacket<T>(work, packet, starts.Next(), cut ? &shapes : nullptr, bricks, pixels);
                   shaded += found;
                   return found != 0 || (cut && shapes.any_owned);
                 });
