@@ -53,14 +53,16 @@ HWY_INLINE Beams BeamsOf(const ViewRays& view, const RayBox& box, Ints x, Ints y
   return beams;
 }
 
-// By packet, a sample before which none of its rays has one in a visible cell; kRayEnd: they have none at all. `x`, `y`: as for BeamsOf.
-HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& to_samples, Ints x, Ints y) {
+// By packet, how far all of its rays, from sample 0 on, pass no visible cell, in samples; kRayEnd: they pass none at all. `x`, `y`: as for
+// BeamsOf.
+HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& distances, Ints x, Ints y) {
+  constexpr float kShortest = 0.25F;  // samples: of a leap
   const FloatTag df;
   const IntTag di;
   const auto zero = hn::Zero(df), samples = Set(float(view.sample_count));
   const Beams beams = BeamsOf(view, box, x, y);
   // Distances are found only for octants of rays.
-  const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, beams.one_octant), OctantStart(to_samples, beams.back));
+  const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, beams.one_octant), OctantStart(distances, beams.back));
   const LeapScales leaps = LeapScalesOf(beams.front);
   // Where the front reaches the cells.
   auto k = zero;
@@ -68,7 +70,7 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
     const auto low = Set(float(box.origin[int(axis)])), high = hn::Add(low, Set(float(box.cells[int(axis)] * kCellSide)));
     const auto side = hn::IfThenElse(hn::Lt(leaps.inverse[axis], zero), high, low);
     const auto reached = hn::Sub(hn::Mul(hn::Sub(side, beams.front.first[axis]), leaps.inverse[axis]), leaps.margin[axis]);
-    k = hn::Max(k, hn::Floor(hn::Min(reached, samples)));
+    k = hn::Max(k, hn::Min(reached, samples));
   }
   auto going = hn::And(beams.one_octant, hn::Lt(k, samples));
   while (!hn::AllFalse(df, going)) {
@@ -86,10 +88,10 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
     }
     k = hn::IfThenElse(hn::And(going, gone), Set(kRayEnd), k);
     going = hn::AndNot(gone, going);
-    const auto distance = DistanceAt(to_samples, octant_start, CellOf<kCellShift>(place, box.cells, going));
+    const auto distance = DistanceAt(distances, octant_start, CellOf<kCellShift>(place, box.cells, going));
     const auto steps = StepsTo(box, leaps, place, SetInt(kCellSide), hn::ConvertTo(df, hn::ShiftLeft<kCellShift>(distance)));
-    going = hn::And(going, hn::And(hn::RebindMask(df, hn::Gt(distance, hn::Zero(di))), hn::Ge(steps, zero)));
-    k = hn::Add(k, hn::IfThenElseZero(going, hn::Add(hn::Floor(steps), Set(1))));
+    going = hn::And(going, hn::And(hn::RebindMask(df, hn::Gt(distance, hn::Zero(di))), hn::Ge(steps, Set(kShortest))));
+    k = hn::Add(k, hn::IfThenElseZero(going, steps));
     going = hn::And(going, hn::Lt(k, samples));
   }
   return hn::IfThenElse(hn::Lt(k, samples), k, Set(kRayEnd));
@@ -98,10 +100,12 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
 // BeamStarts of the packets of a tile, in the order of ForEachPacket.
 class TileStarts {
  public:
-  TileStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& to_samples, const PixelBounds& tile)
-      : view_(view), box_(box), to_samples_(to_samples), tile_(tile) {}
+  // `distances`: null: what they lead to is not asked for, and all starts are kRayEnd.
+  TileStarts(const ViewRays& view, const RayBox& box, const EmptyDistances* distances, const PixelBounds& tile)
+      : view_(view), box_(box), distances_(distances), tile_(tile) {}
 
   HWY_INLINE float Next() {
+    if (distances_ == nullptr) return kRayEnd;
     const std::int32_t lane = number_ % std::int32_t(kLanes);
     if (lane == 0) FindMore();
     ++number_;
@@ -119,13 +123,13 @@ class TileStarts {
       x.number[i] = tile_.x_begin + packet % columns * kPacketWidth;
       y.number[i] = tile_.y_begin + packet / columns * kPacketHeight;
     }
-    const auto starts = BeamStarts(view_, box_, to_samples_, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number));
+    const auto starts = BeamStarts(view_, box_, *distances_, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number));
     hn::Store(starts, FloatTag(), starts_);
   }
 
   const ViewRays& view_;
   const RayBox& box_;
-  const EmptyDistances& to_samples_;
+  const EmptyDistances* const distances_;
   const PixelBounds tile_;
   std::int32_t number_ = 0;  // of the next packet
   HWY_ALIGN float starts_[kLanes];

@@ -5,6 +5,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <cmath>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -232,6 +233,7 @@ struct MarchingPacket {
   const RayPacket& among;
   const LeapScales& leaps;
   GradientBricks* bricks;                   // the volume's, then those of other fields
+  float surfaces_from;                      // BeamStarts, of isosurfaces
   const RayPacket* among_fields = nullptr;  // AmongVoxels, by field
 };
 
@@ -251,14 +253,14 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   // Addresses depend on `inside` alone, so that loads need not wait for the samples before.
   auto inside = hn::Lt(k, owned.end), alive = inside;
   std::uint64_t shaded = 0;
-  const bool has_surfaces = kAll && !kFields && work.to_surfaces != nullptr;
+  const bool has_surfaces = kAll && !kFields && packet.surfaces_from < kRayEnd;
   [[maybe_unused]] const RayFields* fields = nullptr;
   if constexpr (kSamples == Samples::kMixed || kFields) fields = work.fields;
   SurfaceWalk<T> surfaces(work, packet.among, has_surfaces ? OctantStart(*work.to_surfaces, packet.among) : hn::Zero(IntTag()));
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
     if (kSamples == Samples::kAll && !look.volume_shows) alive = hn::Lt(one, zero);
-    if (has_surfaces) surfaces.Start(*part);
+    if (has_surfaces) surfaces.Start(*part, packet.surfaces_from);
   }
   if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
   const bool has_ends = kAll || work.box->at_border;
@@ -429,17 +431,17 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
   return shaded;
 }
 
-// The rays of one packet. `start`: BeamStarts.
+// The rays of one packet. `samples_from`, `surfaces_from`: BeamStarts.
 template <class T>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float start, const PacketShapes* shapes,
-                                     GradientBricks* bricks, float* HWY_RESTRICT rgba) {
-  if (start == kRayEnd && shapes == nullptr && work.to_surfaces == nullptr) return 0;
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float samples_from, float surfaces_from,
+                                     const PacketShapes* shapes, GradientBricks* bricks, float* HWY_RESTRICT rgba) {
+  if (samples_from == kRayEnd && surfaces_from == kRayEnd && shapes == nullptr) return 0;
   const auto zero = hn::Zero(FloatTag());
   SampleInterval owned = OwnedSamples(of_frame, *work.box);
-  owned.begin = hn::Max(owned.begin, Set(start));
+  owned.begin = hn::Max(owned.begin, Set(std::ceil(samples_from)));
   const RayPacket among = AmongVoxels(of_frame, *work.box);
   const LeapScales leaps = LeapScalesOf(among);
-  const MarchingPacket packet = {of_frame, among, leaps, bricks};
+  const MarchingPacket packet = {of_frame, among, leaps, bricks, surfaces_from};
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
@@ -463,11 +465,12 @@ HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds
   std::uint64_t shaded = 0;
   const bool has_shapes = work.shapes != nullptr && !work.shapes->empty();
   PacketShapes shapes;
-  TileStarts starts(*work.rays, *work.box, *work.to_samples, tile);
+  TileStarts of_samples(*work.rays, *work.box, work.to_samples, tile), of_surfaces(*work.rays, *work.box, work.to_surfaces, tile);
   ForEachPacket(*work.rays, tile, rgba, floats_a_row,
                 [&](const RayPacket& packet, float* HWY_RESTRICT pixels, std::int32_t x, std::int32_t y) HWY_ATTR {
                   const bool cut = has_shapes && LoadShapes(*work.shapes, *work.order, *work.rays, *work.box, tile, x, y, shapes);
-                  const std::uint64_t found = MarchPacket<T>(work, packet, starts.Next(), cut ? &shapes : nullptr, bricks, pixels);
+                  const std::uint64_t found =
+                      MarchPacket<T>(work, packet, of_samples.Next(), of_surfaces.Next(), cut ? &shapes : nullptr, bricks, pixels);
                   shaded += found;
                   return found != 0 || (cut && shapes.any_owned);
                 });

@@ -140,11 +140,11 @@ class SurfaceWalk {
   HWY_INLINE SurfaceWalk(const MarchWork& work, const RayPacket& packet, Ints octant_start)
       : work_(work), box_(*work.box), packet_(packet), octant_start_(octant_start) {}
 
-  // Stands where each ray enters `part`.
-  HWY_NOINLINE void Start(const PacketPart& part) {
+  // Stands where each ray enters `part`, or farther on: there are no crossings before `begin`, in samples.
+  HWY_NOINLINE void Start(const PacketPart& part, float begin = 0) {
     const FloatTag df;
     const auto zero = hn::Zero(df), far = Set(kRayEnd);
-    from_ = hn::Max(part.enter, zero);
+    from_ = hn::Max(part.enter, Set(begin));
     to_ = part.leave;
     constexpr float kMargin = 1.0F / 64;  // voxels, and samples: covers the rounding of positions
     auto enter = hn::Sub(from_, Set(kMargin)), leave = to_;
