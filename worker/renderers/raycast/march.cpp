@@ -12,10 +12,10 @@
 #include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
-#include "worker/renderers/raycast/beams-inl.h"
 #include "worker/renderers/raycast/field_samples-inl.h"
 #include "worker/renderers/raycast/gradient_bricks-inl.h"
 #include "worker/renderers/raycast/label_samples-inl.h"
+#include "worker/renderers/raycast/packet_frusta-inl.h"
 #include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -233,7 +233,7 @@ struct MarchingPacket {
   const RayPacket& among;
   const LeapScales& leaps;
   GradientBricks* bricks;                   // the volume's, then those of other fields
-  float surfaces_from;                      // BeamStarts, of isosurfaces
+  float surfaces_from;                      // FrustumStarts, of isosurfaces
   const RayPacket* among_fields = nullptr;  // AmongVoxels, by field
 };
 
@@ -431,7 +431,7 @@ HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, MarchingPacket pack
   return shaded;
 }
 
-// The rays of one packet. `samples_from`, `surfaces_from`: BeamStarts.
+// The rays of one packet. `samples_from`, `surfaces_from`: FrustumStarts.
 template <class T>
 HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float samples_from, float surfaces_from,
                                      const PacketShapes* shapes, GradientBricks* bricks, float* HWY_RESTRICT rgba) {

@@ -1,11 +1,11 @@
-// Beams: where packets of rays leave the empty space in front of them, before any of their rays is marched. A beam is a packet's rays taken
-// together: at each step they lie within a box that moves along. Beams are followed one to a lane, so that as many packets as there are
-// lanes take the leaps of one; those that meet nothing need no rays at all.
-#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
-#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
+// Frusta of packets (Reshetov et al. 2005): how far the rays of each pass empty space, before any of them is marched. At each step, the
+// rays of a packet lie within a box that moves along. Frusta are followed one to a lane, so that as many packets as there are lanes take
+// the leaps of one; those that meet nothing need no rays at all.
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_PACKET_FRUSTA_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_PACKET_FRUSTA_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_PACKET_FRUSTA_INL_H_
 #else
-#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_BEAMS_INL_H_
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_PACKET_FRUSTA_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -16,15 +16,15 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 
-// The corners of the boxes of beams at sample k: first + k * move. `back` is the corner that comes last along the rays, `front` the one
+// The corners of the boxes of frusta at sample k: first + k * move. `back` is the corner that comes last along the rays, `front` the one
 // that goes ahead.
-struct Beams {
+struct Frusta {
   RayPacket back, front;
-  Mask one_octant;  // all rays of the beam move in one octant of directions; the corners of others mean nothing
+  Mask one_octant;  // all rays of the frustum move in one octant of directions; the corners of others mean nothing
 };
 
 // `x`, `y`: the first pixels of packets.
-HWY_INLINE Beams BeamsOf(const ViewRays& view, const RayBox& box, Ints x, Ints y) {
+HWY_INLINE Frusta FrustaOf(const ViewRays& view, const RayBox& box, Ints x, Ints y) {
   // Between corners of a packet, orthographic rays lie within those of the corners.
   const bool corners = !view.perspective && !(view.jitter > 0);
   const std::int32_t step_x = corners ? kPacketWidth - 1 : 1, step_y = corners ? std::max(kPacketHeight - 1, 1) : 1;
@@ -41,50 +41,50 @@ HWY_INLINE Beams BeamsOf(const ViewRays& view, const RayBox& box, Ints x, Ints y
     }
   }
   const auto zero = hn::Zero(FloatTag());
-  Beams beams = {low, high, low.valid};
+  Frusta frusta = {low, high, low.valid};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto down = hn::Lt(high.move[axis], zero);
-    beams.one_octant = hn::And(beams.one_octant, hn::Or(down, hn::Ge(low.move[axis], zero)));
-    beams.back.first[axis] = hn::IfThenElse(down, high.first[axis], low.first[axis]);
-    beams.back.move[axis] = hn::IfThenElse(down, high.move[axis], low.move[axis]);
-    beams.front.first[axis] = hn::IfThenElse(down, low.first[axis], high.first[axis]);
-    beams.front.move[axis] = hn::IfThenElse(down, low.move[axis], high.move[axis]);
+    frusta.one_octant = hn::And(frusta.one_octant, hn::Or(down, hn::Ge(low.move[axis], zero)));
+    frusta.back.first[axis] = hn::IfThenElse(down, high.first[axis], low.first[axis]);
+    frusta.back.move[axis] = hn::IfThenElse(down, high.move[axis], low.move[axis]);
+    frusta.front.first[axis] = hn::IfThenElse(down, low.first[axis], high.first[axis]);
+    frusta.front.move[axis] = hn::IfThenElse(down, low.move[axis], high.move[axis]);
   }
-  return beams;
+  return frusta;
 }
 
 // By packet, how far all of its rays, from sample 0 on, pass no visible cell, in samples; kRayEnd: they pass none at all. `x`, `y`: as for
-// BeamsOf.
-HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& distances, Ints x, Ints y) {
+// FrustaOf.
+HWY_INLINE Floats FrustumStarts(const ViewRays& view, const RayBox& box, const EmptyDistances& distances, Ints x, Ints y) {
   constexpr float kShortest = 0.25F;  // samples: of a leap
   const FloatTag df;
   const IntTag di;
   const auto zero = hn::Zero(df), samples = Set(float(view.sample_count));
-  const Beams beams = BeamsOf(view, box, x, y);
+  const Frusta frusta = FrustaOf(view, box, x, y);
   // Distances are found only for octants of rays.
-  const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, beams.one_octant), OctantStart(distances, beams.back));
-  const LeapScales leaps = LeapScalesOf(beams.front);
+  const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, frusta.one_octant), OctantStart(distances, frusta.back));
+  const LeapScales leaps = LeapScalesOf(frusta.front);
   // Where the front reaches the cells.
   auto k = zero;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto low = Set(float(box.origin[int(axis)])), high = hn::Add(low, Set(float(box.cells[int(axis)] * kCellSide)));
     const auto side = hn::IfThenElse(hn::Lt(leaps.inverse[axis], zero), high, low);
-    const auto reached = hn::Sub(hn::Mul(hn::Sub(side, beams.front.first[axis]), leaps.inverse[axis]), leaps.margin[axis]);
+    const auto reached = hn::Sub(hn::Mul(hn::Sub(side, frusta.front.first[axis]), leaps.inverse[axis]), leaps.margin[axis]);
     k = hn::Max(k, hn::Min(reached, samples));
   }
-  auto going = hn::And(beams.one_octant, hn::Lt(k, samples));
+  auto going = hn::And(frusta.one_octant, hn::Lt(k, samples));
   while (!hn::AllFalse(df, going)) {
     SamplePlace place;  // the cell of the back corner, and the front corner
     auto gone = hn::Lt(zero, zero);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto down = hn::Lt(beams.back.move[axis], zero);
-      const auto back = hn::Add(PositionOf(beams.back, axis, k), hn::IfThenElse(down, Set(kPlaceMargin), Set(-kPlaceMargin)));
+      const auto down = hn::Lt(frusta.back.move[axis], zero);
+      const auto back = hn::Add(PositionOf(frusta.back, axis, k), hn::IfThenElse(down, Set(kPlaceMargin), Set(-kPlaceMargin)));
       const auto voxel = hn::Sub(Truncated(hn::Floor(back)), SetInt(box.origin[int(axis)]));
       const auto last = SetInt(box.cells[int(axis)] * kCellSide - 1);
       const auto below = hn::RebindMask(df, hn::Lt(voxel, hn::Zero(di))), above = hn::RebindMask(df, hn::Gt(voxel, last));
       gone = hn::Or(gone, hn::Or(hn::And(down, below), hn::AndNot(down, above)));
       place.voxel[axis] = hn::Min(hn::Max(voxel, hn::Zero(di)), last);
-      place.position[axis] = PositionOf(beams.front, axis, k);
+      place.position[axis] = PositionOf(frusta.front, axis, k);
     }
     k = hn::IfThenElse(hn::And(going, gone), Set(kRayEnd), k);
     going = hn::AndNot(gone, going);
@@ -97,7 +97,7 @@ HWY_INLINE Floats BeamStarts(const ViewRays& view, const RayBox& box, const Empt
   return hn::IfThenElse(hn::Lt(k, samples), k, Set(kRayEnd));
 }
 
-// BeamStarts of the packets of a tile, in the order of ForEachPacket.
+// FrustumStarts of the packets of a tile, in the order of ForEachPacket.
 class TileStarts {
  public:
   // `distances`: null: what they lead to is not asked for, and all starts are kRayEnd.
@@ -123,7 +123,7 @@ class TileStarts {
       x.number[i] = tile_.x_begin + packet % columns * kPacketWidth;
       y.number[i] = tile_.y_begin + packet / columns * kPacketHeight;
     }
-    const auto starts = BeamStarts(view_, box_, *distances_, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number));
+    const auto starts = FrustumStarts(view_, box_, *distances_, hn::Load(IntTag(), x.number), hn::Load(IntTag(), y.number));
     hn::Store(starts, FloatTag(), starts_);
   }
 
