@@ -65,7 +65,7 @@ void DeclareBench(const CommandLine& line) {
       .TypeName("NUMBER")
       .Default("1 for spheres, otherwise the renderer's own");
   AddNumber(sub, "--termination", options->termination, {0, kMaxTermination},
-            "Skip what lies behind material whose remaining transmittance is below this, in every case");
+            "Skip what lies behind material whose remaining transmittance is below this; for all cases");
   sub.AddOption(
          "--shape",
          [options](const std::string& option, const std::vector<std::string>& texts) {

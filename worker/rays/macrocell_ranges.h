@@ -30,8 +30,8 @@ struct MacrocellRanges {
 // Parallel.
 MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels);
 
-// By macrocell, which of its eighths, cubes of half its side, may show: a set with bit o for eighth o, which has bit i of o where it is the
-// upper half along axis i. `visible`: 0 for macrocells of which any_between(least, greatest value) is true; the others have none.
+// By macrocell, which of its eighths, cubes of half its side, may show: bit o is set if eighth o may. Bit i of o is set for the upper half
+// along axis i. `visible`: 0 for macrocells of which any_between(least, greatest value) is true; the others have none.
 // `counts`: MacrocellRanges::counts of the voxels. Parallel.
 std::vector<std::uint8_t> VisibleEighths(const PaddedVoxels& voxels, const Index3& counts, const std::vector<std::uint8_t>& visible,
                                          FunctionRef<bool(float, float)> any_between);

@@ -1,7 +1,7 @@
 // EmptyDistances: how far rays may leap. For each cell, and each octant of directions, the Chebyshev distance in cells to the nearest
 // visible cell in that octant; 0 in a visible cell. A ray of the octant that is in a cell of distance d may leap over all cells less than d
-// away: proximity clouds (Zuiderveld et al. 1992) for each direction. A ray that has left an object leaps to its end. Of a visible cell,
-// the eighths that are visible, over the others of which it may leap.
+// away: proximity clouds (Zuiderveld et al. 1992) for each direction. A ray that has left an object leaps to its end. For a visible
+// cell it also holds which eighths are visible. Rays leap over the others.
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ class EmptyDistances {
   // `visible`: VisibleCells, of a grid of cells with these counts.
   EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible);
 
-  // VisibleEighths; before, all eighths of visible cells are. For octants that Find finds from now on.
+  // VisibleEighths. Until this call, all eighths of a visible cell count as visible. Forgets all distances: call Find afterwards.
   void SetEighths(std::vector<std::uint8_t> eighths);
   // Finds the distances of these octants, and forgets others if some are new. Parallel.
   void Find(OctantSet octants);

@@ -25,7 +25,7 @@ struct Frusta {
 
 // `x`, `y`: the first pixels of packets.
 HWY_INLINE Frusta FrustaOf(const ViewRays& view, const RayBox& box, Ints x, Ints y) {
-  // Between corners of a packet, orthographic rays lie within those of the corners.
+  // Orthographic rays are parallel, so those of the four corner pixels give the whole box.
   const bool corners = !view.perspective && !(view.jitter > 0);
   const std::int32_t step_x = corners ? kPacketWidth - 1 : 1, step_y = corners ? std::max(kPacketHeight - 1, 1) : 1;
   RayPacket low = AmongVoxels(RaysOf(view, x, y), box), high = low;
@@ -61,7 +61,7 @@ HWY_INLINE Floats FrustumStarts(const ViewRays& view, const RayBox& box, const E
   const IntTag di;
   const auto zero = hn::Zero(df), samples = Set(float(view.sample_count));
   const Frusta frusta = FrustaOf(view, box, x, y);
-  // Distances are found only for octants of rays.
+  // Only the octants that rays point into have distances.
   const Ints octant_start = hn::IfThenElseZero(hn::RebindMask(di, frusta.one_octant), OctantStart(distances, frusta.back));
   const LeapScales leaps = LeapScalesOf(frusta.front);
   // Where the front reaches the cells.
@@ -100,7 +100,7 @@ HWY_INLINE Floats FrustumStarts(const ViewRays& view, const RayBox& box, const E
 // FrustumStarts of the packets of a tile, in the order of ForEachPacket.
 class TileStarts {
  public:
-  // `distances`: null: what they lead to is not asked for, and all starts are kRayEnd.
+  // `distances`: null: all starts are kRayEnd.
   TileStarts(const ViewRays& view, const RayBox& box, const EmptyDistances* distances, const PixelBounds& tile)
       : view_(view), box_(box), distances_(distances), tile_(tile) {}
 
