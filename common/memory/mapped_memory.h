@@ -18,8 +18,8 @@ inline constexpr bool kWatched = true;
 inline constexpr bool kWatched = false;
 #endif
 
-// A mapping of its own, of at least one byte. It reads as 0, and takes no memory where it is never written. One of a huge page or more
-// begins at a huge page and asks for them: to take a volume's memory 4 KiB at a time costs as much as to read the volume. Throws
+// A mapping of its own, of at least one byte. It reads as 0, and takes no memory where it is never written. A mapping of a huge page or
+// more begins at a huge page and asks for them: to take a volume's memory 4 KiB at a time costs as much as to read the volume. Throws
 // std::bad_alloc.
 void* MapMemory(std::size_t bytes);
 void UnmapMemory(void* block, std::size_t bytes);  // both as taken

@@ -11,7 +11,6 @@
 #include <type_traits>
 #include <vector>
 
-#include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 
 #ifndef SLABSTREAM_COMMON_VOLUME_LIGHT_VOLUME_CPP_  // shared by all instruction sets
@@ -36,6 +35,20 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// add(x, load) for columns from x on, a register at a time; load(row) reads those of a row, which begin there, and 0 beyond the width.
+template <class D, class Add>
+void ForEachRegister(D d, std::size_t width, Add&& add) {
+  using T = hn::TFromD<D>;
+  std::size_t x = 0;
+  for (; x + hn::Lanes(d) <= width; x += hn::Lanes(d)) add(x, [&](const T* from) HWY_ATTR { return hn::LoadU(d, from); });
+  if (x == width) return;
+  add(x, [&](const T* from) HWY_ATTR {
+    HWY_ALIGN T rest[kMostLanes] = {};
+    std::copy_n(from, width - x, rest);
+    return hn::Load(d, rest);
+  });
+}
+
 // Sums of columns of integers, which are exact: a slice has less than 2^15 rows.
 template <class T>
 void AddIntegers(const ColumnsOfRows<T>& columns, double* sums) {
@@ -43,8 +56,7 @@ void AddIntegers(const ColumnsOfRows<T>& columns, double* sums) {
   const hn::Half<decltype(di)> dh;
   const hn::Rebind<T, decltype(di)> dt;
   const hn::Rebind<double, decltype(dh)> dd;
-  const std::size_t lanes = hn::Lanes(di), half = lanes / 2;
-  const auto add = [&](std::size_t x, auto&& load) HWY_ATTR {
+  ForEachRegister(dt, columns.width, [&](std::size_t x, auto&& load) HWY_ATTR {
     auto low = hn::Zero(dd), high = low;
     for (std::int32_t slice = 0; slice < columns.slices; ++slice) {
       const T* row = columns.first + slice * columns.slice + x;
@@ -54,15 +66,7 @@ void AddIntegers(const ColumnsOfRows<T>& columns, double* sums) {
       high = hn::Add(high, hn::PromoteTo(dd, hn::UpperHalf(dh, sum)));
     }
     hn::StoreU(low, dd, sums + x);
-    hn::StoreU(high, dd, sums + x + half);
-  };
-  std::size_t x = 0;
-  for (; x + lanes <= columns.width; x += lanes) add(x, [&](const T* from) HWY_ATTR { return hn::LoadU(dt, from); });
-  if (x == columns.width) return;
-  add(x, [&](const T* from) HWY_ATTR {
-    HWY_ALIGN T rest[kMostLanes] = {};
-    std::copy_n(from, columns.width - x, rest);
-    return hn::Load(dt, rest);
+    hn::StoreU(high, dd, sums + x + hn::Lanes(dd));
   });
 }
 void AddBytes(const ColumnsOfRows<std::uint8_t>& columns, double* sums) { AddIntegers(columns, sums); }
@@ -92,8 +96,7 @@ void MeansOfShorts(const double* sums, std::size_t blocks, double count, std::ui
 void AddFloats(const ColumnsOfRows<float>& columns, double* sums, double* counts) {
   const hn::CappedTag<double, kMostLanes / 2> dd;
   const hn::Rebind<float, decltype(dd)> df;
-  const std::size_t lanes = hn::Lanes(dd);
-  const auto add = [&](std::size_t x, auto&& load) HWY_ATTR {
+  ForEachRegister(df, columns.width, [&](std::size_t x, auto&& load) HWY_ATTR {
     auto sum = hn::Zero(dd), count = sum;
     for (std::int32_t slice = 0; slice < columns.slices; ++slice) {
       const float* row = columns.first + slice * columns.slice + x;
@@ -106,14 +109,6 @@ void AddFloats(const ColumnsOfRows<float>& columns, double* sums, double* counts
     }
     hn::StoreU(sum, dd, sums + x);
     hn::StoreU(count, dd, counts + x);
-  };
-  std::size_t x = 0;
-  for (; x + lanes <= columns.width; x += lanes) add(x, [&](const float* from) HWY_ATTR { return hn::LoadU(df, from); });
-  if (x == columns.width) return;
-  add(x, [&](const float* from) HWY_ATTR {
-    HWY_ALIGN float rest[kMostLanes] = {};
-    std::copy_n(from, columns.width - x, rest);
-    return hn::Load(df, rest);
   });
 }
 

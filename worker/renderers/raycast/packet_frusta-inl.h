@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 // that goes ahead.
 struct Frusta {
   RayPacket back, front;
-  Mask one_octant;  // all rays of the frustum move in one octant of directions; the corners of others mean nothing
+  Mask one_octant;  // all rays of the frustum move in one octant of directions; otherwise its corners mean nothing
 };
 
 // `x`, `y`: the first pixels of packets.

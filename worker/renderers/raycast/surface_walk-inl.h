@@ -146,10 +146,9 @@ class SurfaceWalk {
     const auto zero = hn::Zero(df), far = Set(kRayEnd);
     from_ = hn::Max(part.enter, Set(begin));
     to_ = part.leave;
-    constexpr float kMargin = 1.0F / 64;  // voxels, and samples: covers the rounding of positions
-    auto enter = hn::Sub(from_, Set(kMargin)), leave = to_;
+    auto enter = hn::Sub(from_, Set(kPlaceMargin)), leave = to_;  // in samples the same margin covers rounding
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto low = Set(box_.low[i]), high = Set(box_.high[i]), margin = Set(kMargin);
+      const auto low = Set(box_.low[i]), high = Set(box_.high[i]), margin = Set(kPlaceMargin);
       const auto first = packet_.first[i], move = packet_.move[i];
       still_[i] = hn::Lt(hn::Abs(move), Set(1e-9F));
       inverse_[i] = hn::Div(Set(1), hn::IfThenElse(still_[i], Set(1), move));
