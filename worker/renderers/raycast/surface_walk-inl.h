@@ -131,8 +131,41 @@ struct Crossing {
   }
 };
 
-// Finds crossings of all rays of a packet together, some ahead of where they are asked for, and keeps them: rays that lie side by side
-// cross a surface within a few steps of each other, and share the work.
+// A crossing of each ray, in memory.
+struct KeptCrossing {
+  alignas(64) float at[kLanes], surface[kLanes], fraction[3][kLanes];
+  alignas(64) std::int32_t voxel[3][kLanes];
+
+  HWY_INLINE Crossing Load() const {
+    const FloatTag df;
+    const IntTag di;
+    return {hn::Load(df, at),
+            hn::Load(df, surface),
+            {hn::Load(di, voxel[0]), hn::Load(di, voxel[1]), hn::Load(di, voxel[2])},
+            {hn::Load(df, fraction[0]), hn::Load(df, fraction[1]), hn::Load(df, fraction[2])}};
+  }
+  HWY_INLINE void Store(const Crossing& crossing) {
+    hn::Store(crossing.at, FloatTag(), at);
+    hn::Store(crossing.surface, FloatTag(), surface);
+    for (std::size_t i = 0; i < 3; ++i) {
+      hn::Store(crossing.voxel[i], IntTag(), voxel[i]);
+      hn::Store(crossing.fraction[i], FloatTag(), fraction[i]);
+    }
+  }
+  HWY_INLINE void SetLane(std::size_t lane, const KeptCrossing& other, std::size_t from) {
+    at[lane] = other.at[from];
+    surface[lane] = other.surface[from];
+    for (std::size_t i = 0; i < 3; ++i) {
+      voxel[i][lane] = other.voxel[i][from];
+      fraction[i][lane] = other.fraction[i][from];
+    }
+  }
+};
+
+// Finds crossings of all rays of a packet together, some ahead of where they are asked for, and keeps them. The rays walk first and list
+// the cells that hold a surface. Then the cells are searched, one to a lane, whichever rays they are of: so lanes are full, although few
+// rays are in such a cell at a time. Where rays end at their first crossing, most listed cells would lie behind it. There, rays wait in
+// such a cell until more of them wait than move.
 template <class T, bool kStretched = false>
 class SurfaceWalk {
  public:
@@ -150,7 +183,7 @@ class SurfaceWalk {
     for (std::size_t i = 0; i < 3; ++i) {
       const auto low = Set(box_.low[i]), high = Set(box_.high[i]), margin = Set(kPlaceMargin);
       const auto first = packet_.first[i], move = packet_.move[i];
-      still_[i] = hn::Lt(hn::Abs(move), Set(1e-9F));
+      still_[i] = IsStill(move);
       inverse_[i] = hn::Div(Set(1), hn::IfThenElse(still_[i], Set(1), move));
       const auto a = Passes(i, hn::Sub(low, margin)), b = Passes(i, hn::Add(high, margin));
       const auto beside = hn::Or(hn::Lt(first, low), hn::Ge(first, high));
@@ -166,46 +199,63 @@ class SurfaceWalk {
     }
     last_ = hn::Neg(far);
     surface_ = zero;
-    transmitted_ = Set(1);
-    kept_ = zero;
+    hn::Store(Set(1), df, transmitted_);
+    hn::Store(zero, df, kept_);
     const auto none = hn::Zero(IntTag());
-    for (Crossing& kept : queue_) kept = {far, zero, {none, none, none}, {zero, zero, zero}};
+    for (KeptCrossing& crossing : crossings_) crossing.Store({far, zero, {none, none, none}, {zero, zero, zero}});
+    waits_ = false;
+    const std::size_t surfaces = work_.look->isovalues.size();
+    for (std::size_t i = 0; i < surfaces; ++i) waits_ = waits_ || 1 - work_.look->surface_looks[4 * i + 3] <= work_.termination;
     known_to_ = hn::IfThenElse(walking_, hn::Neg(far), far);
   }
 
   // The nearest crossings that are kept.
-  HWY_INLINE const Crossing& nearest() const { return queue_[0]; }
+  HWY_INLINE Crossing nearest() const {
+    Crossing crossing = crossings_[0].Load();
+    crossing.at = hn::IfThenElse(hn::Gt(Kept(), hn::Zero(FloatTag())), crossing.at, Set(kRayEnd));
+    return crossing;
+  }
   // Forgets those of these rays.
   HWY_INLINE void Leave(Mask rays) {
-    for (std::size_t i = 0; i + 1 < kMostKept; ++i) queue_[i].Become(rays, queue_[i + 1]);
-    queue_[kMostKept - 1].at = hn::IfThenElse(rays, Set(kRayEnd), queue_[kMostKept - 1].at);
-    kept_ = hn::Sub(kept_, hn::IfThenElseZero(rays, Set(1)));
+    const auto most = std::size_t(hn::GetLane(hn::MaxOfLanes(FloatTag(), Kept())));
+    for (std::size_t i = 1; i < most; ++i) {
+      Crossing crossing = crossings_[i - 1].Load();
+      crossing.Become(rays, crossings_[i].Load());
+      crossings_[i - 1].Store(crossing);
+    }
+    hn::Store(hn::Sub(Kept(), hn::IfThenElseZero(rays, Set(1))), FloatTag(), kept_);
   }
   // Rays of which no crossing is kept, but one up to `before` may be found.
-  HWY_INLINE Mask MayCross(Floats before) const { return hn::And(hn::Eq(kept_, hn::Zero(FloatTag())), hn::Le(known_to_, before)); }
+  HWY_INLINE Mask MayCross(Floats before) const { return hn::And(hn::Eq(Kept(), hn::Zero(FloatTag())), hn::Le(known_to_, before)); }
 
   // Finds the crossings of `rays` up to `to`, and perhaps some beyond. A ray that has as many as are kept stops there.
   HWY_NOINLINE void Find(Mask rays, Floats to) {
     const FloatTag df;
     const auto going_on = [&]() HWY_ATTR {
-      return hn::And(hn::And(rays, walking_), hn::And(hn::Le(known_to_, to), hn::Lt(kept_, Set(float(kMostKept)))));
+      return hn::And(hn::And(rays, walking_), hn::And(hn::Le(known_to_, to), hn::Lt(Kept(), Set(float(kMostKept)))));
     };
-    for (auto going = going_on(); !hn::AllFalse(df, going); going = going_on()) {
-      // Rays wait in cells that hold a surface until more of them wait than move.
-      auto moving = going, waiting = hn::Lt(Set(1), hn::Zero(df));
-      while (!hn::AllFalse(df, moving) && hn::CountTrue(df, moving) >= hn::CountTrue(df, waiting)) {
-        const SamplePlace place = PlaceOfCells();
-        const auto group = CellOf<kCellShift>(place, box_.cells, moving);
-        const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, group);
-        const auto holds = hn::And(moving, HoldsSurface(group, place));
-        const auto leaping = hn::And(moving, hn::RebindMask(df, hn::Gt(distance, hn::Zero(IntTag()))));
-        const auto stepping = hn::AndNot(hn::Or(holds, leaping), moving);
-        if (!hn::AllFalse(df, stepping)) Step(stepping);
-        if (!hn::AllFalse(df, leaping)) Leap(place, leaping, hn::ConvertTo(df, distance));
-        waiting = hn::Or(waiting, holds);
-        moving = hn::AndNot(waiting, going_on());
+    for (auto moving = going_on(); !hn::AllFalse(df, moving); moving = going_on()) {
+      if (waits_) {
+        auto waiting = hn::Lt(Set(1), hn::Zero(df));
+        while (!hn::AllFalse(df, moving) && hn::CountTrue(df, moving) >= hn::CountTrue(df, waiting)) {
+          Advance(moving, [&](Mask holds) HWY_ATTR {
+            waiting = hn::Or(waiting, holds);
+            return hn::AndNot(holds, moving);
+          });
+          moving = hn::AndNot(waiting, going_on());
+        }
+        if (!hn::AllFalse(df, waiting)) CrossCells(waiting);
+      } else {
+        std::size_t count = 0;
+        while (!hn::AllFalse(df, moving) && count <= kMostCells - kLanes) {
+          Advance(moving, [&](Mask holds) HWY_ATTR {
+            if (!hn::AllFalse(df, holds)) count = cells_.Append(count, holds, cell_, last_, surface_);
+            return moving;
+          });
+          moving = hn::And(moving, going_on());
+        }
+        if (count > 0) CrossListed(count);
       }
-      if (!hn::AllFalse(df, waiting)) CrossCells(waiting);
     }
   }
 
@@ -277,7 +327,27 @@ class SurfaceWalk {
   struct Nearest {
     Floats at, x, surface, changes;
   };
-  static constexpr std::size_t kMostKept = 4;
+  static constexpr std::size_t kMostKept = 8, kMostCells = 128;
+
+  // Cells of rays that hold a surface, those of a ray in its order, with last_ and surface_ there.
+  struct Cells {
+    float cell[3][kMostCells], last[kMostCells], surface[kMostCells];
+    std::int32_t ray[kMostCells];
+
+    // Returns how many there are then.
+    HWY_INLINE std::size_t Append(std::size_t count, Mask rays, const Floats (&cells)[3], Floats lasts, Floats surfaces) {
+      const FloatTag df;
+      const IntTag di;
+      for (std::size_t i = 0; i < 3; ++i) hn::StoreU(hn::Compress(cells[i], rays), df, cell[i] + count);
+      hn::StoreU(hn::Compress(lasts, rays), df, last + count);
+      hn::StoreU(hn::Compress(surfaces, rays), df, surface + count);
+      hn::StoreU(hn::Compress(hn::Iota(di, 0), hn::RebindMask(di, rays)), di, ray + count);
+      return count + hn::CountTrue(df, rays);
+    }
+  };
+
+  HWY_INLINE Floats Kept() const { return hn::Load(FloatTag(), kept_); }
+  static HWY_INLINE Mask IsStill(Floats move) { return hn::Lt(hn::Abs(move), Set(1e-9F)); }
 
   // Whether a crossing counts: it comes after the last one, within the clipped ray, and the box owns it.
   HWY_INLINE Mask Counts(const Way& way, Floats at, Floats x, Floats surface) const {
@@ -359,6 +429,20 @@ class SurfaceWalk {
     return place;
   }
 
+  // Moves rays into their next cell, or farther through empty ones. `moves_on`: takes those of them whose cell holds a surface, and returns
+  // those that move.
+  template <class MovesOn>
+  HWY_INLINE void Advance(Mask rays, MovesOn&& moves_on) {
+    const FloatTag df;
+    const SamplePlace place = PlaceOfCells();
+    const auto group = CellOf<kCellShift>(place, box_.cells, rays);
+    const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, group);
+    const auto leaping = hn::And(rays, hn::RebindMask(df, hn::Gt(distance, hn::Zero(IntTag()))));
+    const auto stepping = hn::AndNot(leaping, moves_on(hn::And(rays, HoldsSurface(group, place))));
+    if (!hn::AllFalse(df, stepping)) Step(stepping);
+    if (!hn::AllFalse(df, leaping)) Leap(place, leaping, hn::ConvertTo(df, distance));
+  }
+
   // Whether a surface passes through the cells that lie at `place`, in these groups.
   HWY_INLINE Mask HoldsSurface(Ints group, const SamplePlace& place) const {
     const IntTag di;
@@ -370,8 +454,12 @@ class SurfaceWalk {
     return hn::RebindMask(FloatTag(), hn::Ne(hn::And(cells, hn::Shl(SetInt(1), bit)), hn::Zero(di)));
   }
 
-  // Keeps the next crossing of these rays in their cells, and moves rays on that have no other one there.
-  HWY_NOINLINE void CrossCells(Mask rays) {
+  // The next crossing of these rays in their cells, and how many changes of sides there are.
+  struct Found {
+    Crossing crossing;
+    Floats changes;
+  };
+  HWY_INLINE Found SearchCell(Mask rays) const {
     const FloatTag df;
     const auto zero = hn::Zero(df);
     const SamplePlace place = PlaceOfCells();
@@ -396,26 +484,104 @@ class SurfaceWalk {
       const auto crossed = hn::And(valid, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
       if (!hn::AllFalse(df, crossed)) CrossSurface(way, cubic, ends, surface, crossed, nearest);
     }
-    const auto found = hn::Lt(nearest.at, Set(kRayEnd));
-    last_ = hn::IfThenElse(found, nearest.at, last_);
-    surface_ = hn::IfThenElse(found, nearest.surface, surface_);
-    known_to_ = hn::IfThenElse(found, nearest.at, known_to_);
+    return {{nearest.at,
+             nearest.surface,
+             {place.voxel[0], place.voxel[1], place.voxel[2]},
+             {way.FractionAt(0, nearest.x), way.FractionAt(1, nearest.x), way.FractionAt(2, nearest.x)}},
+            nearest.changes};
+  }
+
+  // Keeps the next crossing of these rays in their cells, and moves rays on that have no other one there.
+  HWY_NOINLINE void CrossCells(Mask rays) {
+    const FloatTag df;
+    const auto [crossing, changes] = SearchCell(rays);
+    const auto found = hn::Lt(crossing.at, Set(kRayEnd));
     if (!hn::AllFalse(df, found)) {
-      const Crossing crossing = {nearest.at,
-                                 nearest.surface,
-                                 {place.voxel[0], place.voxel[1], place.voxel[2]},
-                                 {way.FractionAt(0, nearest.x), way.FractionAt(1, nearest.x), way.FractionAt(2, nearest.x)}};
-      for (std::size_t i = 0; i < kMostKept; ++i) queue_[i].Become(hn::And(found, hn::Eq(kept_, Set(float(i)))), crossing);
-      kept_ = hn::Add(kept_, hn::IfThenElseZero(found, Set(1)));
-      // A ray ends at the latest where the surfaces alone let too little through. Labels may change their opacity.
-      if (work_.labels == nullptr) {
-        const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)));
-        transmitted_ = hn::Sub(transmitted_, hn::IfThenElseZero(found, hn::Mul(transmitted_, opacity)));
+      last_ = hn::IfThenElse(found, crossing.at, last_);
+      surface_ = hn::IfThenElse(found, crossing.surface, surface_);
+      known_to_ = hn::IfThenElse(found, crossing.at, known_to_);
+      const auto kept = Kept();
+      for (std::size_t i = 0; i <= std::size_t(hn::GetLane(hn::MaxOfLanes(df, kept))) && i < kMostKept; ++i) {
+        Crossing next = crossings_[i].Load();
+        next.Become(hn::And(found, hn::Eq(kept, Set(float(i)))), crossing);
+        crossings_[i].Store(next);
       }
-      walking_ = hn::And(walking_, hn::Or(hn::Not(found), hn::Gt(transmitted_, Set(work_.termination))));
-      known_to_ = hn::IfThenElse(walking_, known_to_, Set(kRayEnd));
+      hn::Store(hn::Add(kept, hn::IfThenElseZero(found, Set(1))), df, kept_);
+      if (work_.labels == nullptr) {
+        const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_));
+        const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, entry);
+        const auto transmitted = hn::Load(df, transmitted_);
+        hn::Store(hn::Sub(transmitted, hn::IfThenElseZero(found, hn::Mul(transmitted, opacity))), df, transmitted_);
+      }
+      EndOpaque();
     }
-    Step(hn::And(hn::And(rays, walking_), hn::Not(hn::And(found, hn::Gt(nearest.changes, Set(1))))));
+    Step(hn::And(hn::And(rays, walking_), hn::Not(hn::And(found, hn::Gt(changes, Set(1))))));
+  }
+
+  // Keeps the crossings in the cells listed.
+  HWY_NOINLINE void CrossListed(std::size_t count) {
+    const FloatTag df;
+    const IntTag di;
+    bool done[kLanes] = {};  // cells of the ray that follow do not count
+    // A walk with a ray of its own in each lane.
+    RayPacket packet;
+    SurfaceWalk walk(work_, packet, octant_start_);
+    for (std::size_t first = 0; first < count; first += kLanes) {
+      const auto valid = hn::FirstN(df, count - first);
+      const auto numbers = hn::IfThenElseZero(hn::RebindMask(di, valid), hn::LoadU(di, cells_.ray + first));
+      const auto indices = hn::IndicesFromVec(df, numbers);
+      const auto of_rays = [&](Floats v) HWY_ATTR { return hn::TableLookupLanes(v, indices); };
+      for (std::size_t i = 0; i < 3; ++i) {
+        packet.first[i] = of_rays(packet_.first[i]);
+        packet.move[i] = of_rays(packet_.move[i]);
+        walk.inverse_[i] = of_rays(inverse_[i]);
+        walk.still_[i] = IsStill(packet.move[i]);
+        walk.cell_[i] = hn::IfThenElse(valid, hn::LoadU(df, cells_.cell[i] + first), of_rays(cell_[i]));
+      }
+      walk.from_ = of_rays(from_);
+      walk.to_ = of_rays(to_);
+      walk.last_ = hn::LoadU(df, cells_.last + first);
+      walk.surface_ = hn::LoadU(df, cells_.surface + first);
+      const Found found = walk.SearchCell(valid);
+      const auto any = hn::Lt(found.crossing.at, Set(kRayEnd));
+      if (hn::AllFalse(df, any)) continue;
+      KeptCrossing crossing;
+      crossing.Store(found.crossing);
+      alignas(64) float changes[kLanes];
+      alignas(64) std::int32_t lanes[kLanes];
+      hn::Store(found.changes, df, changes);
+      hn::Store(hn::Compress(hn::Iota(di, 0), hn::RebindMask(di, any)), di, lanes);
+      for (std::size_t i = 0; i < hn::CountTrue(df, any); ++i) {
+        const auto lane = std::size_t(lanes[i]), number = first + lane, ray = std::size_t(cells_.ray[number]);
+        if (done[ray]) continue;
+        if (kept_[ray] == float(kMostKept)) {
+          done[ray] = true;
+          GoBack(ray, number, crossing.at[lane], cells_.last[number], cells_.surface[number]);
+          continue;
+        }
+        crossings_[std::size_t(kept_[ray]++)].SetLane(ray, crossing, lane);
+        done[ray] = changes[lane] > 1;
+        if (done[ray]) GoBack(ray, number, crossing.at[lane], crossing.at[lane], crossing.surface[lane]);
+        if (work_.labels != nullptr) continue;
+        transmitted_[ray] -= transmitted_[ray] * work_.look->surface_looks[4 * std::size_t(crossing.surface[lane]) + 3];
+        done[ray] = done[ray] || transmitted_[ray] <= work_.termination;
+      }
+    }
+    EndOpaque();
+  }
+  // A ray ends at the latest where the surfaces alone let too little through. Labels may change their opacity.
+  HWY_INLINE void EndOpaque() {
+    walking_ = hn::And(walking_, hn::Gt(hn::Load(FloatTag(), transmitted_), Set(work_.termination)));
+    known_to_ = hn::IfThenElse(walking_, known_to_, Set(kRayEnd));
+  }
+  // The ray walks on from a listed cell, behind its last crossing there; the next one is not before `at`.
+  HWY_INLINE void GoBack(std::size_t ray, std::size_t number, float at, float last, float surface) {
+    const auto lane = hn::Eq(hn::Iota(FloatTag(), 0), Set(float(ray)));
+    walking_ = hn::Or(walking_, lane);
+    known_to_ = hn::IfThenElse(lane, Set(at), known_to_);
+    last_ = hn::IfThenElse(lane, Set(last), last_);
+    surface_ = hn::IfThenElse(lane, Set(surface), surface_);
+    for (std::size_t i = 0; i < 3; ++i) cell_[i] = hn::IfThenElse(lane, Set(cells_.cell[i][number]), cell_[i]);
   }
 
   // Moves rays into the next cell.
@@ -501,17 +667,19 @@ class SurfaceWalk {
   const RayBox& box_;
   const RayPacket& packet_;
   const Ints octant_start_;
-  Floats from_, to_;               // samples
-  Mask still_[3];                  // rays that do not move along an axis
-  Floats inverse_[3];              // 1 / move
-  Floats lowest_[3], highest_[3];  // cells of the box
-  Mask walking_;                   // rays that are still in the box
-  Floats cell_[3];                 // floors of the positions in it
-  Floats last_, surface_;          // the last crossing found in this cell, and the surface of the last crossing
-  Floats known_to_;                // no other crossing comes before, in samples; kRayEnd: none comes at all
-  Floats transmitted_;             // by all crossings found
-  Floats kept_;                    // how many
-  Crossing queue_[kMostKept];      // nearest first
+  Floats from_, to_;                       // samples
+  Mask still_[3];                          // rays that do not move along an axis
+  Floats inverse_[3];                      // 1 / move
+  Floats lowest_[3], highest_[3];          // cells of the box
+  Mask walking_;                           // rays that are still in the box
+  Floats cell_[3];                         // floors of the positions in it
+  Floats last_, surface_;                  // the last crossing found in this cell, and the surface of the last crossing
+  Floats known_to_;                        // no other crossing comes before, in samples; kRayEnd: none comes at all
+  alignas(64) float transmitted_[kLanes];  // by all crossings found
+  alignas(64) float kept_[kLanes];         // how many
+  bool waits_;                             // a surface is so opaque that rays end there
+  Cells cells_;
+  KeptCrossing crossings_[kMostKept];  // nearest first
 };
 
 // Adds the crossings of rays with isosurfaces up to `before`, in samples, to `sums`: add(rays, crossings). A packet walks `ahead` samples

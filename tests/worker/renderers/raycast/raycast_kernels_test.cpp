@@ -237,6 +237,10 @@ TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
     RandomScene setup(i, random, views);
     const double a = random.Real(1, 100), b = random.Real(101, 199);
     setup.options.transfer.isosurfaces = {{a, {1, 0.5F, 0.2F}, i % 3 == 0 ? 1 : 0.3}, {b, {0.2F, 0.5F, 1}, 0.5}};
+    if (i % 3 == 1) {  // several in a cell, and more along a ray than a walk keeps
+      auto& surfaces = setup.options.transfer.isosurfaces;
+      for (int n = 1; n < 8; ++n) surfaces.insert(surfaces.end() - 1, {a + (b - a) * n / 8, {1, 1, 1}, 0.02});
+    }
     if (i % 2 == 0) setup.options.transfer.opacities = {{0, 0}};  // surfaces alone
     if (i % 6 == 5) setup.rate = 0.1;
     if (i % 4 == 3) {
