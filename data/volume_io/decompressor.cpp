@@ -1,74 +1,96 @@
 #include "data/volume_io/decompressor.h"
 
 #include <bzlib.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <new>
+#include <optional>
 #include <vector>
+
+#include "data/codecs/inflater.h"
 
 namespace slabstream {
 namespace {
 
-enum class Step { kMore, kEnd, kDamaged };
+using Step = Inflater::Step;
 
-// The two libraries have the same kind of stream: bytes in, bytes out, and how many of each are left.
-template <bool kBare>
-struct Deflate {
-  static constexpr bool kHasMembers = !kBare;
-  static constexpr char kMagic = '\x1f';  // of a further member
-  z_stream stream{};
+// gzip or zlib, whichever the first byte says. Only gzip has further members.
+class Deflate {
+ public:
+  Step Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
+    if (in.empty() && !inflater_) return Step::kMore;
+    if (!inflater_) inflater_.emplace(char(in[0]) == kMagic ? DeflateFrame::kGzip : DeflateFrame::kZlib);
+    return inflater_->Advance(in, out);
+  }
+  bool BeginMember(std::byte first) {
+    if (inflater_->frame() != DeflateFrame::kGzip || char(first) != kMagic) return false;
+    inflater_->Begin();
+    return true;
+  }
 
-  bool Begin() {
-    // zlib's inflateInit2: tell gzip from zlib by the header; a negative window: there is no header
-    constexpr int kLargestWindow = 15, kDetectHeader = 32;
-    return inflateInit2(&stream, kBare ? -kLargestWindow : kLargestWindow + kDetectHeader) == Z_OK;
-  }
-  Step Advance() {
-    const int code = inflate(&stream, Z_NO_FLUSH);
-    return code == Z_STREAM_END ? Step::kEnd : code == Z_OK ? Step::kMore : Step::kDamaged;
-  }
-  void End() { inflateEnd(&stream); }
+ private:
+  static constexpr char kMagic = '\x1f';
+  std::optional<Inflater> inflater_;
 };
 
-struct Bzip2 {
-  static constexpr bool kHasMembers = true;
-  static constexpr char kMagic = 'B';
-  bz_stream stream{};
+class BareDeflate : public Inflater {
+ public:
+  BareDeflate() : Inflater(DeflateFrame::kBare) {}
+  bool BeginMember(std::byte) { return false; }
+};
 
-  bool Begin() { return BZ2_bzDecompressInit(&stream, 0, 0) == BZ_OK; }
-  Step Advance() {
-    const int code = BZ2_bzDecompress(&stream);
+class Bzip2 {
+ public:
+  Bzip2() { Begin(); }
+  ~Bzip2() { BZ2_bzDecompressEnd(&stream_); }
+  Bzip2(const Bzip2&) = delete;
+  Bzip2& operator=(const Bzip2&) = delete;
+
+  Step Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
+    constexpr std::size_t kMost = std::size_t{1} << 30;  // the library counts in 32 bits
+    const auto given = unsigned(std::min(in.size(), kMost)), room = unsigned(std::min(out.size(), kMost));
+    stream_.next_in = reinterpret_cast<char*>(const_cast<std::byte*>(in.data()));  // which the library does not change
+    stream_.avail_in = given;
+    stream_.next_out = reinterpret_cast<char*>(out.data());
+    stream_.avail_out = room;
+    const int code = BZ2_bzDecompress(&stream_);
+    in = in.subspan(given - stream_.avail_in);
+    out = out.subspan(room - stream_.avail_out);
     return code == BZ_STREAM_END ? Step::kEnd : code == BZ_OK ? Step::kMore : Step::kDamaged;
   }
-  void End() { BZ2_bzDecompressEnd(&stream); }
+  bool BeginMember(std::byte first) {
+    if (char(first) != 'B') return false;
+    BZ2_bzDecompressEnd(&stream_);
+    Begin();
+    return true;
+  }
+
+ private:
+  void Begin() {
+    stream_ = {};
+    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) throw std::bad_alloc();
+  }
+
+  bz_stream stream_{};
 };
 
+// A codec advances over bytes in and bytes out, and begins a further member where its first byte is one.
 template <class Codec>
 class StreamDecompressor : public Decompressor {
  public:
-  StreamDecompressor(std::ifstream& file, std::int64_t offset) : file_(file), input_(std::size_t{1} << 16) {
-    file_.seekg(offset);
-    Begin();
-  }
-  ~StreamDecompressor() override { codec_.End(); }
-  StreamDecompressor(const StreamDecompressor&) = delete;
-  StreamDecompressor& operator=(const StreamDecompressor&) = delete;
+  StreamDecompressor(std::ifstream& file, std::int64_t offset) : file_(file), input_(std::size_t{1} << 16) { file_.seekg(offset); }
 
   std::size_t Read(std::span<std::byte> out) override {
-    auto& stream = codec_.stream;
-    std::size_t done = 0;
-    while (done < out.size() && step_ != Step::kDamaged) {
-      if (stream.avail_in == 0 && !Refill()) break;
-      if (step_ == Step::kEnd && !NextMember()) break;
-      const std::size_t room = std::min(out.size() - done, std::size_t{1} << 30);  // both count in 32 bits
-      SetPointer(stream.next_out, reinterpret_cast<char*>(out.data() + done));
-      stream.avail_out = unsigned(room);
-      step_ = codec_.Advance();
-      done += room - stream.avail_out;
+    const std::size_t wanted = out.size();
+    while (!out.empty() && step_ != Step::kDamaged) {
+      const bool more = !left_.empty() || Refill();
+      // What follows the end of a member is another one, or padding, which is ignored.
+      if (step_ == Step::kEnd && !(more && codec_.BeginMember(left_[0]))) break;
+      step_ = codec_.Advance(left_, out);
+      if (!more) break;
     }
-    return done;
+    return wanted - out.size();
   }
 
   bool damaged() const override { return step_ == Step::kDamaged; }
@@ -81,35 +103,15 @@ class StreamDecompressor : public Decompressor {
   }
 
  private:
-  template <class Pointer>
-  static void SetPointer(Pointer& pointer, char* to) {
-    pointer = reinterpret_cast<Pointer>(to);
-  }
-  void Begin() {
-    if (!codec_.Begin()) throw std::bad_alloc();
-  }
   bool Refill() {
-    file_.read(input_.data(), std::streamsize(input_.size()));
-    SetPointer(codec_.stream.next_in, input_.data());
-    codec_.stream.avail_in = unsigned(file_.gcount());
-    return codec_.stream.avail_in > 0;
-  }
-  // What follows the end of a stream is another member, or padding, which is ignored.
-  bool NextMember() {
-    const auto next = codec_.stream.next_in;
-    const auto left = codec_.stream.avail_in;
-    if (!Codec::kHasMembers || char(*next) != Codec::kMagic) return false;
-    codec_.End();
-    codec_ = {};
-    Begin();
-    codec_.stream.next_in = next;
-    codec_.stream.avail_in = left;
-    step_ = Step::kMore;
-    return true;
+    file_.read(reinterpret_cast<char*>(input_.data()), std::streamsize(input_.size()));
+    left_ = std::span(input_).first(std::size_t(file_.gcount()));
+    return !left_.empty();
   }
 
   std::ifstream& file_;
-  std::vector<char> input_;
+  std::vector<std::byte> input_;
+  std::span<const std::byte> left_;  // of input_
   Codec codec_;
   Step step_ = Step::kMore;
 };
@@ -130,8 +132,8 @@ std::int64_t MaxRatio(Compression compression) {
 
 std::unique_ptr<Decompressor> Decompressor::Make(Compression compression, std::ifstream& file, std::int64_t offset) {
   if (compression == Compression::kBzip2) return std::make_unique<StreamDecompressor<Bzip2>>(file, offset);
-  if (compression == Compression::kBareDeflate) return std::make_unique<StreamDecompressor<Deflate<true>>>(file, offset);
-  return std::make_unique<StreamDecompressor<Deflate<false>>>(file, offset);
+  if (compression == Compression::kBareDeflate) return std::make_unique<StreamDecompressor<BareDeflate>>(file, offset);
+  return std::make_unique<StreamDecompressor<Deflate>>(file, offset);
 }
 
 }  // namespace slabstream

@@ -19,7 +19,7 @@ PACKAGES = {
     "zstd": "zstd", "Eigen3": "eigen", "hwy": "libhwy", "TBB": "tbb-devel", "TIFF": "libtiff", "PNG": "libpng",
     "JPEG": "libjpeg-turbo", "EXPAT": "libexpat", "Freetype": "freetype", "ZLIB": "zlib", "BZip2": "bzip2",
     "LibLZMA": "liblzma-devel", "BROTLI": "brotli", "OPENJPEG": "openjpeg", "CURL": "libcurl", "BLOSC": "blosc",
-    "LZ4": "lz4-c", "LZF": "liblzf", "ZIP": "libzip", "HDF5": "hdf5", "XXHASH": "xxhash", "OIIO": "openimageio",
+    "ISAL": "isa-l", "LZ4": "lz4-c", "LZF": "liblzf", "ZIP": "libzip", "HDF5": "hdf5", "XXHASH": "xxhash", "OIIO": "openimageio",
     "WEBP": "libwebp-base", "CAIRO": "cairo",
     "GDCM_INCLUDE_DIR": "gdcm", "GDCM_${part}": "gdcm",
 }  # fmt: skip
