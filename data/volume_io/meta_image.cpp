@@ -75,7 +75,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
     origin->push_back(0);
   }
   header.steps = StepsOf(Triple(*spacing));
-  if (count == 4) header.times = StatedTimes(header.times.count, (*spacing)[3], "");
+  if (spacing->size() == 4) header.times = StatedTimes(header.times.count, (*spacing)[3], "");  // not if they are the default
   header.unit = LengthUnitNamed(text.Find("DistanceUnits").value_or(""));
   std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
   for (std::size_t i = 0; i < std::min<std::size_t>(count, 3) && !directions->empty(); ++i) {
