@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "common/text/parse_number.h"
 #include "data/volume_io/formats.h"
@@ -63,7 +64,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
 
   // Of synonyms the one that MetaIO prefers comes first.
   const std::size_t count = sizes->size();
-  auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, {1, 1, 1});
+  auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, std::vector<double>(count, 1));
   auto origin = text.Numbers({"Origin", "Offset", "Position"}, count, {0, 0, 0});
   auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, {});
   for (const auto* numbers : {&spacing, &origin, &directions}) {
@@ -75,7 +76,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
     origin->push_back(0);
   }
   header.steps = StepsOf(Triple(*spacing));
-  if (spacing->size() == 4) header.times = StatedTimes(header.times.count, (*spacing)[3], "");  // not if they are the default
+  if (count == 4) header.times = StatedTimes(header.times.count, (*spacing)[3], "");
   header.unit = LengthUnitNamed(text.Find("DistanceUnits").value_or(""));
   std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
   for (std::size_t i = 0; i < std::min<std::size_t>(count, 3) && !directions->empty(); ++i) {

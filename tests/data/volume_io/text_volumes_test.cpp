@@ -147,13 +147,13 @@ TEST_F(TextVolumes, NrrdTimesHaveAStep) {
 }
 
 TEST_F(TextVolumes, MetaImageTimesHaveAStep) {
-  const auto times = [&](const char* step) {
-    return Read("v.mha", Meta(fmt::format("NDims = 4\nDimSize = 4 3 2 2\nElementSpacing = 1 2 3 {}\n", step), 48), {.time = TimeRange{}})
-        .info.times;
+  const auto times = [&](const std::string& spacing) {
+    return Read("v.mha", Meta("NDims = 4\nDimSize = 4 3 2 2\n" + spacing, 48), {.time = TimeRange{}}).info.times;
   };
-  EXPECT_EQ(times("2.5"), (TimeAxis{2, 2.5, ""}));
-  EXPECT_EQ(times("1"), (TimeAxis{2}));
-  EXPECT_EQ(times("-2"), (TimeAxis{2}));
+  EXPECT_EQ(times("ElementSpacing = 1 2 3 2.5\n"), (TimeAxis{2, 2.5, ""}));
+  EXPECT_EQ(times("ElementSpacing = 1 2 3 1\n"), (TimeAxis{2}));
+  EXPECT_EQ(times("ElementSpacing = 1 2 3 -2\n"), (TimeAxis{2}));
+  EXPECT_EQ(times(""), (TimeAxis{2})) << "no spacings";
 }
 
 TEST_F(TextVolumes, NrrdAxesThatAreNoneOfSpaceAreComponentsOrVolumes) {
