@@ -83,12 +83,12 @@ class StreamDecompressor : public Decompressor {
 
   std::size_t Read(std::span<std::byte> out) override {
     const std::size_t wanted = out.size();
-    while (!out.empty() && step_ != Step::kDamaged) {
+    while (!out.empty() && step_ != Step::kDamaged && !drained_) {
       const bool more = !left_.empty() || Refill();
       // What follows the end of a member is another one, or padding, which is ignored.
       if (step_ == Step::kEnd && !(more && codec_.BeginMember(left_[0]))) break;
       step_ = codec_.Advance(left_, out);
-      if (!more) break;
+      drained_ = !more && !out.empty();
     }
     return wanted - out.size();
   }
@@ -114,6 +114,7 @@ class StreamDecompressor : public Decompressor {
   std::span<const std::byte> left_;  // of input_
   Codec codec_;
   Step step_ = Step::kMore;
+  bool drained_ = false;  // without further bytes the codec gives no more, and is not asked again: ISA-L would write anywhere
 };
 
 }  // namespace
