@@ -21,9 +21,9 @@ SharedCodec InflateCodec(std::string_view name, DeflateFrame frame) {
     Inflater inflater(frame);
     do {
       inflater.Begin();
-      const Inflater::Step step = inflater.Advance(in, out);
+      const StreamState step = inflater.Advance(in, out);
       if (out.empty()) return TooManyBytes(name, limit + 1, limit);
-      if (step != Inflater::Step::kEnd) return DamagedBytes(name);
+      if (step != StreamState::kEnded) return DamagedBytes(name);
     } while (frame == DeflateFrame::kGzip && !in.empty());  // another member
     if (!in.empty()) return DamagedBytes(name);
     bytes.resize(bytes.size() - out.size());

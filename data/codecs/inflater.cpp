@@ -39,17 +39,17 @@ void Inflater::Begin() {
   state_->zlib = {};
 }
 
-Inflater::Step Inflater::Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
-  Step step = Step::kMore;
+StreamState Inflater::Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
+  StreamState step = StreamState::kGoesOn;
   do {
     const std::size_t had = in.size(), room = out.size();
     step = AdvancePiece(in, out);
-    if (step == Step::kMore && !in.empty() && in.size() == had && !out.empty() && out.size() == room) return Step::kDamaged;
-  } while (step == Step::kMore && !in.empty() && !out.empty());
+    if (step == StreamState::kGoesOn && !in.empty() && in.size() == had && !out.empty() && out.size() == room) return StreamState::kDamaged;
+  } while (step == StreamState::kGoesOn && !in.empty() && !out.empty());
   return step;
 }
 
-Inflater::Step Inflater::AdvancePiece(std::span<const std::byte>& in, std::span<std::byte>& out) {
+StreamState Inflater::AdvancePiece(std::span<const std::byte>& in, std::span<std::byte>& out) {
   constexpr std::size_t kMost = std::size_t{1} << 30;  // ISA-L counts in 32 bits
   inflate_state& stream = state_->stream;
   const auto given = std::uint32_t(std::min(in.size(), kMost)), room = std::uint32_t(std::min(out.size(), kMost));
@@ -64,13 +64,13 @@ Inflater::Step Inflater::AdvancePiece(std::span<const std::byte>& in, std::span<
   }
   if (code == ISAL_DECOMP_OK) code = isal_inflate(&stream);
   // Beyond damage ISA-L writes what was in its memory before.
-  if (code != ISAL_DECOMP_OK && code != ISAL_END_INPUT) return Step::kDamaged;
+  if (code != ISAL_DECOMP_OK && code != ISAL_END_INPUT) return StreamState::kDamaged;
   const bool ended = stream.block_state == ISAL_BLOCK_FINISH;
   // ISA-L takes whole words, and at the end it may hold bytes that are not the member's.
   const std::uint32_t left = stream.avail_in + (ended ? std::uint32_t(stream.read_in_length) / 8 : 0);
   in = in.subspan(given - std::min(left, given));
   out = out.subspan(room - stream.avail_out);
-  return ended ? Step::kEnd : Step::kMore;
+  return ended ? StreamState::kEnded : StreamState::kGoesOn;
 }
 
 }  // namespace slabstream

@@ -6,6 +6,8 @@
 #include <memory>
 #include <span>
 
+#include "data/codecs/growing_bytes.h"
+
 namespace slabstream {
 
 // How the deflated bytes are framed. kGzip: RFC 1952. kZlib: RFC 1950, without a preset dictionary. kBare: not at all, so that only damage
@@ -15,8 +17,6 @@ enum class DeflateFrame : std::uint8_t { kGzip, kZlib, kBare };
 // One thread at a time.
 class Inflater {
  public:
-  enum class Step : std::uint8_t { kMore, kEnd, kDamaged };
-
   // Throws std::bad_alloc.
   explicit Inflater(DeflateFrame frame);
   ~Inflater();
@@ -26,14 +26,14 @@ class Inflater {
   // Begins a member, with its header.
   void Begin();
 
-  // Goes on until the member ends or one of the two is used up, and moves both to what is left of them. kEnd: the checksum and the length
+  // Goes on until the member ends or one of the two is used up, and moves both to what is left of them. kEnded: the checksum and the length
   // in the frame are those of the bytes. Then `in` begins behind the member; of kZlib and kBare only if all of it came in one call.
   // kDamaged: neither has moved, and what `out` holds is of no use. The last one.
-  Step Advance(std::span<const std::byte>& in, std::span<std::byte>& out);
+  StreamState Advance(std::span<const std::byte>& in, std::span<std::byte>& out);
 
  private:
   struct State;
-  Step AdvancePiece(std::span<const std::byte>& in, std::span<std::byte>& out);
+  StreamState AdvancePiece(std::span<const std::byte>& in, std::span<std::byte>& out);
 
   const DeflateFrame frame_;
   const std::unique_ptr<State> state_;

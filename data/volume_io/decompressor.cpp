@@ -1,25 +1,21 @@
 #include "data/volume_io/decompressor.h"
 
-#include <bzlib.h>
-
 #include <algorithm>
 #include <array>
-#include <new>
 #include <optional>
 #include <vector>
 
+#include "data/codecs/bunzipper.h"
 #include "data/codecs/inflater.h"
 
 namespace slabstream {
 namespace {
 
-using Step = Inflater::Step;
-
 // gzip or zlib, whichever the first byte says. Only gzip has further members.
 class Deflate {
  public:
-  Step Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
-    if (in.empty() && !inflater_) return Step::kMore;
+  StreamState Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
+    if (in.empty() && !inflater_) return StreamState::kGoesOn;
     if (!inflater_) inflater_.emplace(char(in[0]) == kMagic ? DeflateFrame::kGzip : DeflateFrame::kZlib);
     return inflater_->Advance(in, out);
   }
@@ -40,39 +36,13 @@ class BareDeflate : public Inflater {
   bool BeginMember(std::byte) { return false; }
 };
 
-class Bzip2 {
+class Bzip2 : public Bunzipper {
  public:
-  Bzip2() { Begin(); }
-  ~Bzip2() { BZ2_bzDecompressEnd(&stream_); }
-  Bzip2(const Bzip2&) = delete;
-  Bzip2& operator=(const Bzip2&) = delete;
-
-  Step Advance(std::span<const std::byte>& in, std::span<std::byte>& out) {
-    constexpr std::size_t kMost = std::size_t{1} << 30;  // the library counts in 32 bits
-    const auto given = unsigned(std::min(in.size(), kMost)), room = unsigned(std::min(out.size(), kMost));
-    stream_.next_in = reinterpret_cast<char*>(const_cast<std::byte*>(in.data()));  // which the library does not change
-    stream_.avail_in = given;
-    stream_.next_out = reinterpret_cast<char*>(out.data());
-    stream_.avail_out = room;
-    const int code = BZ2_bzDecompress(&stream_);
-    in = in.subspan(given - stream_.avail_in);
-    out = out.subspan(room - stream_.avail_out);
-    return code == BZ_STREAM_END ? Step::kEnd : code == BZ_OK ? Step::kMore : Step::kDamaged;
-  }
   bool BeginMember(std::byte first) {
     if (char(first) != 'B') return false;
-    BZ2_bzDecompressEnd(&stream_);
     Begin();
     return true;
   }
-
- private:
-  void Begin() {
-    stream_ = {};
-    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) throw std::bad_alloc();
-  }
-
-  bz_stream stream_{};
 };
 
 // A codec advances over bytes in and bytes out, and begins a further member where its first byte is one.
@@ -83,23 +53,23 @@ class StreamDecompressor : public Decompressor {
 
   std::size_t Read(std::span<std::byte> out) override {
     const std::size_t wanted = out.size();
-    while (!out.empty() && step_ != Step::kDamaged && !drained_) {
+    while (!out.empty() && state_ != StreamState::kDamaged && !drained_) {
       const bool more = !left_.empty() || Refill();
       // What follows the end of a member is another one, or padding, which is ignored.
-      if (step_ == Step::kEnd && !(more && codec_.BeginMember(left_[0]))) break;
-      step_ = codec_.Advance(left_, out);
+      if (state_ == StreamState::kEnded && !(more && codec_.BeginMember(left_[0]))) break;
+      state_ = codec_.Advance(left_, out);
       drained_ = !more && !out.empty();
     }
     return wanted - out.size();
   }
 
-  bool damaged() const override { return step_ == Step::kDamaged; }
+  bool damaged() const override { return state_ == StreamState::kDamaged; }
 
   bool EndsWell() override {
     std::vector<std::byte> rest(input_.size());
-    while (step_ != Step::kEnd && Read(rest) == rest.size()) {
+    while (state_ != StreamState::kEnded && Read(rest) == rest.size()) {
     }
-    return step_ == Step::kEnd;
+    return state_ == StreamState::kEnded;
   }
 
  private:
@@ -113,7 +83,7 @@ class StreamDecompressor : public Decompressor {
   std::vector<std::byte> input_;
   std::span<const std::byte> left_;  // of input_
   Codec codec_;
-  Step step_ = Step::kMore;
+  StreamState state_ = StreamState::kGoesOn;
   bool drained_ = false;  // without further bytes the codec gives no more, and is not asked again: ISA-L would write anywhere
 };
 

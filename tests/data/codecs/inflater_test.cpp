@@ -15,8 +15,6 @@
 namespace slabstream {
 namespace {
 
-using Step = Inflater::Step;
-
 constexpr int kLargestWindow = 15, kGzipHeader = 16;  // zlib's numbers
 int WindowBits(DeflateFrame frame) {
   return frame == DeflateFrame::kGzip ? kLargestWindow + kGzipHeader : frame == DeflateFrame::kZlib ? kLargestWindow : -kLargestWindow;
@@ -87,10 +85,10 @@ Inflated InPieces(DeflateFrame frame, const std::string& packed, std::size_t roo
       std::vector<char> made(std::min(most_out, room - inflated.bytes.size()));
       if (made.empty()) return inflated;
       out = std::as_writable_bytes(std::span(made));
-      const Step step = inflater.Advance(in, out);
-      if (step == Step::kDamaged) return inflated;
+      const StreamState step = inflater.Advance(in, out);
+      if (step == StreamState::kDamaged) return inflated;
       inflated.bytes.append(made.data(), made.size() - out.size());
-      inflated.ended = step == Step::kEnd;
+      inflated.ended = step == StreamState::kEnded;
       if (inflated.ended) break;
     }
   }
@@ -159,7 +157,7 @@ TEST_P(EveryFrame, TheNextMemberBeginsBehindTheEnd) {
     std::span<const std::byte> in = std::as_bytes(std::span(more));
     std::span<std::byte> out = std::as_writable_bytes(std::span(made));
     Inflater inflater(GetParam());
-    ASSERT_EQ(inflater.Advance(in, out), Step::kEnd);
+    ASSERT_EQ(inflater.Advance(in, out), StreamState::kEnded);
     EXPECT_EQ(in.size(), 6U) << count;
     EXPECT_EQ(out.size(), 1U) << count;
   }
