@@ -30,6 +30,7 @@ import time
 import numpy as np
 
 from ablation import CannotWrite, Change, Node, changes_of, same_value
+from control import run_control
 from judge import difference, judge
 from observer import Observer
 
@@ -44,11 +45,12 @@ MOST_SAMPLES = 12  # in which a change is tried until somebody notices it
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", required=True, help="observe_sources")
+    parser.add_argument("--program", required=True, help="observe_sources; of --control, those that it builds itself")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="default: the time")
     parser.add_argument("--format", action="append", choices=FORMATS, help="only these; may be repeated")
     parser.add_argument("--minutes", type=float, default=15, help="for each format (default 15)")
     parser.add_argument("--summary", action="store_true", help="the table alone")
+    parser.add_argument("--control", action="store_true", help="revert known mends of readers one by one, and look whether each is caught")
     parser.add_argument("--list", metavar="FILE", help="write each failure to this file, a line each, with tabs")
     return parser.parse_args()
 
@@ -79,8 +81,10 @@ class Site:
 
 
 class FormatRun:
-    def __init__(self, name, options, folder):
-        self.name, self.folder = name, folder
+    """`word`: only nodes with it in their path are changed."""
+
+    def __init__(self, name, options, folder, word=""):
+        self.name, self.folder, self.word = name, folder, word
         self.module = importlib.import_module(f"formats.{name}")
         self.random = random.Random(f"{options.seed} {name}")
         self.observer = Observer(options.program, folder)
@@ -143,6 +147,8 @@ class FormatRun:
             for number, document in enumerate(sample.documents(self.work(sample))):
                 for index, node in enumerate(document.nodes()):
                     path = f"{self.name}/{node.path}"
+                    if self.word not in path:
+                        continue
                     if all(site.sample is not sample for site in sites[path]):
                         sites[path].append(Site(sample, number, index, node))
                     documents[node.path].add((sample.name, number))
@@ -261,7 +267,7 @@ class FormatRun:
 
     def sidecars(self):
         for sample in self.samples:
-            for name in sample.sidecars:
+            for name in () if self.word else sample.sidecars:
                 node, change = Node(f"sidecar/{name}", None), Change("dropped", None)
                 self.nodes += 1
                 if self.late(f"{self.name}/{node.path}", change):
@@ -307,20 +313,34 @@ class FormatRun:
         self.pairs(sites)
         self.observer.close()
         for row in self.rows.values():
-            if not row.used:
+            if not row.used and not self.word:
                 self.fail("ignored", row.path, "its row of harmless.tsv is not needed")
+
+
+def run_format(name, options, word=""):
+    with tempfile.TemporaryDirectory(prefix="ablation") as folder:
+        run = FormatRun(name, options, pathlib.Path(folder), word)
+        run.run()
+    return run
+
+
+def failures_of(options):
+    def failures(program, name, word):
+        options.program = program
+        return set(run_format(name, options, word).failures)
+    return failures
 
 
 def main():
     options = arguments()
     sys.path.insert(0, str(HERE))
     print(f"seed {options.seed}", flush=True)
+    if options.control:
+        return 1 if run_control(failures_of(options)) else 0
     print(f"{'format':16} {'samples':>7} {'nodes':>6} {'changes':>7} " + " ".join(f"{v:>8}" for v in VERDICTS), flush=True)
     failed, listed = 0, []
     for name in options.format or FORMATS:
-        with tempfile.TemporaryDirectory(prefix="ablation") as folder:
-            run = FormatRun(name, options, pathlib.Path(folder))
-            run.run()
+        run = run_format(name, options)
         print(f"{name:16} {len(run.samples):7} {run.nodes:6} {run.changes - run.unwritable:7} " + " ".join(f"{run.counts[v]:8}" for v in VERDICTS), flush=True)
         for (verdict, path), texts in sorted(run.failures.items()):
             listed.append(f"{verdict}\t{path}\t{'; '.join(texts)}")
