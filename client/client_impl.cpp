@@ -12,8 +12,8 @@
 namespace slabstream {
 namespace {
 
-constexpr int kUnknownPongs = 2;  // in a row, before a request is submitted again
 constexpr int kMaxResubmits = 3;  // before it fails
+constexpr char kLostTooOften[] = "lost the request 4 times";
 
 std::string Milliseconds(Duration duration) {
   return std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) + " ms";
@@ -34,10 +34,8 @@ Status Client::Impl::NoAnswer(Duration timeout) const {
   return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
 }
 
-void Client::Impl::Submit(const SubmitFrame& message) {
-  if (const Status sent = Send(message); !sent.ok()) {
-    End(message.request, Status::Unavailable("no service at " + endpoint + ": " + sent.message()));
-  }
+void Client::Impl::EndUnlessSent(RequestId request, const Status& sent) {
+  if (!sent.ok()) End(request, Status::Unavailable("no service at " + endpoint + ": " + sent.message()));
 }
 
 void Client::Impl::SendPing(Time now) {
@@ -47,7 +45,9 @@ void Client::Impl::SendPing(Time now) {
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
   }
+  for (const auto& [nonce, unused] : questions) ping.asked.push_back(nonce);
   unreachable = !Send(ping).ok();  // it counts as unanswered
+  std::ranges::copy(ping.asked, std::back_inserter(ping.open));
   pinged[ping.nonce] = std::move(ping.open);
   if (!unanswered_since) unanswered_since = now;
   next_ping = now + timing.ping;
@@ -208,18 +208,13 @@ void Client::Impl::Handle(const ClientPong& pong) {
   if (pong.senders && direct) direct->Admit(*pong.senders, MonotonicNow());
   if (ping == pinged.end()) return;
   const std::vector<RequestId> asked = std::move(ping->second);
-  pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
-  for (const RequestId request : asked) {
-    const auto found = open.find(request);
-    if (found == open.end()) continue;
-    OpenRequest& state = found->second;
-    if (state.awaits_picture) continue;
-    if (std::find(pong.known.begin(), pong.known.end(), request) != pong.known.end()) {
-      state.unknown_pongs = 0;
-    } else if (++state.unknown_pongs >= kUnknownPongs) {
-      state.unknown_pongs = 0;
-      SubmitAgain(state);
-    }
+  pinged.clear();  // older ones will not be answered any more, later ones do not ask about what is sent again now
+  for (const RequestId id : asked) {
+    const auto request = open.find(id);
+    const auto question = questions.find(id);
+    const bool waits = request != open.end() && !request->second.awaits_picture;
+    if (waits && std::ranges::count(pong.known, id) == 0) SubmitAgain(request->second);
+    if (question != questions.end() && std::ranges::count(pong.lost, id) > 0) AskAgain(id, question->second);
   }
 }
 
@@ -236,8 +231,15 @@ void Client::Impl::SubmitAgain(OpenRequest& lost) {
     again.deadline_ms = std::uint32_t(left_ms);
     Submit(again);
   } else {
-    End(request, Status::Unavailable("the service at " + endpoint + " lost the request " + std::to_string(kMaxResubmits + 1) + " times"));
+    End(request, Status::Unavailable("the service at " + endpoint + " " + kLostTooOften));
   }
+}
+
+void Client::Impl::AskAgain(RequestId nonce, OpenQuestion& lost) {
+  const bool again = !lost.message.empty();
+  if (again && lost.resubmits++ < kMaxResubmits) return EndUnlessSent(nonce, socket.Send({}, lost.message));
+  const std::string once = "was restarted, or its connection broke: the order may have been carried out or not";
+  End(nonce, Status::Unavailable("the service at " + endpoint + " " + (again ? kLostTooOften : once)));
 }
 
 void Client::Impl::End(RequestId request, Event::What end) {

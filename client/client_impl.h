@@ -25,7 +25,6 @@ struct Client::Impl {
   struct OpenRequest {
     SubmitFrame message;
     Time submitted, deadline;
-    int unknown_pongs = 0;  // in a row
     int resubmits = 0;
     bool cancelled = false;       // by the caller; the service has not answered yet
     bool awaits_picture = false;  // the service has done its part, and need not know it any more
@@ -35,8 +34,10 @@ struct Client::Impl {
   struct OpenQuestion {
     Duration patience{};
     Time deadline;
-    bool order = false;      // services answer those at once; a wakeup ends the wait for one
-    std::size_t answer = 0;  // what answers it, as Event::What counts
+    bool order = false;              // services answer those at once; a wakeup ends the wait for one
+    std::size_t answer = 0;          // what answers it, as Event::What counts
+    std::vector<std::byte> message;  // empty: it changes something, so it is not sent again
+    int resubmits = 0;
   };
 
   using Order = std::variant<StatusQuery, ShutDown, KeysOrder, DataOrder, SteerDataset>;
@@ -60,7 +61,8 @@ struct Client::Impl {
 
   Status Send(MessageView message) { return socket.Send({}, Encode(message)); }
 
-  void Submit(const SubmitFrame& message);
+  void Submit(const SubmitFrame& message) { EndUnlessSent(message.request, Send(message)); }
+  void EndUnlessSent(RequestId request, const Status& sent);
 
   // Sends due messages, waits for a message, a wakeup, a signal, the next due time or `limit`, and handles what has come. True: a wakeup or
   // a signal ended the wait.
@@ -85,6 +87,7 @@ struct Client::Impl {
   bool ExpirePictures(Time now);  // asks for those that are lost; true: there are some
   void Handle(const ClientPong& pong);
   void SubmitAgain(OpenRequest& lost);
+  void AskAgain(RequestId nonce, OpenQuestion& lost);
   void End(RequestId request, Event::What end);  // nothing happens if it has ended
   bool ExpireQuestions(Time now);                // true: some have ended
   void FailAll(const Status& reason);
@@ -106,7 +109,7 @@ struct Client::Impl {
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
   std::map<RequestId, OpenRequest> open;
   std::map<RequestId, OpenQuestion> questions;             // by nonce
-  std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
+  std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests and questions of each unanswered ping, by nonce
   std::unique_ptr<DirectPictures> direct;                  // from the first frame on; null: there is no such way
   bool direct_opened = false;                              // or tried
   std::deque<Event> events;

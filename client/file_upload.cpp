@@ -61,7 +61,7 @@ Status FileUpload::Serve(Socket& socket) {
     if (const Status sent = SendParts(socket); !sent.ok()) return sent;
     const Time now = MonotonicNow();
     if (now >= next_ping) {
-      (void)socket.Send({}, Encode(ClientPing{.nonce = ++pings_, .open = {}}));
+      (void)socket.Send({}, Encode(ClientPing{.nonce = ++pings_, .open = {}, .asked = {kUploadNonce}}));
       next_ping = now + timing.ping;
     }
     Socket* const sockets[] = {&socket};
@@ -104,6 +104,8 @@ Result<bool> FileUpload::Receive(Socket& socket) {
     if (const auto* credit = std::get_if<VolumeCredit>(&*message)) allowed_ = std::max(allowed_, credit->allowed);
     if (const auto* refused = std::get_if<OrderRefused>(&*message)) return refused->status;
     if (std::holds_alternative<DataReply>(*message)) events_.changed(Status::Ok());
+    if (const auto* pong = std::get_if<ClientPong>(&*message); pong != nullptr && !pong->lost.empty())
+      return Status::Unavailable("the service has lost what was sent: it was restarted, or an admin has removed it");
   }
   return received;
 }

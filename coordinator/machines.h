@@ -8,6 +8,7 @@
 //   LeaveDataset ---------->          the request has ended
 //   ForgetClient ---------->          the client has gone: its questions, orders and uploads end
 //   FinishStatus ---------->          a StatusReply to send, once datasets are in it
+//   FinishPong   ---------->          a ClientPong to send, once it says which questions, orders and uploads are lost
 //   EndDatasets  ---------->          the coordinator ends: so do questions
 //
 // The executor steps the other machine with a ToDatasets or a DatasetNews before it carries out the actions behind it.
@@ -67,10 +68,14 @@ struct FinishStatus {
   PeerToken client = 0;
   StatusReply reply;
 };
+struct FinishPong {
+  PeerToken client = 0;
+  ClientPong pong;  // `lost` has all that were asked about
+};
 struct EndDatasets {
   std::string reason;
 };
-using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetClient, FinishStatus, EndDatasets>;
+using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetClient, FinishStatus, FinishPong, EndDatasets>;
 
 // ---- from DatasetMachine to FrameMachine
 struct DatasetAwaited {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -97,5 +98,6 @@ int Run(int argc, char** argv) {
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
+  slabstream::HandleStopSignals([](int) { std::_Exit(0); });
   return slabstream::RunMain("slabstream-coordinator", [&] { return slabstream::Run(argc, argv); });
 }

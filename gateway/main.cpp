@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "client/service/gateway_state.h"
@@ -38,7 +39,6 @@ Result<std::uint64_t> ParseUploadLimit(const std::string& option, const std::str
 
 Status Serve(Options options) {
   if (Status simd = LimitSimdTargetByEnvironment(); !simd.ok()) return simd;
-  BlockStopSignals();
   const Result<ServiceAddress> service = ResolveService(options.service);
   if (!service.ok()) return service.status();
   Result<std::string> token = options.token_file.empty() ? MakeToken() : ReadToken("--token-file", options.token_file);
@@ -50,6 +50,7 @@ Status Serve(Options options) {
     options.gateway.collector = *std::move(collector);
   }
   if (!options.tls.certificate.empty()) options.gateway.tls = options.tls;
+  BlockStopSignals();
   Context context;
   const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
   if (!gateway.ok()) return gateway.status();
@@ -115,5 +116,6 @@ int Run(int argc, char** argv) {
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
+  slabstream::HandleStopSignals([](int) { std::_Exit(0); });
   return slabstream::RunMain("slabstream-gateway", [&] { return slabstream::Run(argc, argv); });
 }

@@ -107,5 +107,6 @@ int Run(int argc, char** argv) {
 }  // namespace slabstream
 
 int main(int argc, char** argv) {
+  slabstream::HandleStopSignals([](int) { std::_Exit(0); });
   return slabstream::RunMain("slabstream-worker", [&] { return slabstream::Run(argc, argv); });
 }

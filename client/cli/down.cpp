@@ -35,12 +35,11 @@ Status EndOne(const ServiceChoice& choice) {
   const std::optional<ServiceState> state = FindState(service->endpoint);
   Status asked;
   {
-    Result<ServiceConnection> connection = ServiceConnection::OpenService(*service);
+    Result<ServiceConnection> connection = ServiceConnection::OpenRunning(*service);
     asked = connection.ok() ? connection->client().ShutDownService() : connection.status();
   }
   if (!state) {
-    if (asked.code() == StatusCode::kInvalidArgument) return asked;  // it refuses
-    if (!asked.ok()) return Status::Unavailable(fmt::format("no service runs at {}", service->endpoint));
+    if (!asked.ok()) return asked;
     std::cout << fmt::format("{} was told to end\n", service->endpoint);
     return Status::Ok();
   }

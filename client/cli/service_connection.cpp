@@ -14,6 +14,7 @@
 #include "client/service/service_state.h"
 #include "common/base/printable.h"
 #include "common/cli/program.h"
+#include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/shape_data.h"
 #include "data/open/open_source.h"
@@ -71,7 +72,7 @@ Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
   if (source.size() > kMaxNameBytes) {
     return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
   }
-  if (!NoServiceHere(choice)) return Status::Ok();
+  if (ResolveService(choice).status().code() != StatusCode::kUnavailable) return Status::Ok();
   const bool has_ending = source.rfind('.') != std::string::npos;
   return Status(has_ending ? StatusCode::kNotFound : StatusCode::kUnavailable,
                 fmt::format("SOURCE {}: no such file, and no service runs here that could have a dataset of this name ({})",
@@ -151,10 +152,14 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
 }
 
 Result<ServiceConnection> ServiceConnection::OpenService(const ServiceChoice& choice) {
-  if (NoServiceHere(choice)) return Status::Unavailable(fmt::format("no service runs here ({})", kHowToStart));
   const Result<ServiceAddress> service = ResolveService(choice);
   if (!service.ok()) return service.status();
   return OpenService(*service);
+}
+
+Result<ServiceConnection> ServiceConnection::OpenRunning(const ServiceAddress& service) {
+  if (NobodyListens(service.endpoint)) return Status::Unavailable(fmt::format("no service runs at {}", service.endpoint));
+  return OpenService(service);
 }
 
 Result<ServiceConnection> ServiceConnection::OpenService(const ServiceAddress& service) {

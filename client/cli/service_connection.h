@@ -35,9 +35,11 @@ class ServiceConnection {
   // of its own.
   static Result<ServiceConnection> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources,
                                              std::span<const ShapeChoice> shapes = {});
-  // The service alone, for `status`.
+  // The service alone. It may be about to start: Unavailable after 4 s, but at once if none is named and none runs here. OpenRunning, for
+  // `status` and `down`, waits for no start: it is Unavailable at once if nobody listens at an address of this machine.
   static Result<ServiceConnection> OpenService(const ServiceChoice& choice);
   static Result<ServiceConnection> OpenService(const ServiceAddress& service);
+  static Result<ServiceConnection> OpenRunning(const ServiceAddress& service);
   ServiceConnection(ServiceConnection&&) noexcept;
   ServiceConnection& operator=(ServiceConnection&&) = delete;
   ~ServiceConnection();

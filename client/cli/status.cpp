@@ -13,7 +13,7 @@ namespace slabstream {
 Status RunStatus(const StatusOptions& options) {
   const Result<ServiceAddress> address = ResolveService(options.service);
   if (!address.ok()) return address.status();
-  Result<ServiceConnection> connection = ServiceConnection::OpenService(*address);
+  Result<ServiceConnection> connection = ServiceConnection::OpenRunning(*address);
   if (!connection.ok()) return connection.status();
   const Result<StatusReply> reply = connection->client().QueryStatus();
   if (!reply.ok()) return reply.status();

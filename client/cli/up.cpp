@@ -173,6 +173,7 @@ class LocalService {
     Child& child = *children_.front().process;
     state_.coordinator = child.pid();
     const Result<std::string> line = child.ReadLine(kStartTimeout);
+    if (line.status().code() == StatusCode::kCancelled) return line.status();
     if (!line.ok()) {
       child.Terminate(kPatience);  // it closed its output: ended, or about to
       return StartFailure(0, *child.Ended());
@@ -304,6 +305,7 @@ Status LeaveTerminal(const std::string& log_path, int ready) {
 
 // `ready`: of Detach, if it was called.
 Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional<int> ready) {
+  BlockStopSignals();
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
   if (Status status = MakeRoomAt(options.listen); !status.ok()) return status;
@@ -316,7 +318,6 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
   if (!keys_folder.ok()) return keys_folder.status();
   const bool new_keys = !keys_folder->empty() && !std::filesystem::exists(*keys_folder, error);
 
-  BlockStopSignals();
   LocalService service(options, memory, log_directory, *keys_folder);
   if (Status status = service.Start(); !status.ok()) {
     service.Stop(status.code() == StatusCode::kDeadlineExceeded);  // which names the logs
@@ -346,6 +347,7 @@ Status CheckData(const std::vector<std::string>& data) {
 }  // namespace
 
 Status RunUp(const UpOptions& options) {
+  HandleStopSignals([](int) { std::_Exit(130); });  // nothing has begun
   if (options.metrics + options.workers > 65535) {
     return Status::InvalidArgument(fmt::format("--metrics {}: {} workers need the ports after it", options.metrics, options.workers));
   }

@@ -103,7 +103,7 @@ Result<std::string> OwnPath() {
 // The endpoint in "slabstream is up at ENDPOINT (...)".
 Result<std::string> EndpointOfUp(Helper& up) {
   const Result<std::string> line = up.child().ReadLine(kHelperStartTimeout);
-  if (!line.ok()) return Status(line.status().code(), "the service did not start; see its error above");
+  if (!line.ok()) return Status(line.status().code(), fmt::format("the service did not start: {}", line.status().message()));
   constexpr std::string_view kBefore = " up at ";
   const std::size_t begin = line->find(kBefore);
   if (begin == std::string::npos) return Status::Internal(fmt::format("`slabstream up` said '{}' instead of its endpoint", *line));
@@ -215,7 +215,7 @@ Status RunView(const ViewOptions& options) {
   Result<Helper> gateway = Helper::Start(std::move(command));
   if (!gateway.ok()) return gateway.status();
   const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
-  if (!line.ok()) return Status(line.status().code(), "the gateway did not start; see its error above");
+  if (!line.ok()) return Status(line.status().code(), fmt::format("the gateway did not start: {}", line.status().message()));
   const std::string dataset = file ? ShownDataset(options.source) : options.source;
   const std::string address = line->substr(line->find(' ') + 1), with_token = token->empty() ? address : address + "#token=" + *token;
   const std::string url = fmt::format("{}&dataset={}{}{}", with_token, dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",

@@ -17,6 +17,8 @@
 #include <thread>
 #include <utility>
 
+#include "common/threads/stop_signals.h"
+
 namespace slabstream {
 namespace {
 
@@ -88,8 +90,9 @@ Result<std::string> Child::ReadLine(Duration timeout) {
   while (true) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - MonotonicNow()).count();
     if (left <= 0) return Status::DeadlineExceeded("no answer in time");
+    if (StopComesWithin(std::chrono::milliseconds(0))) return Status::Cancelled("interrupted");
     pollfd descriptor{output_, POLLIN, 0};
-    if (::poll(&descriptor, 1, int(std::min<long long>(left, 1000))) <= 0) continue;
+    if (::poll(&descriptor, 1, int(std::min<long long>(left, 100))) <= 0) continue;
     char byte = 0;
     if (::read(output_, &byte, 1) != 1) return Status::Unavailable("it ended");
     if (byte == '\n') return line;

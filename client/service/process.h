@@ -53,7 +53,7 @@ class Child {
   pid_t pid() const { return pid_; }
   int output() const { return output_; }  // the reading end of its stdout, which stays this object's
 
-  // The first line of its stdout. Unavailable if it ends before that; DeadlineExceeded.
+  // The first line of its stdout. Unavailable if it ends before that; DeadlineExceeded; Cancelled: one of the blocked StopSignals came.
   Result<std::string> ReadLine(Duration timeout);
 
   // How it ended, if it has; reaps it. Later calls return the same.

@@ -19,7 +19,6 @@
 #include "common/json/json.h"
 #include "common/service/service_file.h"
 #include "common/transport/endpoint.h"
-#include "common/transport/this_machine.h"
 
 namespace slabstream {
 namespace {
@@ -200,13 +199,6 @@ Result<ServiceChoice> NamedService(const ServiceChoice& choice) {
   return ServiceChoice{.endpoint = endpoint, .file = {}};
 }
 
-bool NoServiceHere(const ServiceChoice& choice) {
-  const Result<ServiceChoice> named = NamedService(choice);
-  if (!named.ok() || !named->text().empty() || FindState("")) return false;
-  const Result<Endpoint> usual = ParseEndpoint(kDefaultEndpoint, false);
-  return usual.ok() && NobodyListens(*usual);
-}
-
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
   const Result<ServiceChoice> named = NamedService(choice);
   if (!named.ok()) return named.status();
@@ -218,7 +210,8 @@ Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {
   const std::optional<ServiceState> state = FindState(named->endpoint);
   if (state && !state->keys_folder.empty()) return AddressIn(state->keys_folder + "/admin.json");
   if (!named->endpoint.empty()) return ServiceAddress(named->endpoint);
-  return ServiceAddress(state ? state->endpoint : std::string(kDefaultEndpoint));
+  if (state) return ServiceAddress(state->endpoint);
+  return Status::Unavailable("no service is named, and `slabstream up` of this user has started none here that runs");
 }
 
 Result<ServiceChoice> ResolveOwnerService(std::string text) {

@@ -57,12 +57,10 @@ std::string FileNameOf(std::string text);
 // The service that the user names: `choice`; else $SLABSTREAM_SERVICE, a service file; else $SLABSTREAM_ENDPOINT; else neither file nor
 // endpoint. InvalidArgument: that variable holds no endpoint.
 Result<ServiceChoice> NamedService(const ServiceChoice& choice);
-// Whether the usual service is meant and there is none: nobody names one, `up` has started none here, and nobody listens at
-// kDefaultEndpoint.
-bool NoServiceHere(const ServiceChoice& choice);
 // Its address (an endpoint beside a service file is another way to the same service, such as the near end of a tunnel); if none is named,
-// that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its admin. Errors: of
-// NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.
+// that of the last service started here by this user: whoever else listens is not meant. A service that `up` started here with keys is
+// reached as its admin. Errors: of NamedService and ReadServiceFile; InvalidArgument: the file is a worker's; Unavailable: none is named,
+// and `up` of this user has started none here that runs.
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice);
 // Where an owner of voxels finds its service: `text`, the path of a service file of role owner, or an endpoint for workers; if it is empty,
 // what $SLABSTREAM_OWNER_SERVICE names; else the last service started here; else where one listens for workers by default.

@@ -1,9 +1,9 @@
 // SIGINT and SIGTERM as an orderly stop of a service.
 //
-//   1. BlockStopSignals() first of all: threads that are started later inherit the blocked mask, so the handler below runs in the main
-//   thread only.
-//   2. Start the service.
-//   3. WaitUntilStopped(service): returns when the service has ended, by itself or because a signal made it; a signal that came before
+//   1. HandleStopSignals([](int) { std::_Exit(0); }) first of all: nothing has begun, so a signal may end the process at any time.
+//   2. BlockStopSignals() before anything begins that must be ended in order: threads that are started later inherit the blocked mask.
+//   3. Start the service.
+//   4. WaitUntilStopped(service): returns when the service has ended, by itself or because a signal made it; a signal that came before
 //   counts.
 // For main functions: handlers belong to the process.
 #pragma once
@@ -20,6 +20,15 @@ inline sigset_t StopSignals() {
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
   return signals;
+}
+
+// Also one that came while they were blocked.
+inline void HandleStopSignals(void (*handler)(int)) {
+  struct sigaction action = {};
+  action.sa_handler = handler;
+  const sigset_t signals = StopSignals();
+  for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
 }
 
 inline void BlockStopSignals() {
@@ -39,11 +48,7 @@ template <class Service, void (Service::*kRequest)() = &Service::RequestStop>
 void WaitUntilStopped(Service& service) {
   static std::atomic<Service*> target;
   target = &service;
-  struct sigaction action = {};
-  action.sa_handler = [](int) { (target.load()->*kRequest)(); };
-  const sigset_t signals = StopSignals();
-  for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
-  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  HandleStopSignals([](int) { (target.load()->*kRequest)(); });
   service.WaitUntilStopped();
   BlockStopSignals();  // the service may be destroyed now
 }

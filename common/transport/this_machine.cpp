@@ -4,36 +4,40 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/time.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdint>
 
+#include "common/transport/endpoint.h"
+
 namespace slabstream {
 
-bool NobodyListens(const Endpoint& endpoint) {
-  if (endpoint.scheme != Scheme::kTcp || endpoint.remote()) return false;
-  sockaddr_storage address{};
-  socklen_t bytes = 0;
-  if (endpoint.host.starts_with('[')) {
-    auto& six = reinterpret_cast<sockaddr_in6&>(address);
-    six.sin6_family = AF_INET6;
-    six.sin6_addr = in6addr_loopback;
-    six.sin6_port = htons(static_cast<std::uint16_t>(endpoint.port));
-    bytes = sizeof(six);
+bool NobodyListens(const std::string& text) {
+  const Result<Endpoint> endpoint = ParseEndpoint(text, false);
+  if (!endpoint.ok() || endpoint->scheme == Scheme::kInproc || endpoint->remote()) return false;
+  union {
+    sockaddr any = {};
+    sockaddr_in four;
+    sockaddr_in6 six;
+    sockaddr_un file;
+  } address;
+  if (endpoint->scheme == Scheme::kIpc) {
+    address.file = {.sun_family = AF_UNIX, .sun_path = {}};
+    endpoint->path.copy(address.file.sun_path, sizeof(address.file.sun_path) - 1);
+  } else if (endpoint->host.starts_with('[')) {
+    address.six = {.sin6_family = AF_INET6, .sin6_port = htons(std::uint16_t(endpoint->port)), .sin6_addr = in6addr_loopback};
   } else {
-    auto& four = reinterpret_cast<sockaddr_in&>(address);
-    four.sin_family = AF_INET;
-    if (inet_pton(AF_INET, endpoint.host.c_str(), &four.sin_addr) != 1) return false;
-    four.sin_port = htons(static_cast<std::uint16_t>(endpoint.port));
-    bytes = sizeof(four);
+    address.four = {
+        .sin_family = AF_INET, .sin_port = htons(std::uint16_t(endpoint->port)), .sin_addr = {inet_addr(endpoint->host.c_str())}};
   }
-  const int descriptor = ::socket(address.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int descriptor = ::socket(address.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0) return false;
   // On the loopback the answer comes at once, unless a full queue or a firewall swallows the question.
   const timeval patience{1, 0};
   (void)::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
-  const bool refused = ::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), bytes) != 0 && errno == ECONNREFUSED;
+  const bool refused = ::connect(descriptor, &address.any, sizeof(address)) != 0 && (errno == ECONNREFUSED || errno == ENOENT);
   ::close(descriptor);
   return refused;
 }

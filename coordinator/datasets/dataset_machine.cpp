@@ -67,6 +67,18 @@ void DatasetMachine::State::On(const FinishStatus& event) {
   Send(event.client, std::move(reply));
 }
 
+// What is not open here was answered before, on another connection if the client still waits, or was asked of an earlier coordinator.
+void DatasetMachine::State::On(const FinishPong& event) {
+  ClientPong pong = event.pong;
+  std::erase_if(pong.lost, [&](std::uint64_t nonce) {
+    const auto is_order = [&](const auto& each) { return each.second.client == event.client && each.second.order.nonce == nonce; };
+    const auto asks = [&](const auto& each) { return each.second.client == event.client && NonceOf(each.second.question) == nonce; };
+    return std::ranges::any_of(orders, is_order) || std::ranges::any_of(questions, asks) || std::ranges::any_of(uploads, is_order) ||
+           std::ranges::any_of(files, is_order);
+  });
+  Send(event.client, std::move(pong));
+}
+
 void DatasetMachine::State::On(const EndDatasets& event) {
   for (const auto& [id, open] : questions) RefuseQuestion(open, Status::Unavailable(event.reason));
   stopped = true;

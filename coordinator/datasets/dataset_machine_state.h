@@ -140,6 +140,7 @@ struct DatasetMachine::State {
   void On(const LeaveDataset& event);
   void On(const ForgetClient& event);
   void On(const FinishStatus& event);
+  void On(const FinishPong& event);
   void On(const EndDatasets& event);
   void On(const ClientAsked& event);
   void On(const BadRequest& event);

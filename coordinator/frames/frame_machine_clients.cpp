@@ -141,7 +141,9 @@ void FrameMachine::State::OnPing(const FromClient& event, const ClientPing& mess
     PictureSenders senders = roster.SendersOfPictures();
     if (senders.version != *message.senders) pong.senders = std::move(senders);
   }
-  SendClient(client, std::move(pong));
+  pong.lost = message.asked;
+  if (pong.lost.empty()) return SendClient(client, std::move(pong));
+  actions.emplace_back(std::in_place_type<ToDatasets>, FinishPong{client, std::move(pong)});
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& message) {

@@ -23,6 +23,7 @@
 #include "common/base/printable.h"
 #include "common/text/parse_number.h"
 #include "common/text/trimmed.h"
+#include "common/threads/stop_signals.h"
 #include "data/stores/transfer.h"
 
 namespace slabstream {
@@ -143,6 +144,7 @@ struct HttpTransfers::Impl {
   std::jthread thread;
 
   void Run(const std::stop_token& stop) {
+    BlockStopSignals();  // they are for threads that wait for them
     while (!stop.stop_requested()) {
       TakeAsked();
       for (const Time now = MonotonicNow(); !paused.empty() && paused.begin()->first <= now;)

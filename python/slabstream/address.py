@@ -10,10 +10,9 @@ import pathlib
 import re
 from typing import Any
 
-from .errors import InvalidArgument
+from .errors import InvalidArgument, Unavailable
 from .values import json_of
 
-USUAL_ENDPOINT = "tcp://127.0.0.1:7420"
 _SHAPES = "tcp://HOST:PORT or ipc:///PATH"
 _MOST_IPC_PATH_BYTES = 107
 _KEYS, _KEY_CHARACTERS = ("server_key", "public_key", "secret_key"), 40  # Z85
@@ -135,8 +134,8 @@ def _started_here(endpoint: str | None) -> dict[str, Any] | None:
 
 def find_service(service: str | os.PathLike[str] | None = None, endpoint: str | None = None) -> Address:
     """The service that is meant: the named one; else $SLABSTREAM_SERVICE; else $SLABSTREAM_ENDPOINT; else the one that `slabstream up`
-    started here last; else the usual endpoint. An endpoint beside a service file is another way to the same service, such as the near end
-    of a tunnel."""
+    started here last. Unavailable: it has started none that runs. An endpoint beside a service file is another way to the same service, such
+    as the near end of a tunnel."""
     if service is None and endpoint is None:
         service = os.environ.get("SLABSTREAM_SERVICE") or None
         endpoint = None if service else os.environ.get("SLABSTREAM_ENDPOINT") or None
@@ -150,7 +149,9 @@ def find_service(service: str | os.PathLike[str] | None = None, endpoint: str | 
             address = read_service_file(pathlib.Path(state["keys_folder"], "admin.json"))
         elif endpoint is not None:
             address = Address(endpoint)
+        elif state is not None:
+            address = Address(state["endpoint"])
         else:
-            address = Address(state["endpoint"] if state else USUAL_ENDPOINT)
+            raise Unavailable("no service is named, and `slabstream up` of this user has started none here that runs")
     check_endpoint(address.endpoint, address.keys is not None)
     return address

@@ -20,7 +20,6 @@ PING_SECONDS = 1.0     # between pings while requests are open
 SILENCE_SECONDS = 5.0  # without an answer to a ping, the service counts as gone
 MOST_OPEN = 256
 MOST_DEADLINE_SECONDS = 86400.0
-_UNKNOWN_PONGS = 2     # in a row, before a request is submitted again
 _MOST_RESUBMITS = 3    # before it fails
 _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
@@ -42,7 +41,6 @@ class _Open:
     message: Any  # SubmitFrame
     deadline: float
     observer: Observer
-    unknown_pongs: int = 0  # in a row
     resubmits: int = 0
     cancelled: bool = False  # by the caller; the service has not answered yet
 
@@ -52,8 +50,9 @@ class _Question:
     answer: concurrent.futures.Future[Any]          # the reply's message
     credited: Callable[[int], None] | None = None   # of a volume that is sent: told how many bytes may be sent in all
     keeps: bool = False                             # an AddVolume of a file, which stays as long as this client pings
-    epoch: int | None = None                        # of the coordinator that takes the volume, once a pong has told it
+    again: Any = None                               # the message, by its kind, if it may be sent twice
     pinged: bool = True                             # fails if the service does not answer pings; False: a ping of its own
+    resubmits: int = 0
 
 
 class Requests:
@@ -64,8 +63,8 @@ class Requests:
         self._open: dict[int, _Open] = {}
         self.numbers = itertools.count(1)  # of requests and nonces; any thread may take the next one
         self._questions: dict[int, _Question] = {}  # and orders, by nonce
-        self._files: dict[int, int | None] = {}  # that the service has of this client: the coordinator's epoch, once a pong has told it, by nonce
-        self._pinged: dict[int, list[int]] = {}  # requests of each unanswered ping, by nonce
+        self._files: set[int] = set()  # nonces of those that the service has of this client
+        self._pinged: dict[int, list[int]] = {}  # requests and nonces of each unanswered ping, by nonce
         self._received_bytes = self._told_bytes = 0
         self._next_ping = 0.0
         self._unanswered_since: float | None = None  # time of the first ping since the last message
@@ -99,7 +98,10 @@ class Requests:
         pinged = kind != "client_ping"
         if pinged:
             self._begin_pings(now)
-        self._questions[nonce] = _Question(answer, credited, kind == "add_volume" and message.HasField("file"), pinged=pinged)
+        changes = (kind == "add_volume" or kind == "data_order" and message.action != schema.DATA_ACTION_LIST
+                   or kind == "steer_dataset" and len(message.values) > 0)
+        keeps = kind == "add_volume" and message.HasField("file")
+        self._questions[nonce] = _Question(answer, credited, keeps, None if changes else {kind: message}, pinged)
         self._send_message(**{kind: message})
 
     def forget(self, nonce: int) -> None:
@@ -114,7 +116,7 @@ class Requests:
 
     def drop_file(self, nonce: int) -> None:
         if nonce in self._files:
-            del self._files[nonce]
+            self._files.remove(nonce)
             self._send_message(drop_volume=schema.DropVolume(nonce=nonce))
 
     def send_part(self, nonce: int, begin: int, part: memoryview) -> None:
@@ -180,15 +182,12 @@ class Requests:
             self._gone = why
         for request in list(self._open):
             self._end(request, Unavailable(why))
-        self._fail_questions(why, lambda question: for_good or question.pinged)
+        for nonce in [nonce for nonce, question in self._questions.items() if for_good or question.pinged]:
+            self._end(nonce, Unavailable(why))
         for nonce in list(self._files):
             self.drop_file(nonce)
         self._pinged.clear()
         self._unanswered_since = None
-
-    def _fail_questions(self, why: str, which: Callable[[_Question], bool]) -> None:
-        for nonce in [nonce for nonce, question in self._questions.items() if which(question)]:
-            self._questions.pop(nonce).answer.set_exception(Unavailable(why))
 
     def _pings(self) -> bool:
         """Whether anybody waits, or the service keeps anything as long as this client pings."""
@@ -209,9 +208,10 @@ class Requests:
         self._send(schema.Envelope(version=schema.WIRE_VERSION, **message))
 
     def _end(self, request: int, error: SlabstreamError) -> None:
-        ended = self._open.pop(request, None)
-        if ended is not None:
-            ended.observer.failed(error)
+        if request in self._open:
+            self._open.pop(request).observer.failed(error)
+        elif request in self._questions:
+            self._questions.pop(request).answer.set_exception(error)
 
     def _replied(self, reply: Any, payload: memoryview) -> None:
         found = self._open.get(reply.request)
@@ -234,13 +234,14 @@ class Requests:
             question.answer.set_exception(error_of(message.status.code, message.status.message))
         else:
             if question.keeps:
-                self._files[message.nonce] = question.epoch
+                self._files.add(message.nonce)
             question.answer.set_result(message)
 
     def _ping(self, now: float) -> None:
-        ping = schema.ClientPing(nonce=next(self.numbers), received_bytes=self._received_bytes, open=list(self._open))
+        asked = [*(nonce for nonce, question in self._questions.items() if question.pinged), *self._files][:MOST_OPEN]
+        ping = schema.ClientPing(nonce=next(self.numbers), received_bytes=self._received_bytes, open=list(self._open), asked=asked)
         self._told_bytes = self._received_bytes
-        self._pinged[ping.nonce] = list(ping.open)
+        self._pinged[ping.nonce] = [*ping.open, *asked]
         self._send_message(client_ping=ping)
         if self._unanswered_since is None:
             self._unanswered_since = now
@@ -250,35 +251,32 @@ class Requests:
         if pong.nonce not in self._pinged:
             return
         asked = self._pinged[pong.nonce]
-        lost = f"the service at {self._endpoint} was restarted, and the part of the volume that was sent is lost"
-        self._fail_questions(lost, lambda question: question.credited is not None and question.epoch not in (None, pong.epoch))
-        for question in self._questions.values():
-            question.epoch = pong.epoch
-        self._files = {nonce: pong.epoch for nonce, epoch in self._files.items() if epoch in (None, pong.epoch)}
-        self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
-        known = set(pong.known)
-        for request in asked:
-            state = self._open.get(request)
-            if state is None:
-                continue
-            state.unknown_pongs = 0 if request in known else state.unknown_pongs + 1
-            if state.unknown_pongs >= _UNKNOWN_PONGS:
-                state.unknown_pongs = 0
-                self._submit_again(state, now)
+        self._pinged.clear()  # later ones do not ask about what is sent again now
+        self._files -= set(pong.lost)
+        known = {*pong.known, *self._questions} - set(pong.lost)
+        for number in asked:
+            state = self._open.get(number) or self._questions.get(number)
+            if state is not None and number not in known:
+                self._submit_again(number, state, now)
 
-    def _submit_again(self, lost: _Open, now: float) -> None:
-        """The service was restarted and lost the request. The deadline is still that of the first time."""
-        request = lost.message.request
-        left_ms = int((lost.deadline - now) * 1000)
-        if lost.cancelled:
-            self._end(request, Cancelled("the client cancelled the frame"))
+    def _submit_again(self, number: int, lost: _Open | _Question, now: float) -> None:
+        """The service was restarted and lost the request or the question, or its connection broke. The deadline is still that of the first time."""
+        where = f"the service at {self._endpoint}"
+        left_ms = int((lost.deadline - now) * 1000) if isinstance(lost, _Open) else 1
+        lost.resubmits += 1
+        if isinstance(lost, _Open) and lost.cancelled:
+            self._end(number, Cancelled("the client cancelled the frame"))
         elif left_ms < 1:
-            self._end(request, DeadlineExceeded(f"the service at {self._endpoint} lost the request, and its time is over"))
-        elif lost.resubmits < _MOST_RESUBMITS:
-            lost.resubmits += 1
+            self._end(number, DeadlineExceeded(f"{where} lost the request, and its time is over"))
+        elif isinstance(lost, _Question) and lost.again is None:
+            what = "the part of the volume that was sent is lost" if lost.credited else "the order may have been carried out or not"
+            self._end(number, Unavailable(f"{where} was restarted, or its connection broke: {what}"))
+        elif lost.resubmits > _MOST_RESUBMITS:
+            self._end(number, Unavailable(f"{where} lost the request {_MOST_RESUBMITS + 1} times"))
+        elif isinstance(lost, _Question):
+            self._send_message(**lost.again)
+        else:
             again = schema.SubmitFrame()
             again.CopyFrom(lost.message)
             again.deadline_ms = left_ms
             self._send_message(submit_frame=again)
-        else:
-            self._end(request, Unavailable(f"the service at {self._endpoint} lost the request {_MOST_RESUBMITS + 1} times"))

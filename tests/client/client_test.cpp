@@ -6,8 +6,10 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -193,6 +195,103 @@ TEST_F(ClientTest, RequestThatWasLostKeepsItsDeadline) {
   }
   ASSERT_EQ(deadlines.size(), 5U);
   for (std::size_t i = 1; i < 4; ++i) EXPECT_LT(deadlines[i], deadlines[i - 1]) << i;
+}
+
+// A service that has lost what it was asked, `times` times each, and then answers questions. It counts what it was asked.
+auto LosesAndCounts(int times, std::map<std::string, int>& asked) {
+  return [times, &asked](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message))
+      return {{ClientPong{.epoch = 1, .nonce = ping->nonce, .known = ping->open, .lost = ping->asked}, {}}};
+    if (const auto* query = std::get_if<SummaryQuery>(&message)) {
+      if (++asked["question"] <= times) return {};
+      return {{SummaryReply{.nonce = query->nonce}, {}}};
+    }
+    if (const auto* query = std::get_if<StatusQuery>(&message)) {
+      if (++asked["status"] <= times) return {};
+      return {{StatusReply{.nonce = query->nonce}, {}}};
+    }
+    if (const auto* order = std::get_if<DataOrder>(&message)) {
+      if (++asked[order->action == DataAction::kList ? "list" : "order"] <= times) return {};
+      return {{DataReply{.nonce = order->nonce}, {}}};
+    }
+    if (const auto* order = std::get_if<SteerDataset>(&message)) ++asked[order->values.empty() ? "parameters" : "steer"];
+    if (std::holds_alternative<ShutDown>(message)) ++asked["end"];
+    return {};
+  };
+}
+
+TEST_F(ClientTest, QuestionsThatTheServiceForgotAreAskedAgain) {
+  std::map<std::string, int> asked;
+  {
+    FakeService service(context_, "inproc://client-test", LosesAndCounts(3, asked));
+    Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+    EXPECT_TRUE(client.Summarize({.dataset = "ball"}).ok());
+    EXPECT_TRUE(client.QueryStatus(seconds(60)).ok());
+    EXPECT_TRUE(client.OrderData({}, seconds(60)).ok());
+  }
+  EXPECT_EQ(asked, (std::map<std::string, int>{{"question", 4}, {"status", 4}, {"list", 4}}));
+}
+
+TEST_F(ClientTest, QuestionsThatTheServiceAlwaysForgetsFail) {
+  std::map<std::string, int> asked;
+  {
+    FakeService service(context_, "inproc://client-test", LosesAndCounts(1000, asked));
+    Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+    const Status failed = client.Summarize({.dataset = "ball"}).status();
+    EXPECT_EQ(failed.code(), StatusCode::kUnavailable);
+    EXPECT_THAT(failed.message(), testing::AllOf(HasSubstr(service.endpoint()), HasSubstr("lost the request 4 times")));
+    EXPECT_EQ(client.Summarize({.dataset = "ball"}, milliseconds(1)).status().code(), StatusCode::kDeadlineExceeded);
+    EXPECT_EQ(client.Steer({.dataset = "ball"}, seconds(60)).status().code(), StatusCode::kUnavailable);
+  }
+  EXPECT_EQ(asked, (std::map<std::string, int>{{"question", 5}, {"parameters", 4}}));
+}
+
+// They may have been carried out before.
+TEST_F(ClientTest, OrdersThatTheServiceForgotFailAndAreNotSentAgain) {
+  std::map<std::string, int> asked;
+  {
+    FakeService service(context_, "inproc://client-test", LosesAndCounts(1000, asked));
+    Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+    for (const DataAction action : {DataAction::kAdd, DataAction::kRemove, DataAction::kReload}) {
+      const Status failed = client.OrderData({.action = action, .items = {"/ball.nrrd"}}, seconds(60)).status();
+      EXPECT_EQ(failed.code(), StatusCode::kUnavailable);
+      EXPECT_THAT(failed.message(), HasSubstr("the order may have been carried out or not"));
+    }
+    EXPECT_EQ(client.Steer({.dataset = "ball", .values = {{"feed", 1}}}, seconds(60)).status().code(), StatusCode::kUnavailable);
+    EXPECT_EQ(client.ShutDownService(seconds(60)).code(), StatusCode::kUnavailable);
+  }
+  EXPECT_EQ(asked, (std::map<std::string, int>{{"order", 3}, {"steer", 1}, {"end", 1}}));
+}
+
+TEST_F(ClientTest, AQuestionThatWasCancelledIsNotAskedAgain) {
+  std::map<std::string, int> asked;
+  {
+    FakeService service(context_, "inproc://client-test", LosesAndCounts(1000, asked));
+    Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+    client.Cancel(client.Submit(SummaryQuery{.dataset = "ball"}));
+    EXPECT_EQ(client.Steer({.dataset = "ball"}, seconds(60)).status().code(), StatusCode::kUnavailable);
+  }
+  EXPECT_EQ(asked, (std::map<std::string, int>{{"question", 1}, {"parameters", 4}}));
+}
+
+// However many pings it takes.
+TEST_F(ClientTest, AQuestionThatTheServiceKnowsIsAskedOnce) {
+  std::atomic<int> asked = 0, pings = 0;
+  std::atomic<std::uint64_t> nonce = 0;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* query = std::get_if<SummaryQuery>(&message)) {
+      ++asked;
+      nonce = query->nonce;
+    }
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    if (nonce != 0) EXPECT_THAT(ping->asked, testing::ElementsAre(nonce));
+    if (++pings < 10) return {{PongTo(*ping), {}}};
+    return {{SummaryReply{.nonce = nonce}, {}}};
+  });
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), quick_).value();
+  EXPECT_TRUE(client.Summarize({.dataset = "ball"}).ok());
+  EXPECT_EQ(asked, 1);
 }
 
 TEST_F(ClientTest, BadRequestFailsBeforeItIsSent) {

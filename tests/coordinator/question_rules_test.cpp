@@ -75,6 +75,26 @@ TEST_F(QuestionRules, AClientHasOnlySoManyAndNoneAfterItHasGone) {
   EXPECT_THAT(Refusals(script.Step(CoordinatorStopRequested{})), SizeIs(1));
 }
 
+TEST_F(QuestionRules, APongTellsWhichOnesTheCoordinatorDoesNotKnow) {
+  const auto lost = [this](PeerToken from) {
+    const auto pongs = ToClients<ClientPong>(script.Client(from, ClientPing{.nonce = 9, .open = {7}, .asked = {1, 2, 3}}));
+    EXPECT_THAT(pongs, SizeIs(1));
+    EXPECT_EQ(pongs.at(0).message.nonce, 9U);
+    EXPECT_EQ(pongs.at(0).message.known, std::vector<RequestId>(from == kClient ? 1 : 0, 7));
+    return pongs.at(0).message.lost;
+  };
+  script.Client(kClient, Frame(7));
+  script.Client(kClient, Question(1));
+  script.Client(kClient, DataOrder{.nonce = 2, .action = DataAction::kAdd, .items = {"/ball.nrrd"}});
+  EXPECT_THAT(lost(kClient), ElementsAre(3U)) << "an order and a question are open";
+  EXPECT_THAT(lost(kOther), ElementsAre(1U, 2U, 3U)) << "they are another's, such as the same client's before its connection broke";
+  const auto asked = Of<AnswerQuestion>(Loaded());
+  ASSERT_THAT(asked, SizeIs(1));
+  EXPECT_THAT(lost(kClient), ElementsAre(3U)) << "it is being answered";
+  script.Step(QuestionAnswered{asked[0].id, QuestionReply(SampleReply{.nonce = 1})});
+  EXPECT_THAT(lost(kClient), ElementsAre(1U, 3U)) << "the answer was sent before the pong";
+}
+
 TEST_F(QuestionRules, ADatasetThatDoesNotFitIsRefused) {
   ScriptConfig config = TestConfig();
   config.memory_bytes = 400;
@@ -253,6 +273,18 @@ TEST_F(FileRules, TheClientThatHasSentAFileRemovesIt) {
   EXPECT_EQ(script.QueryStatus().datasets.size(), 3U);
   EXPECT_THAT(script.Client(kClient, DropVolume{1}), IsEmpty()) << "it is gone already";
   EXPECT_THAT(Of<BeginUpload>(script.Client(kClient, File(3, "one"))), SizeIs(1)) << "its name is free";
+}
+
+TEST_F(FileRules, APongTellsWhichOnesTheCoordinatorDoesNotHave) {
+  const auto lost = [this](PeerToken from) {
+    return ToClients<ClientPong>(script.Client(from, ClientPing{.asked = {1, 2}})).at(0).message.lost;
+  };
+  Arrive(kClient, 1, "one");
+  Begin(kClient, File(2, "two"));
+  EXPECT_THAT(lost(kClient), IsEmpty()) << "one is there, one on its way";
+  EXPECT_THAT(lost(kOther), ElementsAre(1U, 2U));
+  script.Client(kOther, DataOrder{.action = DataAction::kRemove, .items = {"one"}});
+  EXPECT_THAT(lost(kClient), ElementsAre(1U)) << "an admin has removed it";
 }
 
 TEST_F(FileRules, FilesGoWithTheirClient) {

@@ -12,6 +12,7 @@
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/loopback_listener.h"
 
 namespace slabstream {
 namespace {
@@ -172,6 +173,49 @@ TEST_F(ServiceTest, DownLeavesNothingBehind) {
   const ProgramResult again = Slabstream({"down", "--endpoint", endpoint_});
   EXPECT_EQ(again.exit_status, 1);
   EXPECT_THAT(again.err_lines(), testing::ElementsAre("slabstream down: no service runs at " + endpoint_));
+}
+
+// None is named, and this user has started none: no command asks whoever listens at the usual port, or waits for somebody.
+TEST_F(ServiceTest, WithoutAServiceEachCommandSaysSoInALine) {
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"status"},
+                                                  {"down"},
+                                                  {"render", "ball", "-o", "x.png"},
+                                                  {"turntable", "ball", "--frames", "2", "-o", "x%d.png"},
+                                                  {"info", "ball"},
+                                                  {"value", "ball", "--at", "1,1,1"},
+                                                  {"measure", "ball"},
+                                                  {"view", "ball", "--no-browser"},
+                                                  {"data", "list"},
+                                                  {"data", "add", "x=" + ball_},
+                                                  {"data", "remove", "ball"},
+                                                  {"steer", "ball"},
+                                                  {"keys", "list"}}) {
+    const ProgramResult result = Slabstream(command);
+    EXPECT_EQ(result.exit_status, 1) << command[0];
+    EXPECT_THAT(result.err_lines(), testing::ElementsAre(testing::AnyOf(
+                                        HasSubstr("no service is named, and `slabstream up` of this user has started none here"),
+                                        HasSubstr("no service runs here"))))
+        << command[0];
+    EXPECT_EQ(result.out, "") << command[0];
+  }
+  RunningProgram gateway({Command({}).front() + "-gateway"}, directory_);
+  const ProgramResult refused = gateway.Wait();
+  EXPECT_EQ(refused.exit_status, 1);
+  EXPECT_THAT(refused.err_lines(), testing::ElementsAre(HasSubstr("slabstream-gateway: no service is named")));
+}
+
+// A port or a path where nobody listens refuses at once, which the answer tells: else it would be that nobody answers within 4 s.
+TEST_F(ServiceTest, StatusAndDownDoNotWaitWhereNobodyListens) {
+  const LoopbackListener listener = ListenOnLoopback();
+  ::close(listener.socket);
+  for (const std::string& endpoint :
+       {"tcp://127.0.0.1:" + std::to_string(listener.port), "tcp://localhost:" + std::to_string(listener.port), endpoint_}) {
+    for (const std::string command : {"status", "down"}) {
+      const ProgramResult result = Slabstream({command, "--endpoint", endpoint});
+      EXPECT_EQ(result.exit_status, 1);
+      EXPECT_THAT(result.err_lines(), testing::ElementsAre("slabstream " + command + ": no service runs at " + endpoint));
+    }
+  }
 }
 
 TEST_F(ServiceTest, DownEndsProcessesThatDoNotAnswer) {

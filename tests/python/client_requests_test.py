@@ -98,19 +98,29 @@ class RequestsTest(unittest.TestCase):
         for ping in self.pings():
             self.receive(client_pong=schema.ClientPong(nonce=ping.nonce, known=known))
 
-    def test_what_two_pongs_do_not_know_is_submitted_again_with_what_is_left_of_its_time(self) -> None:
+    def test_what_a_pong_does_not_know_is_submitted_again_with_what_is_left_of_its_time(self) -> None:
         request = self.submit(deadline=60)
-        self.answer_pings([])
-        self.answer_pings([request])  # known again: it was on its way
-        self.answer_pings([])
+        self.taken()
+        self.answer_pings([request])
         self.assertEqual(self.taken(), [])
         self.answer_pings([])
         again = self.sent[0].submit_frame
-        self.assertEqual((again.request, again.deadline_ms, again.frame.dataset), (request, 56000, "ball"))
+        self.assertEqual((again.request, again.deadline_ms, again.frame.dataset), (request, 58000, "ball"))
+
+    def test_pings_that_were_under_way_do_not_submit_it_once_more(self) -> None:
+        self.submit()
+        self.taken()
+        for _ in range(3):
+            self.now += PING_SECONDS
+            self.requests.tick(self.now)
+        pings = self.pings()
+        for ping in pings:
+            self.receive(client_pong=schema.ClientPong(nonce=ping.nonce))
+        self.assertEqual((len(pings), self.taken()), (3, ["submit_frame"]))
 
     def test_a_request_is_lost_four_times_at_most(self) -> None:
         self.submit(deadline=600)
-        for _ in range(8):
+        for _ in range(4):
             self.answer_pings([])
         self.assertIsInstance(self.watcher.told[0], ss.Unavailable)
         self.assertIn("lost the request 4 times", str(self.watcher.told[0]))
@@ -119,15 +129,77 @@ class RequestsTest(unittest.TestCase):
         request = self.submit()
         self.requests.cancel(request)
         self.answer_pings([])
-        self.answer_pings([])
         self.assertEqual(self.taken(), [])
         self.assertIsInstance(self.watcher.told[0], ss.Cancelled)
 
     def test_a_lost_request_whose_time_is_over_fails(self) -> None:
-        self.submit(deadline=1.5)
-        self.answer_pings([])
+        self.submit(deadline=1)
         self.answer_pings([])
         self.assertIsInstance(self.watcher.told[0], ss.DeadlineExceeded)
+
+    def ask(self, kind: str, message) -> tuple[int, concurrent.futures.Future]:
+        answer: concurrent.futures.Future = concurrent.futures.Future()
+        nonce = next(self.requests.numbers)
+        self.requests.ask(nonce, kind, message, answer, self.now)
+        self.taken()
+        return nonce, answer
+
+    def lose(self, pongs: int) -> None:
+        """The service has nothing of what it is asked about."""
+        for _ in range(pongs):
+            self.now += PING_SECONDS
+            self.requests.tick(self.now)
+            ping = self.pings()[-1]
+            self.receive(client_pong=schema.ClientPong(nonce=ping.nonce, lost=ping.asked))
+
+    def test_what_changes_nothing_and_is_lost_is_asked_again(self) -> None:
+        for kind, message in (("summary_query", schema.SummaryQuery(dataset="ball")), ("status_query", schema.StatusQuery()),
+                              ("data_order", schema.DataOrder(action=schema.DATA_ACTION_LIST)), ("steer_dataset", schema.SteerDataset(dataset="ball"))):
+            with self.subTest(kind=kind):
+                nonce, answer = self.ask(kind, message)
+                self.answer_pings([])  # it is known: none of those asked about is lost
+                self.assertEqual(self.taken(), [])
+                self.lose(1)
+                self.assertEqual([(each.WhichOneof("message"), getattr(each, kind).nonce) for each in self.sent], [(kind, nonce)])
+                self.lose(3)
+                self.assertRegex(str(answer.exception(0)), "ipc:///s lost the request 4 times")
+
+    def test_an_order_that_is_lost_fails_and_is_not_sent_again(self) -> None:
+        for kind, message in (("data_order", schema.DataOrder(action=schema.DATA_ACTION_ADD, items=[b"/ball.nrrd"])),
+                              ("data_order", schema.DataOrder(action=schema.DATA_ACTION_REMOVE, items=[b"ball"])),
+                              ("steer_dataset", schema.SteerDataset(dataset="ball", values=[schema.SteeredValue(name="feed", value=1)]))):
+            with self.subTest(kind=kind):
+                _, answer = self.ask(kind, message)
+                self.lose(1)
+                self.assertEqual(self.taken(), [])
+                self.assertIsInstance(answer.exception(0), ss.Unavailable)
+                self.assertIn("the order may have been carried out or not", str(answer.exception(0)))
+
+    def test_a_question_that_nobody_waits_for_is_not_asked_again(self) -> None:
+        nonce, _ = self.ask("summary_query", schema.SummaryQuery(dataset="ball"))
+        request = self.submit()
+        self.requests.forget(nonce)
+        self.taken()
+        self.answer_pings([request])
+        self.assertEqual(self.taken(), [])
+
+    def test_a_file_is_told_of_until_it_is_lost(self) -> None:
+        nonce, answer = self.ask("add_volume", schema.AddVolume(name="mesh", file=schema.SentFile(name="mesh.vtk", bytes=3)))
+        self.receive(data_reply=schema.DataReply(nonce=nonce))
+        self.assertIsNone(answer.exception(0))
+        self.answer_pings([])
+        self.assertTrue(self.requests.has_file(nonce))
+        self.lose(1)
+        self.assertFalse(self.requests.has_file(nonce))
+        self.requests.drop_file(nonce)
+        self.assertEqual(self.taken(), [])
+
+    def test_a_volume_that_is_lost_on_its_way_fails(self) -> None:
+        answer: concurrent.futures.Future = concurrent.futures.Future()
+        nonce = next(self.requests.numbers)
+        self.requests.ask(nonce, "add_volume", schema.AddVolume(name="sent"), answer, self.now, lambda _: None)
+        self.lose(1)
+        self.assertIn("the part of the volume that was sent is lost", str(answer.exception(0)))
 
     def test_a_ping_tells_each_mebibyte_of_payload(self) -> None:
         request = self.submit()

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import contextlib
 import functools
 import http.server
 import inspect
@@ -378,6 +379,14 @@ class Addresses(InAFolder):
         with self.assertRaisesRegex(ss.Unavailable, "no service answers at ipc:///.*/none within 200 ms"):
             ss.connect(endpoint=f"ipc://{self.folder}/none", timeout=0.2)
 
+    def test_only_a_service_of_this_user_is_meant_if_none_is_named(self) -> None:
+        """Whoever listens at the usual port is not asked."""
+        alone = {name: value for name, value in os.environ.items() if not name.startswith("SLABSTREAM_")} | {"XDG_RUNTIME_DIR": str(self.folder)}
+        for connect in (ss.connect, ss.connect_async):
+            with unittest.mock.patch.dict(os.environ, alone, clear=True), \
+                    self.assertRaisesRegex(ss.Unavailable, "no service is named, and `slabstream up` of this user has started none here that runs"):
+                connect()
+
     def test_endpoints_that_are_wrong(self) -> None:
         for endpoint, sentence in (
             ("http://localhost", "expected tcp://HOST:PORT or ipc:///PATH"),
@@ -499,6 +508,65 @@ class Endings(InAFolder):
             self.coordinator()
             self.start("slabstream-worker", "--coordinator", f"ipc://{self.folder}/s.workers", "--threads", "1")
             self.assertEqual(frame.result(timeout=60).size, (25, 25))
+
+    def test_a_question_outlives_its_coordinator(self) -> None:
+        """The dataset is behind a web server that keeps the coordinator waiting, so the question is under way when the coordinator is killed."""
+        asked, may_answer = threading.Event(), threading.Event()
+        may_answer.set()
+
+        class Store(http.server.SimpleHTTPRequestHandler):
+            def do_GET(self) -> None:
+                if not may_answer.is_set():
+                    asked.set()
+                    may_answer.wait(60)
+                with contextlib.suppress(OSError):  # whoever asked was killed
+                    super().do_GET()
+
+            def log_message(self, *_) -> None:
+                pass
+
+        write_cells(self.folder)
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Store, directory=self.folder))
+        self.addCleanup(server.server_close)
+        self.addCleanup(server.shutdown)
+        self.addCleanup(may_answer.set)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        self.data = f"cells=http://127.0.0.1:{server.server_port}/cells.ome.zarr"
+
+        def by_command() -> float:
+            done = subprocess.run([PROGRAM, "value", "cells", "--at", "4,8,8", "--json", "--endpoint", f"ipc://{self.folder}/s"],
+                                  capture_output=True, text=True, timeout=100)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            return json.loads(done.stdout)["value"]
+
+        for ask in (by_command, lambda: service.value("cells", (4, 8, 8), timeout=100).value):
+            first = self.coordinator()
+            with ss.connect(endpoint=f"ipc://{self.folder}/s") as service, concurrent.futures.ThreadPoolExecutor() as pool:
+                asked.clear()
+                may_answer.clear()
+                value = pool.submit(ask)
+                self.assertTrue(asked.wait(60))
+                first.kill()
+                first.wait()
+                may_answer.set()
+                second = self.coordinator()
+                self.assertAlmostEqual(value.result(60), 200, delta=1)
+            second.kill()
+            second.wait()
+
+    def test_a_question_about_what_the_next_coordinator_does_not_have_fails(self) -> None:
+        self.data = write_volumes(self.folder)
+        first = self.coordinator()
+        with ss.connect(endpoint=f"ipc://{self.folder}/s") as service, concurrent.futures.ThreadPoolExecutor() as pool:
+            service.status()
+            first.send_signal(signal.SIGSTOP)
+            value = pool.submit(service.value, "head", (0, 10, 30), timeout=100)
+            first.kill()
+            first.wait()
+            self.data = f"other={self.folder}/head.nrrd"
+            self.coordinator()
+            with self.assertRaisesRegex(ss.NotFound, 'no dataset "head": the catalogue has other'):
+                value.result(60)
 
     def test_a_service_that_has_gone_is_noticed(self) -> None:
         self.data = write_volumes(self.folder)

@@ -56,7 +56,7 @@ class SLABSTREAM_API Error : public std::runtime_error {
 using Options = std::vector<std::pair<std::string, std::string>>;
 
 // Where a service is. With both, the endpoint is another way to the service of the file. With neither: the file that $SLABSTREAM_SERVICE
-// names, else $SLABSTREAM_ENDPOINT, else the service that `slabstream up` started here last, else tcp://127.0.0.1:7420.
+// names, else $SLABSTREAM_ENDPOINT, else the service that `slabstream up` of this user started here last.
 struct Address {
   std::string endpoint = {};      // "tcp://HOST:PORT" or "ipc://PATH"
   std::string service_file = {};  // with the keys of a service that has some, such as "client.json"; connections are encrypted then

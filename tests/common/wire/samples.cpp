@@ -557,12 +557,12 @@ std::vector<CancelFrame> SamplesOf() {
 
 template <>
 std::vector<ClientPing> SamplesOf() {
-  return {{}, {kMax64, {0, kMax64}, kMax64, kMax64}};
+  return {{}, {kMax64, {0, kMax64}, kMax64, kMax64, {kMax64, 0}}};
 }
 
 template <>
 std::vector<ClientPong> SamplesOf() {
-  return {{}, {kMax64, kMax64, {kMax64, 0}, PictureSenders{kMax64, {kKey, kKey}}}, {1, 2, {}, PictureSenders{}}};
+  return {{}, {kMax64, kMax64, {kMax64, 0}, PictureSenders{kMax64, {kKey, kKey}}, {0, kMax64}}, {1, 2, {}, PictureSenders{}}};
 }
 
 template <>
