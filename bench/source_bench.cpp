@@ -30,7 +30,7 @@ class ReadyChunks : public ChunkedArray {
 
   const ArrayShape& shape() const override { return shape_; }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) override {
     constexpr std::uint64_t kCount = kSide / kChunk;
     const Bytes& chunk = chunks_[(index[0] * kCount + index[1]) * kCount + index[2]];
     context_->PostDecode([&chunk, done = std::move(done)] { done(std::optional(StoredChunk{chunk, chunk.size()})); });

@@ -6,6 +6,7 @@
 
 #include "common/volume/memory_budget.h"
 #include "coordinator/datasets/dataset_machine_state.h"
+#include "data/sources/read_context.h"
 
 namespace slabstream {
 
@@ -50,6 +51,21 @@ void DatasetMachine::State::On(const ForgetClient& event) {
   }
   RemoveFilesOf(event.client);
   std::erase_if(questions, [&](const auto& open) { return open.second.client == event.client; });
+}
+
+// What servers send, and nobody has waited for a while.
+void DatasetMachine::State::GiveUpLoads() {
+  next_give_up = Time::max();
+  datasets.ForEach([this](const std::string& name, DatasetTable::Entry& entry) {
+    if (entry.state != DatasetState::kLoading) return;
+    const SourceAtLevel* const level = entry.source.at_level.get();
+    if (ServerOf(level != nullptr ? level->stored.source : entry.source.path).empty()) return;
+    if (entry.goes_on || IsWanted(name)) return entry.left.reset();
+    const Time until = entry.left.value_or(now) + kUnwanted;
+    if (now >= until) return void(datasets.Unload(name, now));
+    entry.left = until - kUnwanted;
+    next_give_up = std::min(next_give_up, until);
+  });
 }
 
 void DatasetMachine::State::On(const FinishStatus& event) {
@@ -389,8 +405,11 @@ bool DatasetMachine::State::IsAwaited(DatasetId dataset) const {
 
 void DatasetMachine::State::LoadData(const std::string& name) {
   const LoadId load = datasets.BeginLoad(name, now);
-  actions.emplace_back(
-      LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source, .most_bytes = DatasetShare(config.memory_bytes)});
+  actions.emplace_back(LoadDataset{.name = name,
+                                   .load = load,
+                                   .source = datasets.Find(name)->source,
+                                   .most_bytes = DatasetShare(config.memory_bytes),
+                                   .stop = datasets.Find(name)->loading->stop.get_token()});
   TellUses(name);
 }
 
@@ -521,6 +540,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
   const bool may_grow = datasets.Find(name)->MayGrow();
   datasets.Reset(name, now);
   if (IsWanted(name) || may_grow) LoadData(name);
+  datasets.Find(name)->goes_on = may_grow;
 }
 
 // Once those that render now have ended.
@@ -640,7 +660,8 @@ void DatasetMachine::State::On(const BadRequest& event) {
 }
 
 Time DatasetMachine::State::NextWake() const {
-  return stopped || datasets.folders.empty() || folder_checks.UnderWay() ? Time::max() : next_round;
+  if (stopped) return Time::max();
+  return datasets.folders.empty() || folder_checks.UnderWay() ? next_give_up : std::min(next_round, next_give_up);
 }
 
 DatasetMachine::DatasetMachine(DatasetConfig config) : state_(std::make_unique<State>(std::move(config))) {}
@@ -658,6 +679,7 @@ std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time 
   std::visit([&state](const auto& e) { state.On(e); }, event);
   if (!state.stopped) {
     if (now >= state.NextWake()) state.CheckEverything();
+    state.GiveUpLoads();
     state.AskExecutor();
     if (std::exchange(state.parts_came, false)) state.ClosePartsThatNobodyWants();
     state.UnloadRetired();

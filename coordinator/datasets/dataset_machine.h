@@ -3,7 +3,8 @@
 //
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
 //              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
-//              cannot be loaded for want of memory.
+//              cannot be loaded for want of memory. What a server sends is given up kUnwanted after the last one who waited for it left:
+//              another request may come at once, and servers may never answer.
 //   levels     A dataset with several levels is only opened. A request seeks the levels that it draws (LevelsOf), and these are loaded.
 //   files      A frame of a dataset begins only after a check of its files that began after the request came. If they have changed, they
 //              are read anew, and what has not begun waits. Frames that have begun end with the voxels that they began with, which stay
@@ -27,6 +28,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <variant>
 #include <vector>
@@ -44,6 +46,8 @@ namespace slabstream {
 using OrderId = std::uint64_t;     // an order about datasets that waits; a number is never given twice
 using QuestionId = std::uint64_t;  // a question that waits; a number is never given twice
 using UploadId = std::uint64_t;    // a dataset that a client sends; a number is never given twice
+
+inline constexpr Duration kUnwanted = std::chrono::seconds(5);
 
 struct DatasetConfig {
   Catalogue datasets;
@@ -148,6 +152,7 @@ struct LoadDataset {
   LoadId load = 0;
   DataSource source;
   std::uint64_t most_bytes = 0;  // the most voxels that may be held; more stay where they are, if the source can be read in parts
+  std::stop_token stop = {};     // told to stop once nobody waits for the end any more
 };
 // Its voxels are not needed any more.
 struct UnloadDataset {
@@ -183,6 +188,7 @@ struct AnswerQuestion {
   // A SummaryQuery about the time that it names, and not about all: range and histogram are those of the voxels, which `summary` is not of.
   bool at_time = false;
   CoarserVolume labels = {};  // `summary` is null: there are none, or it does not need them; `dataset` is 0 of a SummaryQuery
+  std::stop_token stop = {};  // told to stop once nobody waits for the answer any more
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

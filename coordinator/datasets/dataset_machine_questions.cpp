@@ -188,6 +188,7 @@ void DatasetMachine::State::AskExecutor() {
     AnswerQuestion ask{id,          open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr,
                        open.fields, at_time};
     if (!open.labels.name.empty()) ask.labels = known(open.labels);
+    ask.stop = open.answer->stop.get_token();
     actions.emplace_back(std::move(ask));
   }
   for (const auto& [id, why] : wrong) {

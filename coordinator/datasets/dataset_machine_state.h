@@ -80,6 +80,7 @@ struct DatasetMachine::State {
     std::vector<Use::Entry> others = {};                     // of fields.others
     std::vector<Use::Entry> shapes = {};                     // of the shapes in the picture that it is about
     std::vector<Use::Entry> planes = {};                     // of its planes, once the voxels are there
+    std::shared_ptr<Wanted> answer = std::make_shared<Wanted>();
 
     // All of them.
     std::vector<Use::Entry> entries() const {
@@ -120,6 +121,7 @@ struct DatasetMachine::State {
   UploadId last_upload = 0;
   CheckCounter folder_checks;
   Time next_round;                                          // when the folders are looked through, if there are any
+  Time next_give_up = Time::max();                          // when a load may be given up
   Time times_seen;                                          // when somebody was last told how many times datasets have
   std::map<std::string, std::set<std::string>> complaints;  // about what lies in each folder
   bool folders_asked_for = false;                           // by a client, since the last check began
@@ -203,6 +205,7 @@ struct DatasetMachine::State {
   }
   bool InUse(DatasetId dataset) const { return IsKept(dataset) || IsAwaited(dataset); }
   void ClosePartsThatNobodyWants();
+  void GiveUpLoads();
 
   // ---- voxels
   void LoadData(const std::string& name);

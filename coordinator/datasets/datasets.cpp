@@ -147,6 +147,7 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   entry.since = now;
   entry.error.clear();
   entry.read = {};
+  entry.loading = std::make_shared<Wanted>();
   return entry.load = ++last_load_;
 }
 
@@ -158,6 +159,7 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   if (!IsLoading(name, load)) return false;
   Entry* const entry = Find(name);
   CHECK(summary != nullptr) << name;
+  entry->loading->End();
   entry->state = DatasetState::kReady;
   entry->since = now;
   entry->id = id;
@@ -174,6 +176,7 @@ bool DatasetTable::Opened(const std::string& name, LoadId load, std::shared_ptr<
                           std::shared_ptr<const FileStamp> stamp, std::shared_ptr<const DatasetFields> fields, Time now) {
   if (!IsLoading(name, load)) return false;
   Entry& entry = *Find(name);
+  entry.loading->End();
   entry.state = DatasetState::kReady;
   entry.since = now;
   entry.levels = std::move(levels);

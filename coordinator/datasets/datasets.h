@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,16 @@ inline std::string Named(const std::string& entry) {
   return (IsLevelName(entry) ? "level " : "") + entry.substr(last + 1) + " of " + Named(entry.substr(0, last));
 }
 
+// Work that is told to stop when nobody waits for it any more: when the last holder of this drops it.
+struct Wanted {
+  Wanted() = default;
+  ~Wanted() { stop.request_stop(); }
+  void End() { stop = std::stop_source(std::nostopstate); }  // it is done
+  Wanted(const Wanted&) = delete;
+  Wanted& operator=(const Wanted&) = delete;
+  std::stop_source stop;
+};
+
 class DatasetTable {
  public:
   struct Entry {
@@ -70,6 +81,9 @@ class DatasetTable {
     DatasetState state = DatasetState::kUnloaded;
     Time since;                                    // in this state
     LoadId load = 0;                               // the last one begun; 0: none
+    std::shared_ptr<Wanted> loading = {};          // kLoading only
+    std::optional<Time> left;                      // kLoading only: since when nobody waits for it
+    bool goes_on = false;                          // kLoading only: whether anybody waits or not
     ReadShare read;                                // kLoading only: of its samples, as far as is known
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only

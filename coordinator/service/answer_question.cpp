@@ -220,7 +220,7 @@ Result<VoxelBlock> ReadBox(const VoxelServer::Samples::InParts& from, const Box&
   const std::int64_t bytes = box.voxel_count() * std::int64_t(BytesPerSample(type));
   if (Status fits = CheckFitsMemory(bytes, "the box"); !fits.ok()) return fits;
   VoxelBlock block = MakeVoxelBlock(box, type);
-  if (Status read = from.source->ReadNow(from.level, box, block.bytes); !read.ok()) return read;
+  if (Status read = from.source->ReadNow(from.level, box, block.bytes, from.stop); !read.ok()) return read;
   return block;
 }
 
@@ -238,7 +238,7 @@ class ReadVoxels {
     const ExactType& of = from_.source->info().exact;
     std::array<std::byte, sizeof(std::uint64_t)> sample{};
     const Box box = {voxel, voxel + Uniform(1)};
-    if (status_.ok()) status_ = from_.source->ReadNow(from_.level, box, BoxRoom::Dense(box, sample.data(), true));
+    if (status_.ok()) status_ = from_.source->ReadNow(from_.level, box, BoxRoom::Dense(box, sample.data(), true), from_.stop);
     return ExactValueOf(of, sample.data());
   }
 

@@ -26,20 +26,21 @@
 #include "data/catalogue/dataset_fields.h"
 #include "data/catalogue/shape_data.h"
 #include "data/owned/owned_source.h"
+#include "data/sources/read_context.h"
+#include "data/stores/store.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {
 
-// The server that a source is read from, whose tasks may hold up each other. 0: it lies in files.
-FairTasks::Owner ServerOf(std::string_view source) {
-  if (SchemeOf(source).empty()) return 0;
-  if (const std::size_t endpoint = source.find(kEndpointMark); endpoint != std::string_view::npos) {
-    source.remove_prefix(endpoint + kEndpointMark.size());
-  }
-  while (!SchemeOf(source).empty()) source.remove_prefix(SchemeOf(source).size() + 3);
-  return std::hash<std::string_view>()(source.substr(0, source.find('/')));
+// The tasks of a server may hold up each other. 0: of files.
+FairTasks::Owner OwnerOf(std::string_view server) { return server.empty() ? 0 : std::hash<std::string_view>()(server); }
+
+// Those that are read are read until `stop` is told to stop.
+VoxelServer::Samples Stoppable(VoxelServer::Samples samples, const std::stop_token& stop) {
+  samples.in_parts.stop = stop;
+  return samples;
 }
 
 // Whether at least half of the volume's bricks hold one value each.
@@ -185,7 +186,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadPlane(const LoadDataset& 
   const auto read = [&](const Box& box) -> Result<VoxelBlock> {
     VoxelBlock block = MakeVoxelBlock(box, description.type);
     if (const auto& from = samples.in_parts; from.source != nullptr) {
-      if (Status status = from.source->ReadNow(from.level, box, block.bytes); !status.ok()) return status;
+      if (Status status = from.source->ReadNow(from.level, box, block.bytes, from.stop); !status.ok()) return status;
     } else {
       samples.view().Read(box, 0, block.bytes);
     }
@@ -289,22 +290,23 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   if (const PlaneOfVoxels* const plane = action.source.plane.get()) {
     const std::optional<StoredAt>& stored = plane->summary->stored;
     return Post(
-        answers_.Of(stored ? ServerOf(stored->source) : 0), barrier.c_str(),
-        [action, samples = voxels_.Find(plane->voxels)] { return LoadPlane(action, samples); },
+        answers_.Of(OwnerOf(stored ? ServerOf(stored->source) : "")), barrier.c_str(),
+        [action, samples = Stoppable(voxels_.Find(plane->voxels), action.stop)] { return LoadPlane(action, samples); },
         EndOf<DatasetFailed>(action.name, action.load));
   }
   const auto load = [action, inbox = inbox_] {
     const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
+    const StoresStop stop(action.stop);
     Result<News> news = Load(action, tell);
     if (news.ok() || action.source.sent == nullptr) return news;
     return Result<News>(action.source.sent->ForClient(news.status()));
   };
   const auto failed = EndOf<DatasetFailed>(action.name, action.load);
   const DataSource& source = action.source;
-  const FairTasks::Owner server = source.open ? std::hash<std::string>()(action.name)  // who may wait for owners of voxels
-                                              : ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
-  if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
-  return Post(loads_, barrier.c_str(), load, failed);
+  // It may wait for owners of voxels.
+  return Post(
+      loads_.Of(OwnerOf(source.open ? action.name : ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path))),
+      barrier.c_str(), load, failed);
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
@@ -314,13 +316,13 @@ BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CheckDatasetFiles& action) {
   return PostResult(
-      checks_, "checking the files of a dataset", [stamp = action.stamp] { return HaveChanged(*stamp); },
-      EndOf<DatasetSeen>(action.name, action.load));
+      checks_.Of(OwnerOf(action.stamp->ask ? action.name : "")), "checking the files of a dataset",
+      [stamp = action.stamp] { return HaveChanged(*stamp); }, EndOf<DatasetSeen>(action.name, action.load));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action) {
   return Post(
-      checks_, "searching the watched folders", [action, memory = folders_] { return News{Check(action, *memory)}; },
+      checks_.Of(0), "searching the watched folders", [action, memory = folders_] { return News{Check(action, *memory)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};
@@ -329,20 +331,29 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
   return PostResult(
-      checks_, "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
+      checks_.Of(0), "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
-  const std::optional<StoredAt>& stored = action.summary->stored;
+  std::string server;  // any that it may wait for
+  const auto find = [&](DatasetId dataset, const VolumeSummary* summary) {
+    if (server.empty() && summary != nullptr && summary->stored) server = ServerOf(summary->stored->source);
+    return Stoppable(voxels_.Find(dataset), action.stop);
+  };
+  const VoxelServer::Samples samples = find(action.dataset, action.summary.get());
+  const VoxelServer::Samples labels = find(action.labels.dataset, action.labels.summary.get());
   std::vector<VoxelServer::Samples> others, shapes;
-  for (const FieldVolume& field : action.fields.others) others.push_back(voxels_.Find(field.levels.front().dataset));
+  for (const FieldVolume& field : action.fields.others) {
+    others.push_back(find(field.levels.front().dataset, field.levels.front().summary.get()));
+  }
   for (const auto* const of : {&action.fields.shapes, &action.fields.planes}) {
-    for (const CoarserVolume& shape : *of) shapes.push_back(voxels_.Find(shape.dataset));
+    for (const CoarserVolume& shape : *of) shapes.push_back(find(shape.dataset, shape.summary.get()));
   }
   return PostResult(
-      answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset), others = std::move(others), labels = voxels_.Find(action.labels.dataset),
-       shapes = std::move(shapes)] { return AnswerTo(action, samples, others, labels, shapes); },
+      answers_.Of(OwnerOf(server)), "an answer to a question",
+      [action, samples, others = std::move(others), labels, shapes = std::move(shapes)] {
+        return AnswerTo(action, samples, others, labels, shapes);
+      },
       EndOf<QuestionAnswered>(action.id));
 }
 
@@ -350,7 +361,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {
   const UploadId upload = action.upload;
   uploads_[upload] = nullptr;
   return Post(
-      loads_, "taking memory for a volume",
+      loads_.Of(0), "taking memory for a volume",
       [upload, order = std::move(action.order)] {
         const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
         return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
@@ -366,7 +377,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
 BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
   const auto whole = uploads_.extract(action.upload);
   return PostResult(
-      loads_, "finishing a volume", [buffer = whole.mapped()] { return buffer->Finish(); }, EndOf<UploadFinished>(action.upload));
+      loads_.Of(0), "finishing a volume", [buffer = whole.mapped()] { return buffer->Finish(); }, EndOf<UploadFinished>(action.upload));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {

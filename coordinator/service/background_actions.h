@@ -1,9 +1,8 @@
 // BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets
-// from files or take memory for uploads, up to kFarLoadsAtOnce load datasets from servers, kLoadsAtOnce from each, up to kChecksAtOnce
-// check files, up to kAnswersAtOnce answer questions about voxels, two about those of one server or of all files, up to kCountsAtOnce count
-// occupied voxels, each of another dataset, and up to kPlansAtOnce plan, each for another client. None waits for another, and who has used
-// least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as events for the machines. A
-// plan that is dropped stops soon.
+// from files or take memory for uploads, up to kChecksAtOnce check files, up to kAnswersAtOnce answer questions about voxels of files, and
+// as many of each beside them about what lies at each server; up to kCountsAtOnce count occupied voxels, each of another dataset, and up to
+// kPlansAtOnce plan, each for another client. None waits for another, and who has used least time is next (FairTasks). An exception in one
+// fails only what it was doing. What they find comes back as events for the machines. A plan that is dropped stops soon.
 //
 // One thread uses an object of this class: the one that runs the machines.
 #pragma once
@@ -16,7 +15,6 @@
 #include <stop_token>
 
 #include "common/classification/count_occupied.h"
-#include "common/threads/background_tasks.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/datasets/dataset_machine.h"
 #include "coordinator/frames/frame_machine.h"
@@ -36,9 +34,9 @@ using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const Clas
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
-inline constexpr std::size_t kFarLoadsAtOnce = 16;  // so three servers that do not answer leave the others alone
-inline constexpr std::size_t kAnswersAtOnce = 8;    // so one server that does not answer leaves the others alone
-inline constexpr std::size_t kChecksAtOnce = 4;     // so one file system that does not answer leaves the others alone
+inline constexpr std::size_t kAnswersAtOnce = 2;
+inline constexpr std::size_t kMostThreads = 1024;  // of each kind: files never wait for servers, and a thread that waits costs little
+inline constexpr std::size_t kChecksAtOnce = 4;    // so one file system that does not answer leaves the others alone
 inline constexpr std::size_t kCountsAtOnce = 4;
 inline constexpr std::size_t kPlansAtOnce = 8;
 
@@ -97,8 +95,7 @@ class BackgroundActions {
   const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
-  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce};
-  FairTasks far_loads_{kFarLoadsAtOnce, kLoadsAtOnce}, answers_{kAnswersAtOnce, 2};  // by server
+  FairTasks loads_{kMostThreads, kLoadsAtOnce}, checks_{kMostThreads, kChecksAtOnce}, answers_{kMostThreads, kAnswersAtOnce};  // by server
   FairTasks counts_{kCountsAtOnce}, planning_{kPlansAtOnce};
 };
 

@@ -16,6 +16,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -54,6 +55,7 @@ class VoxelServer {
     struct InParts {
       std::shared_ptr<VolumeSource> source = nullptr;
       int level = 0;
+      std::stop_token stop = {};  // of who reads it
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
     std::shared_ptr<VolumeSource> read_from = nullptr;  // where `volume` was read from, if chunks tell what was read of it

@@ -40,7 +40,7 @@ class BoxArray : public ChunkedArray, public std::enable_shared_from_this<BoxArr
 
   const ArrayShape& shape() const override { return shape_; }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) override {
     const std::uint64_t first = index[0] * shape_.chunk[0], slice = shape_.size[1] * shape_.size[2];
     ArrayBox box{{begin_ + first * slice}, {std::min(shape_.chunk[0], shape_.size[0] - first) * slice}};
     if (values_->shape().size.size() == 2) {

@@ -98,14 +98,14 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
   const ArrayShape& shape() const override { return shape_; }
   std::string NameOf(std::span<const std::uint64_t> index) const override { return store_->name() + "/" + KeyOf(index); }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted) override {
     const std::string key = KeyOf(index);
     // What does not shrink becomes a little longer.
     constexpr std::uint64_t kOverhead = 65536;
     auto decode = [self = shared_from_this(), what = store_->name() + "/" + key, done = std::move(done)](Result<Bytes> answer) {
       self->Decode(what, std::move(answer), done);
     };
-    store_->Read(key, {}, 2 * shape_.chunk_bytes() + kOverhead, std::move(decode));
+    store_->Read(key, {}, 2 * shape_.chunk_bytes() + kOverhead, std::move(decode), std::move(wanted));
   }
 
  private:

@@ -38,12 +38,12 @@ VolumeFormat Zarr();
 
 namespace {
 
-// A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again. A small level, of which a survey
+// A third of it, at most twice 128 MiB, for chunks under way, the rest for those that may be needed again. A small level, of which a survey
 // from afar reads all, is then read once more by who holds it.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
   constexpr std::uint64_t kLeast = 8U << 20, kMostUnderWay = 128U << 20;
-  const std::uint64_t all = std::max(SourceBytes(process_bytes), 2 * kLeast), under_way = std::clamp(all / 4, kLeast, kMostUnderWay);
-  return {.under_way_bytes = under_way, .cache_bytes = all - under_way, .small_bytes = std::uint64_t(kFarSurvey.exact)};
+  const std::uint64_t all = std::max(SourceBytes(process_bytes), 3 * kLeast), under_way = std::clamp(all / 6, kLeast, kMostUnderWay);
+  return {.under_way_bytes = under_way, .cache_bytes = all - 2 * under_way, .small_bytes = std::uint64_t(kFarSurvey.exact)};
 }
 
 std::atomic<std::uint64_t> process_memory = 0;  // 0: not said

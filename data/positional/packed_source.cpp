@@ -44,7 +44,7 @@ class PackedArray : public ChunkedArray, public std::enable_shared_from_this<Pac
 
   const ArrayShape& shape() const override { return shape_; }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) override {
     const std::uint64_t z = index[0] * shape_.chunk[0], y = index[1] * shape_.chunk[1];
     const std::uint64_t rows = std::min(shape_.chunk[0], shape_.size[0] - z) * std::min(shape_.chunk[1], shape_.size[1] - y);
     const PackedSamples::Range part{(z * shape_.size[1] + y) * row_bytes_, rows * row_bytes_};

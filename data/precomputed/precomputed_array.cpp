@@ -63,25 +63,27 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
     return store_->name() + "/" + metadata::Join(scale_.key, scale_.sharding ? ShardOf(index).file : FileOf(index));
   }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted) override {
     std::array<std::uint64_t, 3> size{};
     for (std::size_t axis = 0; axis < 3; ++axis) size[axis] = EndOf(index, axis) - BeginOf(index, axis);
-    if (scale_.sharding) return ReadFromShard(index, size, std::move(done));
-    ReadFile(metadata::Join(scale_.key, FileOf(index)), size, ending_, 0, std::move(done));
+    if (scale_.sharding) return ReadFromShard(index, size, std::move(done), wanted);
+    ReadFile(metadata::Join(scale_.key, FileOf(index)), size, ending_, 0, std::move(done), wanted);
   }
 
  private:
   // Tries the endings in turn, from `first` on.
-  void ReadFile(const std::string& key, const std::array<std::uint64_t, 3>& size, std::size_t first, std::size_t tried, ChunkDone done) {
+  void ReadFile(const std::string& key, const std::array<std::uint64_t, 3>& size, std::size_t first, std::size_t tried, ChunkDone done,
+                const StillWanted& wanted) {
     const std::size_t endings = IsUrl(store_->name()) ? kEndingsOfServers : Endings().size(), number = (first + tried) % endings;
     const std::string file = key + std::string(Endings()[number].name);
-    auto read = [self = shared_from_this(), key, file, size, first, tried, endings, number, done = std::move(done)](Result<Bytes> answer) {
+    auto read = [self = shared_from_this(), key, file, size, first, tried, endings, number, done = std::move(done),
+                 wanted](Result<Bytes> answer) {
       const bool missing = answer.status().code() == StatusCode::kNotFound;
-      if (missing && tried + 1 < endings) return self->ReadFile(key, size, first, tried + 1, done);
+      if (missing && tried + 1 < endings) return self->ReadFile(key, size, first, tried + 1, done, wanted);
       if (answer.ok()) self->ending_ = number;
       self->Decode(self->store_->name() + "/" + file, size, std::move(answer), done, Endings()[number].codec);
     };
-    store_->Read(file, {}, MostStored(), std::move(read));
+    store_->Read(file, {}, MostStored(), std::move(read), wanted);
   }
 
   // Of a chunk, in voxels of the scale along x, y and z.
@@ -107,34 +109,37 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   ShardPlace ShardOf(std::span<const std::uint64_t> index) const { return PlaceOf(*scale_.sharding, NumberOf(index)); }
 
   // The index of the shard, that of the minishard, and the chunk, one after the other.
-  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done,
+                     const StillWanted& wanted) {
     const std::uint64_t chunk = NumberOf(index);
     const ShardPlace place = ShardOf(index);
     const std::string key = metadata::Join(scale_.key, place.file);
     const std::string what = fmt::format("{}/{}: chunk {}", store_->name(), key, chunk);
     constexpr std::uint64_t kEntryBytes = 16;
-    auto found_chunk = [self = shared_from_this(), key, size, what, done](Result<std::optional<ByteRange>> range) {
+    auto found_chunk = [self = shared_from_this(), key, size, what, done, wanted](Result<std::optional<ByteRange>> range) {
       if (!range.ok()) return done(Status(range.status().code(), what + ": " + range.status().message()));
       if (!*range) return done(std::optional<StoredChunk>());
-      self->store_->Read(key, **range, self->MostStored(), [self, size, what, wanted = (*range)->bytes, done](Result<Bytes> answer) {
+      auto decode = [self, size, what, bytes = (*range)->bytes, done](Result<Bytes> answer) {
         if (answer.status().code() == StatusCode::kNotFound) answer = Status::Unavailable(what + ": the shard is gone");
-        if (answer.ok() && answer->size() != wanted) answer = Status::DataLoss(what + ": the shard ends before it does");
+        if (answer.ok() && answer->size() != bytes) answer = Status::DataLoss(what + ": the shard ends before it does");
         self->Decode(what, size, std::move(answer), done);
-      });
+      };
+      self->store_->Read(key, **range, self->MostStored(), std::move(decode), wanted);
     };
-    auto found_minishard = [self = shared_from_this(), key, what, chunk, found_chunk, done](Result<Bytes> entry) {
+    auto found_minishard = [self = shared_from_this(), key, what, chunk, found_chunk, done, wanted](Result<Bytes> entry) {
       if (entry.status().code() == StatusCode::kNotFound) return done(std::optional<StoredChunk>());
       if (!entry.ok()) return done(entry.status());
       const Result<ByteRange> range = MinishardRange(*self->scale_.sharding, *entry);
       if (!range.ok()) return found_chunk(range.status());
       if (range->bytes == 0) return done(std::optional<StoredChunk>());
-      self->store_->Read(key, *range, kMostMinishardBytes, [self, chunk, found_chunk, done, wanted = range->bytes](Result<Bytes> packed) {
+      auto find_chunk = [self, chunk, found_chunk, done, bytes = range->bytes](Result<Bytes> packed) {
         if (!packed.ok()) return done(packed.status());
-        if (packed->size() != wanted) return found_chunk(Status::DataLoss("the shard ends within an index"));
+        if (packed->size() != bytes) return found_chunk(Status::DataLoss("the shard ends within an index"));
         found_chunk(ChunkRange(*self->scale_.sharding, *std::move(packed), chunk));
-      });
+      };
+      self->store_->Read(key, *range, kMostMinishardBytes, std::move(find_chunk), wanted);
     };
-    store_->Read(key, {.begin = kEntryBytes * place.minishard, .bytes = kEntryBytes}, kEntryBytes, std::move(found_minishard));
+    store_->Read(key, {.begin = kEntryBytes * place.minishard, .bytes = kEntryBytes}, kEntryBytes, std::move(found_minishard), wanted);
   }
 
   // A block of one voxel in the segmentation encoding takes two words and its label.

@@ -16,6 +16,7 @@
 
 #include "common/base/status.h"
 #include "common/memory/bytes.h"
+#include "data/stores/store.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
@@ -60,8 +61,9 @@ class ChunkedArray {
   using ChunkDone = std::function<void(Result<std::optional<StoredChunk>>)>;
   // Calls `done` exactly once, on any thread, perhaps before this returns. What `done` does takes as long as decoding, so it is called on a
   // decoding thread (DecodeOn, decode_chunk.h), not on one of a store. `index`: of the chunk along each axis, inside the array. Any thread.
-  // Unavailable: it cannot be read. DataLoss: it is damaged, or has another number of bytes. Both name store, object and cause.
-  virtual void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) = 0;
+  // Unavailable: it cannot be read. DataLoss: it is damaged, or has another number of bytes. Both name store, object and cause. Cancelled:
+  // as of Store::Read.
+  virtual void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted = {}) = 0;
 };
 
 }  // namespace slabstream

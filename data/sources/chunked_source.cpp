@@ -33,7 +33,7 @@ class Level : public std::enable_shared_from_this<Level> {
  public:
   Level(std::string name, PyramidLevel level, const Index3& size, SourceContext context, std::shared_ptr<Findings> findings)
       : name_(std::move(name)),
-        far_(IsUrl(name_)),
+        server_(ServerOf(name_)),
         level_(std::move(level)),
         size_(size),
         context_(std::move(context)),
@@ -144,7 +144,8 @@ class Level : public std::enable_shared_from_this<Level> {
       return End(chunk, TakeFlight(chunk), fits);
     }
     try {
-      context_->Admit(bytes, [self = shared_from_this(), chunk, bytes] { self->Begin(chunk, bytes); });
+      context_->Admit(
+          bytes, [self = shared_from_this(), chunk, bytes] { self->Begin(chunk, bytes); }, server_);
     } catch (const std::exception& error) {
       End(chunk, TakeFlight(chunk), OutOfMemory(error));
     }
@@ -154,17 +155,29 @@ class Level : public std::enable_shared_from_this<Level> {
   void Begin(const Index3& chunk, std::uint64_t bytes) {
     if (const Readings nobody = TakeFlightIfUnwanted(chunk); !nobody.empty()) {
       End(chunk, nobody, Status::Cancelled("reading was stopped"));
-      return context_->Release(bytes);
+      return context_->Release(bytes, server_);
     }
     try {
-      level_.array->ReadChunk(IndexOf(chunk), [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
+      auto land = [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
+        // Somebody may have come for it since nobody wanted it.
+        if (read.status().code() == StatusCode::kCancelled && self->IsWanted(chunk)) return self->Begin(chunk, bytes);
         self->Land(chunk, std::move(read));
-        self->context_->Release(bytes);
-      });
+        self->context_->Release(bytes, self->server_);
+      };
+      level_.array->ReadChunk(IndexOf(chunk), std::move(land), [self = shared_from_this(), chunk] { return self->IsWanted(chunk); });
     } catch (const std::exception& error) {
       End(chunk, TakeFlight(chunk), OutOfMemory(error));
-      context_->Release(bytes);
+      context_->Release(bytes, server_);
     }
+  }
+
+  bool IsWanted(const Index3& chunk) {
+    const std::lock_guard lock(mutex_);
+    const auto flight = flights_.find(NumberIn(counts_, chunk));
+    return flight != flights_.end() && IsWanted(flight->second);
+  }
+  static bool IsWanted(const Readings& flight) {
+    return std::ranges::any_of(flight, [](const auto& each) { return each->goes_on(); });
   }
 
   // Along all axes of the array.
@@ -219,7 +232,7 @@ class Level : public std::enable_shared_from_this<Level> {
     const std::lock_guard lock(mutex_);
     const auto flight = flights_.find(NumberIn(counts_, chunk));
     const Box all = Mirrored(BoxOf(chunk));
-    const bool is_small = far_ && CountIn(size_) * BytesPerSample(level_.array->shape().type) <= context_->small_bytes();
+    const bool is_small = !server_.empty() && CountIn(size_) * BytesPerSample(level_.array->shape().type) <= context_->small_bytes();
     const bool is_taken = std::ranges::any_of(flight->second, [&](const auto& each) { return each->box().Contains(all); });
     if (!elements.empty() && (is_small || !is_taken)) {
       try {
@@ -235,7 +248,7 @@ class Level : public std::enable_shared_from_this<Level> {
   Readings TakeFlightIfUnwanted(const Index3& chunk) {
     const std::lock_guard lock(mutex_);
     const auto flight = flights_.find(NumberIn(counts_, chunk));
-    if (std::ranges::any_of(flight->second, [](const auto& each) { return each->goes_on(); })) return {};
+    if (IsWanted(flight->second)) return {};
     Readings readings = std::move(flight->second);
     flights_.erase(flight);
     return readings;
@@ -304,7 +317,7 @@ class Level : public std::enable_shared_from_this<Level> {
   }
 
   const std::string name_;
-  const bool far_;  // behind an address
+  const std::string server_;  // empty: it lies in files
   const PyramidLevel level_;
   Index3 size_;
   const SourceContext context_;

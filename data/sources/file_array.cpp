@@ -21,7 +21,7 @@ class FileArray : public ChunkedArray, public std::enable_shared_from_this<FileA
 
   const ArrayShape& shape() const override { return shape_; }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) override {
     context_->PostDecode([self = shared_from_this(), at = std::vector(index.begin(), index.end()), done = std::move(done)] {
       try {
         self->Read(at, done);
@@ -69,7 +69,9 @@ class HeldArray : public ChunkedArray {
  public:
   HeldArray(ArrayShape shape, Bytes elements) : shape_(std::move(shape)), elements_(std::move(elements)) {}
   const ArrayShape& shape() const override { return shape_; }
-  void ReadChunk(std::span<const std::uint64_t>, ChunkDone done) override { done(std::optional(StoredChunk{elements_, elements_.size()})); }
+  void ReadChunk(std::span<const std::uint64_t>, ChunkDone done, StillWanted /*wanted*/) override {
+    done(std::optional(StoredChunk{elements_, elements_.size()}));
+  }
 
  private:
   const ArrayShape shape_;

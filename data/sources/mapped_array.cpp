@@ -25,14 +25,15 @@ class MappedArray : public ChunkedArray, public std::enable_shared_from_this<Map
   const ArrayShape& shape() const override { return shape_; }
   std::string NameOf(std::span<const std::uint64_t> index) const override { return array_->NameOf(index); }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    array_->ReadChunk(index, [self = shared_from_this(), at = std::vector(index.begin(), index.end()),
-                              done = std::move(done)](Result<std::optional<StoredChunk>> read) {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted) override {
+    auto mapped_done = [self = shared_from_this(), at = std::vector(index.begin(), index.end()),
+                        done = std::move(done)](Result<std::optional<StoredChunk>> read) {
       if (!read.ok()) return done(std::move(read));
       if (!*read && self->meaning_.mapped_axes == 0) return done(std::move(read));
       Result<std::optional<StoredChunk>> mapped = self->Mapped(at, *read);
       done(std::move(mapped));
-    });
+    };
+    array_->ReadChunk(index, std::move(mapped_done), std::move(wanted));
   }
 
  private:

@@ -2,13 +2,24 @@
 
 #include <algorithm>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "common/text/url.h"
 #include "common/threads/background_tasks.h"
 
 namespace slabstream {
+
+std::string ServerOf(std::string_view source) {
+  if (SchemeOf(source).empty()) return {};
+  if (const std::size_t endpoint = source.find(kEndpointMark); endpoint != std::string_view::npos) {
+    source.remove_prefix(endpoint + kEndpointMark.size());
+  }
+  while (!SchemeOf(source).empty()) source.remove_prefix(SchemeOf(source).size() + 3);
+  return std::string(source.substr(0, source.find('/')));
+}
 
 struct ReadContext::State {
   explicit State(const Limits& l)
@@ -22,10 +33,25 @@ struct ReadContext::State {
     std::function<void()> task;
   };
 
-  bool Fits(std::uint64_t bytes) const { return tasks == 0 || (tasks < most_tasks && under_way + bytes <= limits.under_way_bytes); }
-  void Begin(std::uint64_t bytes) {
-    ++tasks;
-    under_way += bytes;
+  // What reads of one server, or of files, may wait for.
+  struct Lane {
+    std::size_t tasks = 0;        // that were begun and not released
+    std::uint64_t under_way = 0;  // their bytes
+    std::deque<Waiting> waiting;
+  };
+
+  // A server leaves others a quarter of what those before it have left. What comes first of each hardly waits: a server that does not
+  // answer has promised bytes, but sent none.
+  bool Fits(const std::string& server, const Lane& lane, std::uint64_t bytes) const {
+    const std::uint64_t own = lane.under_way + bytes, others = far_bytes - lane.under_way, most = limits.under_way_bytes;
+    if (lane.tasks >= most_tasks) return false;
+    if (server.empty()) return lane.tasks == 0 || own <= most;
+    return lane.tasks == 0 ? others == 0 || others + bytes <= 2 * most : own <= (most - std::min(others, most)) / 4 * 3;
+  }
+  void Begin(const std::string& server, Lane& lane, std::uint64_t bytes) {
+    ++lane.tasks;
+    lane.under_way += bytes;
+    if (!server.empty()) far_bytes += bytes;
   }
 
   const Limits limits;
@@ -34,11 +60,10 @@ struct ReadContext::State {
   std::mutex post_mutex;  // BackgroundTasks::Post wants one caller at a time
   BackgroundTasks decoders;
   ChunkCache cache;
-  std::mutex mutex;       // guards what follows
-  std::size_t tasks = 0;  // that were begun and not released
-  std::uint64_t under_way = 0;
-  std::deque<Waiting> waiting;
-  bool beginning = false;  // a thread runs tasks that have waited
+  std::mutex mutex;                   // guards what follows
+  std::map<std::string, Lane> lanes;  // by server; "": of files
+  std::uint64_t far_bytes = 0;        // under way from all servers
+  bool beginning = false;             // a thread runs tasks that have waited
 };
 
 ReadContext::ReadContext(const Limits& limits) : state_(std::make_shared<State>(limits)) {}
@@ -52,34 +77,42 @@ void ReadContext::PostDecode(std::function<void()> task) {
   state_->decoders.Post(std::move(task));
 }
 
-void ReadContext::Admit(std::uint64_t bytes, std::function<void()> task) {
+void ReadContext::Admit(std::uint64_t bytes, std::function<void()> task, const std::string& server) {
   {
     const std::lock_guard lock(state_->mutex);
-    if (!state_->waiting.empty() || !state_->Fits(bytes)) {
-      state_->waiting.push_back({bytes, std::move(task)});
+    State::Lane& lane = state_->lanes[server];
+    if (!lane.waiting.empty() || !state_->Fits(server, lane, bytes)) {
+      lane.waiting.push_back({bytes, std::move(task)});
       return;
     }
-    state_->Begin(bytes);
+    state_->Begin(server, lane, bytes);
   }
   task();
 }
 
-void ReadContext::Release(std::uint64_t bytes) {
+void ReadContext::Release(std::uint64_t bytes, const std::string& server) {
   const std::shared_ptr<State> state = state_;  // a task may let go of the context
   std::unique_lock lock(state->mutex);
-  --state->tasks;
-  state->under_way -= bytes;
+  State::Lane& released = state->lanes.at(server);
+  --released.tasks;
+  released.under_way -= bytes;
+  if (!server.empty()) state->far_bytes -= bytes;
   // A task that ends at once calls this again. The loop that is under way then begins the next one, so calls do not nest deeper and deeper.
   if (std::exchange(state->beginning, true)) return;
-  while (!state->waiting.empty() && state->Fits(state->waiting.front().bytes)) {
-    State::Waiting next = std::move(state->waiting.front());
-    state->waiting.pop_front();
-    state->Begin(next.bytes);
+  while (true) {
+    const auto next = std::ranges::find_if(state->lanes, [&](const auto& each) {
+      return !each.second.waiting.empty() && state->Fits(each.first, each.second, each.second.waiting.front().bytes);
+    });
+    if (next == state->lanes.end()) break;
+    State::Waiting begun = std::move(next->second.waiting.front());
+    next->second.waiting.pop_front();
+    state->Begin(next->first, next->second, begun.bytes);
     lock.unlock();
-    next.task();
-    next.task = nullptr;  // may destroy a source
+    begun.task();
+    begun.task = nullptr;  // may destroy a source
     lock.lock();
   }
+  std::erase_if(state->lanes, [](const auto& each) { return each.second.tasks == 0 && each.second.waiting.empty(); });
   state->beginning = false;
 }
 

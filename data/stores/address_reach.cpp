@@ -9,6 +9,8 @@
 #include <cstring>
 #include <span>
 
+#include "common/base/check.h"
+
 namespace slabstream {
 namespace {
 
@@ -61,11 +63,12 @@ bool ParseIp(const char* text, Ip& ip) {
   return true;
 }
 
-Reach ReachOfIp(const Ip& address) {
+// The network that holds it; null: the internet.
+const Network* NetworkOf(const Ip& address) {
   const Ip ip = WithoutWrapping(address);
   for (const Network& network : kNetworks) {
     Ip base{};
-    if (!ParseIp(network.address, base)) return Reach::kLink;
+    CHECK(ParseIp(network.address, base));
     constexpr int kV4Bits = 96;
     const int bits = network.bits + (std::strchr(network.address, ':') == nullptr ? kV4Bits : 0);
     const auto same = [&](std::size_t byte) {
@@ -74,32 +77,40 @@ Reach ReachOfIp(const Ip& address) {
     };
     bool inside = true;
     for (std::size_t byte = 0; byte < ip.size(); ++byte) inside = inside && same(byte);
-    if (inside) return network.reach;
+    if (inside) return &network;
   }
-  return Reach::kInternet;
+  return nullptr;
 }
 
 }  // namespace
 
-Reach ReachOf(const sockaddr* address) {
-  if (address->sa_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, address, sizeof v4);
-    std::array<std::uint8_t, 4> bytes{};
-    std::memcpy(bytes.data(), &v4.sin_addr, sizeof bytes);
-    return ReachOfIp(FromV4(bytes));
-  }
-  if (address->sa_family != AF_INET6) return Reach::kLink;
-  sockaddr_in6 v6{};
-  std::memcpy(&v6, address, sizeof v6);
-  Ip ip{};
-  std::memcpy(ip.data(), &v6.sin6_addr, sizeof ip);
-  return ReachOfIp(ip);
-}
-
 Reach ReachOf(const std::string& address) {
   Ip ip{};
-  return ParseIp(address.c_str(), ip) ? ReachOfIp(ip) : Reach::kLink;
+  if (!ParseIp(address.c_str(), ip)) return Reach::kLink;
+  const Network* const network = NetworkOf(ip);
+  return network == nullptr ? Reach::kInternet : network->reach;
+}
+
+std::string TextOf(const sockaddr* address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  const bool v4 = address->sa_family == AF_INET;
+  const void* const bytes = v4 ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in*>(address)->sin_addr)
+                               : &reinterpret_cast<const sockaddr_in6*>(address)->sin6_addr;
+  return ::inet_ntop(address->sa_family, bytes, text.data(), text.size()) == nullptr ? "" : text.data();
+}
+
+bool IsIp(const std::string& text) {
+  Ip unused{};
+  return ParseIp(text.c_str(), unused);
+}
+
+bool MayMove(const std::string& first, const std::string& now) {
+  if (now == first) return true;
+  Ip from{}, to{};
+  if (!MayLead(ReachOf(first), ReachOf(now)) || !ParseIp(first.c_str(), from) || !ParseIp(now.c_str(), to)) return false;
+  const Network *const one = NetworkOf(from), *const other = NetworkOf(to);
+  return ReachOf(now) != Reach::kPrivate || one == other ||
+         (std::strchr(one->address, ':') == nullptr) != (std::strchr(other->address, ':') == nullptr);
 }
 
 std::string_view ToString(Reach reach) {

@@ -18,7 +18,7 @@ class FileStoreImpl : public Store {
  public:
   explicit FileStoreImpl(std::string path) : path_(std::move(path)) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     if (key != kOnlyKey) {
       return done(Printable(Status::InvalidArgument(path_ + ": '" + key + "' names no object: a file has only '" + kOnlyKey + "'")));
     }

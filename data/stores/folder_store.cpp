@@ -66,7 +66,7 @@ class FolderStoreImpl : public Store {
  public:
   FolderStoreImpl(std::string path, Links links) : path_(std::move(path)), links_(links) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     if (Status status = CheckObjectKey(path_, key); !status.ok()) return done(std::move(status));
     std::string object = path_ + "/" + key;
     auto read = [path = path_, links = links_, key, object, range, most]() -> Result<Bytes> {

@@ -35,21 +35,21 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         transfers_(transfers),
         cache_(cache == nullptr ? std::nullopt : std::optional(*cache)) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted wanted) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
     if (range.bytes == 0) return done(Bytes());
     if (seen_.IsMissing(key, MonotonicNow())) {
       return done(Printable(Status::NotFound(fmt::format("{}/{}: does not exist, as the server said less than a minute ago", url_, key))));
     }
     const bool whole = range.begin == 0 && range.bytes == ByteRange::kAll;
-    HttpGet get{.url = UrlOf(key), .span = {}, .most = most, .access = access_};
+    HttpGet get{.url = UrlOf(key), .span = {}, .most = most, .access = access_, .wanted = wanted};
     // Where an object ends must be known to read what lies there: servers differ in what they make of "the last n bytes".
     if (!whole && (range.from_end || range.bytes == ByteRange::kAll)) {
       get.only_size = true;
-      const auto sized = [self = shared_from_this(), key, range, most, done](const HttpObject& object) {
+      const auto sized = [self = shared_from_this(), key, range, most, done, wanted](const HttpObject& object) {
         const Result<ByteSpan> span = BytesOfRange(self->url_ + "/" + key, object.size, range, most);
         if (!span.ok()) return done(span.status());
-        self->Read(key, {span->begin, span->bytes}, most, done);
+        self->Read(key, {span->begin, span->bytes}, most, done, wanted);
       };
       return transfers_.Get(std::move(get), Checked(key, std::nullopt, false, sized, done));
     }
@@ -251,6 +251,8 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   bool asks_witness_ = false;
 };
 
+thread_local std::stop_token stop_of_stores;
+
 // "NAME: VALUE" of "NAME:VALUE" or "NAME:@FILE". What they hold is in no message.
 Result<std::string> HeaderLine(const std::string& text) {
   constexpr std::size_t kMostBytes = 16 << 10;
@@ -270,10 +272,13 @@ Result<std::string> HeaderLine(const std::string& text) {
 
 }  // namespace
 
+StoresStop::StoresStop(std::stop_token stop) { stop_of_stores = std::move(stop); }
+StoresStop::~StoresStop() { stop_of_stores = {}; }
+
 Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, const ObjectCache* cache,
                                          const WebOptions& options) {
   std::string url = address;
-  auto access = std::make_shared<HttpAccess>(HttpAccess{.query = options.query, .headers = {}, .s3 = {}});
+  auto access = std::make_shared<HttpAccess>(HttpAccess{.query = options.query, .headers = {}, .s3 = {}, .stop = stop_of_stores});
   for (const std::string& header : options.headers) {
     Result<std::string> line = HeaderLine(header);
     if (!line.ok()) return line.status();

@@ -24,6 +24,7 @@
 #include "common/text/parse_number.h"
 #include "common/text/trimmed.h"
 #include "common/threads/stop_signals.h"
+#include "data/stores/address_reach.h"
 #include "data/stores/transfer.h"
 
 namespace slabstream {
@@ -138,6 +139,7 @@ struct HttpTransfers::Impl {
   std::multimap<Time, Owned> paused;
   std::map<std::string, std::string> regions;  // by the beginning of the addresses there
   std::set<std::string> headless;              // hosts that do not say by HEAD how long an object is
+  std::map<std::string, std::string> places;   // where the names of stores were first reached
   std::vector<CURL*> idle;                     // to be used again
   Time looked = MonotonicNow();                // for silent hosts
   std::minstd_rand random{std::random_device{}()};
@@ -163,7 +165,7 @@ struct HttpTransfers::Impl {
       if (ended) continue;  // others may begin
       LeaveSilentHosts(MonotonicNow());
       const Duration until = paused.empty() ? Duration(seconds(1)) : paused.begin()->first - MonotonicNow();
-      const auto wait = std::clamp<Duration>(until, Duration(0), seconds(1));
+      const auto wait = std::clamp<Duration>(until, Duration(0), hosts.empty() ? Duration(seconds(1)) : kLookAtWanted);
       curl_multi_poll(multi, nullptr, 0, int(std::chrono::ceil<milliseconds>(wait).count()), nullptr);
     }
     DropAll();
@@ -219,11 +221,14 @@ struct HttpTransfers::Impl {
         ++other;
       }
     }
+    if (!transfer.IsWanted()) return Fail(std::move(owned), transfer.stopped->code(), transfer.stopped->message());
     CURL* easy = idle.empty() ? curl_easy_init() : idle.back();
     if (easy == nullptr) return Answer(std::move(owned), Status::ResourceExhausted(transfer.get.url + ": no memory to ask for it"));
     if (!idle.empty()) idle.pop_back();
     transfer.Prepare(easy, timing);
     transfer.heard_bytes = &host.heard_bytes;
+    const std::string name = PartOf(transfer.url, CURLUPART_HOST);
+    transfer.first_place = transfer.elsewhere() || name.starts_with('[') || IsIp(name) ? nullptr : &places[name];
     if (host.active.empty()) host.heard += transfer.tried - host.left_alone;
     host.active.emplace(easy, std::move(owned));
     curl_multi_add_handle(multi, easy);
@@ -383,7 +388,7 @@ struct HttpTransfers::Impl {
     if (++transfer.redirects > kMostRedirects) return fail(fmt::format("leads on more than {} times", kMostRedirects));
     const char* address = nullptr;
     curl_easy_getinfo(transfer.easy, CURLINFO_PRIMARY_IP, &address);
-    transfer.led_by = ReachOf(std::string(address == nullptr ? "" : address));
+    transfer.led_by = address == nullptr ? "" : address;
     Lead(transfer, url);
     Once(std::move(owned));
   }
@@ -411,7 +416,9 @@ struct HttpTransfers::Impl {
 
   void Answer(Owned owned, Result<HttpObject> answer) {
     // That an object is not there is an answer: volumes leave out chunks that hold nothing.
-    if (!answer.ok() && answer.status().code() != StatusCode::kNotFound) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
+    const StatusCode code = answer.status().code();
+    if (!answer.ok() && code != StatusCode::kNotFound && code != StatusCode::kCancelled)
+      Count(owned->host, [](WebTraffic& count) { ++count.failures; });
     Close(owned->host);
     for (Asker& asker : owned->askers) {
       if (!answer.ok() || owned->askers.size() == 1) {

@@ -14,7 +14,8 @@
 //
 // Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may end on the internet, or where
 // its own server is: at this machine, or in a private network (address_reach.h). So no server on the internet makes this process ask what
-// only this machine sees. The address counts, not the name.
+// only this machine sees. The address counts, not the name: each connection to a name that a request has must lead where the first one of
+// this process did (MayMove).
 //
 // A host is silent if, for kSilence, no answer of it ends and it sends less than kLeastBytes a second in all, although it is asked. Then
 // all requests of it fail, those that wait, too, and so do others that come in the next kRest.
@@ -27,6 +28,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,7 @@ struct HttpAccess {
   std::string query;                 // added to each address, encoded; empty: none
   std::vector<std::string> headers;  // "NAME: VALUE"
   std::optional<S3Access> s3;        // what signs them
+  std::stop_token stop;              // StoresStop
 };
 
 struct HttpGet {
@@ -53,6 +56,7 @@ struct HttpGet {
   std::uint64_t most = 0;                              // bytes of an answer
   std::string known = {};                              // an ETag: if the object still has it, no bytes come
   std::shared_ptr<const HttpAccess> access = nullptr;  // null: nothing goes along
+  std::function<bool()> wanted = {};                   // whether somebody still waits for the answer; null: somebody does
 };
 
 struct HttpObject {
@@ -81,6 +85,7 @@ class HttpTransfers {
   // After kSilence a host counts as silent, and requests to it fail for kRest. Two processes may try one after the
   // other, a worker and the coordinator, and a minute is the promise for both.
   static constexpr Duration kSilence = std::chrono::seconds(30), kRest = std::chrono::seconds(10);
+  static constexpr Duration kLookAtWanted = std::chrono::milliseconds(200);
   // Limits of an answer: headers and trailers, and what is no object, such as the page of an error.
   static constexpr std::uint64_t kMostOfHead = std::uint64_t{256} << 10, kMostOfPage = std::uint64_t{1} << 20;
 
@@ -101,7 +106,8 @@ class HttpTransfers {
 
   // Calls `done` exactly once, on the thread of the transfers, which it must not hold up. Messages begin with the URL. NotFound: 404, 410.
   // ResourceExhausted: the answer has more than `most` bytes; few of them are read. Unavailable: there is no answer, or one without the
-  // bytes; where trying again may help, only the last try fails so. DataLoss: the answer holds other bytes than were asked for. Any thread.
+  // bytes; where trying again may help, only the last try fails so. DataLoss: the answer holds other bytes than were asked for. Cancelled:
+  // nobody wants it any more; its transfer ends within kLookAtWanted. Any thread.
   using Done = std::function<void(Result<HttpObject>)>;
   void Get(HttpGet get, Done done);
 

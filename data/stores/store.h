@@ -9,6 +9,7 @@
 #include <future>
 #include <limits>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,9 @@ struct ByteRange {
   bool from_end = false;  // `begin` is 0
 };
 
+// Whether somebody still waits for what is read. Asked again and again, on any thread; null: somebody does.
+using StillWanted = std::function<bool()>;
+
 class Store {
  public:
   Store() = default;
@@ -37,8 +41,8 @@ class Store {
   using Done = std::function<void(Result<Bytes>)>;
   // Calls `done` exactly once, on any thread, perhaps before this returns. NotFound: there is no such object. InvalidArgument: the key is
   // no name of an object ("", "..", a part that is empty). Unavailable, DataLoss: it cannot be read; names store and key.
-  // ResourceExhausted: more than `most` bytes; nothing is read then.
-  virtual void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) = 0;
+  // ResourceExhausted: more than `most` bytes; nothing is read then. Cancelled: it was not `wanted` any more before a server had answered.
+  virtual void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted wanted = {}) = 0;
 
   // Names of what lies in a folder of the store ("" is the store itself), sorted; those of folders end in "/". Waits. InvalidArgument:
   // the store cannot list.
@@ -74,6 +78,15 @@ struct WebOptions {
 // server alone. What a server says of an object with HTTP 403, or with a page of HTML, counts as "there is none" (NotFound) if the server
 // then sends another object that was read before; else it is Unavailable. InvalidArgument: another address, or one with a name, a password,
 // a query or a fragment; as FindS3Place; a file of a header that cannot be read or holds no text of one line.
+//
+// As long as a StoresStop lives, what its thread opens reads until it is told to stop: then all reads end as if nobody wanted them.
+class StoresStop {
+ public:
+  explicit StoresStop(std::stop_token stop);
+  ~StoresStop();
+  StoresStop(const StoresStop&) = delete;
+  StoresStop& operator=(const StoresStop&) = delete;
+};
 Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, const ObjectCache* cache = nullptr,
                                          const WebOptions& options = {});
 // One file: its only object has the key "file". Does not check that it exists.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "common/base/version.h"
+#include "data/stores/address_reach.h"
 
 namespace slabstream {
 namespace {
@@ -32,15 +33,15 @@ int TakeProgress(void* transfer, curl_off_t, curl_off_t bytes, curl_off_t, curl_
   return static_cast<Transfer*>(transfer)->OnProgress(std::uint64_t(bytes)) ? 0 : 1;
 }
 
-// Before a connection is made. What is refused hears nothing from us.
+// Before a connection is made. What is refused hears nothing from us, and another address of the same name may be asked.
 curl_socket_t OpenSocket(void* transfer, curlsocktype, curl_sockaddr* address) {
-  if (!static_cast<Transfer*>(transfer)->OnPlace(ReachOf(&address->addr))) return CURL_SOCKET_BAD;
+  if (!static_cast<Transfer*>(transfer)->OnPlace(TextOf(&address->addr))) return CURL_SOCKET_BAD;
   return ::socket(address->family, address->socktype | SOCK_CLOEXEC, address->protocol);
 }
 
 // Before a request goes out, perhaps over a connection that was there.
 int CheckPlace(void* transfer, char* address, char*, int, int) {
-  return static_cast<Transfer*>(transfer)->OnPlace(ReachOf(address)) ? CURL_PREREQFUNC_OK : CURL_PREREQFUNC_ABORT;
+  return static_cast<Transfer*>(transfer)->OnConnection(address) ? CURL_PREREQFUNC_OK : CURL_PREREQFUNC_ABORT;
 }
 
 const std::string& UserAgent() {
@@ -94,8 +95,18 @@ std::string InRegion(const std::string& url, const std::string& region) {
 }
 
 Transfer::Transfer(HttpGet what, HttpTransfers::Done done) : get(std::move(what)) {
-  askers.push_back({get.span, std::move(done)});
+  askers.push_back({get.span, std::move(done), get.wanted});
   Lead(UrlOf(get));
+}
+
+bool Transfer::IsWanted() {
+  const bool dropped = get.access != nullptr && get.access->stop.stop_requested();
+  if (!dropped && std::ranges::any_of(askers, [](const Asker& asker) { return !asker.wanted || asker.wanted(); })) {
+    asked_wanted = MonotonicNow();
+    return true;
+  }
+  stopped = Status::Cancelled("nobody waits for it any more");
+  return false;
 }
 
 bool Transfer::elsewhere() const { return PartOf(url, CURLUPART_HOST) != PartOf(InRegion(get.url, region), CURLUPART_HOST); }
@@ -181,6 +192,7 @@ void Transfer::Prepare(CURL* handle, const HttpTransfers::Timing& timing) {
   curl_easy_setopt(easy, CURLOPT_USERAGENT, UserAgent().c_str());
   if (const char* const authorities = std::getenv("SSL_CERT_FILE")) curl_easy_setopt(easy, CURLOPT_CAINFO, authorities);
   curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(easy, CURLOPT_QUICK_EXIT, 1L);  // the end of a transfer does not wait for a name that is still looked for
   // One connection for all, if the server speaks HTTP/2, which it says when the connection is encrypted.
   curl_easy_setopt(easy, CURLOPT_PIPEWAIT, url.starts_with("https:") ? 1L : 0L);
   curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(std::chrono::ceil<milliseconds>(timing.connecting).count()));
@@ -262,6 +274,7 @@ bool Transfer::OnBody(std::span<const std::byte> bytes) {
 
 bool Transfer::OnProgress(std::uint64_t bytes) {
   const Time now = MonotonicNow();
+  if (now >= asked_wanted + HttpTransfers::kLookAtWanted && !IsWanted()) return false;
   if (now < begun + patience) return true;
   const auto in_seconds = [](Duration time) { return std::uint64_t(std::chrono::duration_cast<seconds>(time).count()); };
   if (bytes > in_seconds(now - tried) * HttpTransfers::kLeastBytes) return true;
@@ -270,10 +283,24 @@ bool Transfer::OnProgress(std::uint64_t bytes) {
   return false;
 }
 
-bool Transfer::OnPlace(Reach place) {
-  if (redirects == 0 || !elsewhere() || MayLead(led_by, place)) return true;
-  stopped = Status::Unavailable(fmt::format("leads to {}, which is an address of {} and was not named", host, ToString(place)));
+bool Transfer::OnPlace(const std::string& address) {
+  const auto shown = [](const std::string& each) { return fmt::format("{}, which is an address of {}", each, ToString(ReachOf(each))); };
+  if (elsewhere()) {
+    if (MayLead(ReachOf(led_by), ReachOf(address))) return true;
+    stopped =
+        Status::Unavailable(fmt::format("leads to {}, which is an address of {} and was not named", host, ToString(ReachOf(address))));
+  } else {
+    if (first_place == nullptr || first_place->empty() || MayMove(*first_place, address)) return true;
+    stopped = Status::Unavailable(fmt::format("{} is now at {}; at first it was at {}", host, shown(address), shown(*first_place)));
+  }
   return false;
+}
+
+bool Transfer::OnConnection(const std::string& address) {
+  if (!OnPlace(address)) return false;
+  stopped.reset();  // another address of the name was refused
+  if (first_place != nullptr && first_place->empty()) *first_place = address;
+  return true;
 }
 
 }  // namespace slabstream

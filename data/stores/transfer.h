@@ -4,6 +4,7 @@
 #include <curl/curl.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -14,7 +15,6 @@
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/memory/pooled_vector.h"
-#include "data/stores/address_reach.h"
 #include "data/stores/http_transfers.h"
 
 namespace slabstream {
@@ -28,6 +28,7 @@ std::string InRegion(const std::string& url, const std::string& region);
 struct Asker {
   std::optional<ByteSpan> span;  // bytes of the object; none: all of it
   HttpTransfers::Done done;
+  std::function<bool()> wanted;
 };
 
 struct Transfer {
@@ -39,24 +40,27 @@ struct Transfer {
   std::string host;
   std::string region;  // the region of its bucket, as far as the server has told; empty: it has told none
   int tries = 0, redirects = 0;
-  bool reads_start = false;         // to learn the object's size, if the server does not answer HEAD
-  bool as_sent = false;             // a Content-Encoding says nothing true about the bytes
-  Reach led_by = Reach::kInternet;  // where the server is that led here; redirects > 0
-  Time begun;                       // the first try
-  Duration patience{};              // from then on, for a server that sends little or nothing
+  bool reads_start = false;  // to learn the object's size, if the server does not answer HEAD
+  bool as_sent = false;      // a Content-Encoding says nothing true about the bytes
+  std::string led_by;        // the address of the server that led here; redirects > 0
+  Time begun;                // the first try
+  Duration patience{};       // from then on, for a server that sends little or nothing
 
   // What follows belongs to the present try.
   Time tried;
+  Time asked_wanted;  // when it was last found out that it is
   CURL* easy = nullptr;
   PooledVector<std::byte> body;
   std::string page;              // the beginning of an answer that is no object
   std::uint64_t head_bytes = 0;  // bytes of headers and trailers
   std::uint64_t page_bytes = 0;
   std::uint64_t* heard_bytes = nullptr;  // the host's count of all bytes that come
+  std::string* first_place = nullptr;    // where the name was first reached; empty: it was not yet; null: the request names an address
   std::optional<Status> stopped;         // by us, and why
   char reason[CURL_ERROR_SIZE] = {};
   std::unique_ptr<curl_slist, void (*)(curl_slist*)> headers{nullptr, curl_slist_free_all};
 
+  bool IsWanted();         // by one of them; else `stopped` says so
   bool elsewhere() const;  // asks another host than the request
   bool trusted() const;    // asks the server of the request, to which alone its headers and its signature go
   long status() const;
@@ -79,8 +83,9 @@ struct Transfer {
   // Each says whether the try goes on; else `stopped` says why it does not.
   bool OnHead(std::uint64_t bytes);
   bool OnBody(std::span<const std::byte> bytes);
-  bool OnProgress(std::uint64_t bytes);  // so many have come in this try
-  bool OnPlace(Reach place);             // where the server is
+  bool OnProgress(std::uint64_t bytes);           // so many have come in this try
+  bool OnPlace(const std::string& address);       // where the server is
+  bool OnConnection(const std::string& address);  // which is there, and over which the request would go
 
  private:
   void AddHeader(const std::string& line);

@@ -127,7 +127,7 @@ class ZipStoreImpl : public Store {
  public:
   explicit ZipStoreImpl(std::shared_ptr<Archive> archive) : archive_(std::move(archive)) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     if (Status status = CheckObjectKey(name(), key); !status.ok()) return done(std::move(status));
     ReadOnThread(
         name(), [archive = archive_, key, range, most] { return archive->Read(key, range, most); }, std::move(done));

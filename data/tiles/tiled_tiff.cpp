@@ -104,7 +104,7 @@ class TiffPagesArray : public ChunkedArray, public std::enable_shared_from_this<
         context_(std::move(context)) {}
 
   const ArrayShape& shape() const override { return shape_; }
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) override {
     const int component = chunks_.separate ? int(index[3]) : 0;
     const auto slice = std::size_t(index[0]);
     const TiffChunk chunk = {std::int32_t(index[2]), std::int32_t(index[1]), component, places_[slice].plane};

@@ -27,11 +27,12 @@ class ConsolidatedStore : public Store {
     for (const auto& [key, text] : objects_) nodes_.insert(key.substr(0, NodeEnd(key)));
   }
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted wanted) override {
     const std::size_t end = NodeEnd(key);
     const bool describes = std::ranges::find(kNodeObjects, std::string_view(key).substr(end == 0 ? 0 : end + 1)) != kNodeObjects.end();
     // What is said of a node is said as a whole. Of the root more may be said elsewhere.
-    if (!describes || end == 0 || !nodes_.contains(key.substr(0, end))) return store_->Read(key, range, most, std::move(done));
+    if (!describes || end == 0 || !nodes_.contains(key.substr(0, end)))
+      return store_->Read(key, range, most, std::move(done), std::move(wanted));
     const auto object = objects_.find(key);
     if (object == objects_.end()) return done(Status::NotFound(name() + "/" + key + ": does not exist"));
     const Result<ByteSpan> span = BytesOfRange(name() + "/" + key, object->second.size(), range, most);

@@ -28,24 +28,29 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
   const ArrayShape& shape() const override { return layout_.shape; }
   std::string NameOf(std::span<const std::uint64_t> index) const override { return NameOf(KeyOf(index, separator_)); }
 
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    if (layout_.sharding) return ReadFromShard(*layout_.sharding, index, std::move(done));
-    if (layout_.separator_stated || separator_known_) return ReadObject(KeyOf(index, separator_), std::move(done));
-    auto try_other = [self = shared_from_this(), other = KeyOf(index, '/'),
-                      done = std::move(done)](Result<std::optional<StoredChunk>> chunk) mutable {
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted) override {
+    if (layout_.sharding) {
+      std::uint64_t number = 0;  // in its shard
+      for (std::size_t i = 0; i < index.size(); ++i) number += index[i] % layout_.sharding->chunks[i] * layout_.sharding->strides[i];
+      return ReadFromShard(KeyOf(index, separator_), number, std::move(done), wanted);
+    }
+    if (layout_.separator_stated || separator_known_) return ReadObject(KeyOf(index, separator_), std::move(done), wanted);
+    auto try_other = [self = shared_from_this(), other = KeyOf(index, '/'), done = std::move(done),
+                      wanted](Result<std::optional<StoredChunk>> chunk) mutable {
       if (!chunk.ok() || *chunk) {
         self->separator_known_ = true;
         return done(std::move(chunk));
       }
-      self->ReadObject(other, [self, done = std::move(done)](Result<std::optional<StoredChunk>> nested) {
+      auto take_nested = [self, done = std::move(done)](Result<std::optional<StoredChunk>> nested) {
         if (nested.ok() && *nested) {
           self->separator_ = '/';
           self->separator_known_ = true;
         }
         done(std::move(nested));
-      });
+      };
+      self->ReadObject(other, std::move(take_nested), wanted);
     };
-    ReadObject(KeyOf(index, separator_), std::move(try_other));
+    ReadObject(KeyOf(index, separator_), std::move(try_other), wanted);
   }
 
  private:
@@ -60,7 +65,7 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
     return Join(path_, layout_.Key(std::span(object).first(index.size()), separator));
   }
 
-  void ReadObject(const std::string& key, ChunkDone done) {
+  void ReadObject(const std::string& key, ChunkDone done, const StillWanted& wanted) {
     const std::uint64_t most = MostStored(MostEncoded(layout_.codecs, shape().chunk_bytes()));
     auto decode = [self = shared_from_this(), what = NameOf(key), most, done = std::move(done)](Result<Bytes> answer) mutable {
       if (answer.ok() && answer->size() > most) answer = Status::DataLoss(fmt::format("{}: damaged: has more than {} bytes", what, most));
@@ -68,26 +73,27 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
                std::move(done));
     };
     // One byte more than there may be tells that there are more.
-    context_.store->Read(key, {.bytes = most + 1}, most + 1, std::move(decode));
+    context_.store->Read(key, {.bytes = most + 1}, most + 1, std::move(decode), wanted);
   }
 
-  void ReadFromShard(const Sharding& sharding, std::span<const std::uint64_t> index, ChunkDone done) {
-    std::uint64_t number = 0;
-    for (std::size_t i = 0; i < index.size(); ++i) number += index[i] % sharding.chunks[i] * sharding.strides[i];
-    const std::string key = KeyOf(index, separator_);
-    auto with_index = [self = shared_from_this(), key, number, done = std::move(done)](Result<Index> answer) mutable {
+  void ReadFromShard(const std::string& key, std::uint64_t number, ChunkDone done, const StillWanted& wanted) {
+    auto with_index = [self = shared_from_this(), key, number, done = std::move(done), wanted](Result<Index> answer) mutable {
+      // Who read it for all does not want it any more.
+      const bool again = answer.status().code() == StatusCode::kCancelled && (!wanted || wanted());
+      if (again) return self->ReadFromShard(key, number, std::move(done), wanted);
       if (!answer.ok()) return done(answer.status());
-      self->ReadIndexed(key, number, *answer, std::move(done));
+      self->ReadIndexed(key, number, *answer, std::move(done), wanted);
     };
-    if (context_.indices->Ask(key, std::move(with_index))) ReadIndex(sharding, key);
+    if (context_.indices->Ask(key, std::move(with_index))) ReadIndex(*layout_.sharding, key, wanted);
   }
 
-  void ReadIndex(const Sharding& sharding, const std::string& key) {
+  void ReadIndex(const Sharding& sharding, const std::string& key, const StillWanted& wanted) {
     const ByteRange range{.bytes = sharding.index_bytes, .from_end = sharding.index_at_end};
-    context_.store->Read(key, range, sharding.index_bytes, [self = shared_from_this(), key](Result<Bytes> answer) {
+    auto decode = [self = shared_from_this(), key](Result<Bytes> answer) {
       const Result<Index> index = Guarded("reading the index of a shard", [&] { return self->DecodeIndex(key, std::move(answer)); });
       self->context_.indices->Put(key, index);
-    });
+    };
+    context_.store->Read(key, range, sharding.index_bytes, std::move(decode), wanted);
   }
 
   Result<Index> DecodeIndex(const std::string& key, Result<Bytes> answer) const {
@@ -100,13 +106,13 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
     return Status(numbers.status().code(), fmt::format("{}: index of the shard: {}", NameOf(key), numbers.status().message()));
   }
 
-  void ReadIndexed(const std::string& key, std::uint64_t number, const Index& index, ChunkDone done) {
+  void ReadIndexed(const std::string& key, std::uint64_t number, const Index& index, ChunkDone done, const StillWanted& wanted) {
     const std::optional<ByteRange> range = index == nullptr ? std::nullopt : index->Find(number);
     if (!range) return done(std::optional<StoredChunk>());
     std::string what = fmt::format("{}: chunk {} of the shard", NameOf(key), number);
     // If it is damaged, its shard may have been replaced since the index was read.
     auto decoded = [self = shared_from_this(), key, done = std::move(done)](Result<std::optional<StoredChunk>> chunk) {
-      if (!chunk.ok()) self->context_.indices->Forget(key);
+      if (!chunk.ok() && chunk.status().code() != StatusCode::kCancelled) self->context_.indices->Forget(key);
       done(std::move(chunk));
     };
     const std::uint64_t bytes = range->bytes, most = MostStored(MostEncoded(layout_.codecs, shape().chunk_bytes()));
@@ -121,7 +127,7 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
       DecodeOn(self->context_.source, self->layout_.codecs, std::move(answer), self->shape().chunk_bytes(), std::move(what),
                std::move(decoded));
     };
-    context_.store->Read(key, *range, most, std::move(decode));
+    context_.store->Read(key, *range, most, std::move(decode), wanted);
   }
 
   const ArrayContext context_;

@@ -142,6 +142,44 @@ TEST_F(OwnedDataRules, WhatWasThereIsGivenUpWhileSomebodyWaitsForAll) {
   EXPECT_EQ(StateOf("block"), DatasetState::kLoading) << "it is waited for";
 }
 
+// ---------------------------------------------------------------- servers
+
+TEST_F(DataRules, ALoadFromAServerIsGivenUpAWhileAfterTheLastOneWhoWaitsForItLeaves) {
+  CoordinatorScript far([] {
+    ScriptConfig config = TestConfig();
+    config.datasets = {{"block", DataSource("http://example.org/a.zarr", "")}};
+    return config;
+  }());
+  far.Join(11, 1);
+  far.clients = {kClient, kOther};
+  far.Client(kClient, Frame(1));
+  ASSERT_THAT(far.loads, SizeIs(1));
+  const std::stop_token first = far.loads[0].stop;
+  far.Pass(2 * kUnwanted);
+  far.Client(kClient, CancelFrame{1});
+  far.Pass(kUnwanted / 2);
+  far.Client(kOther, Frame(2));
+  far.Pass(kUnwanted);
+  EXPECT_THAT(far.loads, SizeIs(1));
+  EXPECT_FALSE(first.stop_requested()) << "somebody else waits for it";
+  far.Client(kOther, CancelFrame{2});
+  far.Pass(kUnwanted + seconds(1));
+  EXPECT_TRUE(first.stop_requested());
+  far.Step(DatasetFailed{"block", far.loads[0].load, Status::Cancelled("nobody waits")});
+
+  far.Client(kOther, Frame(3));
+  ASSERT_THAT(far.loads, SizeIs(2));
+  far.Step(DatasetLoaded{"block", far.loads[1].load, 7, BlockSummary()});
+  EXPECT_FALSE(far.loads[1].stop.stop_possible()) << "nothing stops what was loaded";
+}
+
+TEST_F(DataRules, ADatasetThatIsRemovedIsNotLoadedToTheEnd) {
+  script.Client(kClient, Frame(1));
+  ASSERT_THAT(script.loads, SizeIs(1));
+  script.Client(kClient, DataOrder{.nonce = 1, .action = DataAction::kRemove, .items = {"block"}});
+  EXPECT_TRUE(script.loads[0].stop.stop_requested());
+}
+
 // ---------------------------------------------------------------- files
 
 TEST_F(DataRules, AFrameWaitsForALookThatBeganAfterItsRequest) {

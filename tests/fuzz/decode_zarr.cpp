@@ -23,7 +23,7 @@ class FuzzStore : public Store {
         below_(std::move(below)),
         other_(std::move(other)) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     const std::string* object = key == root_key_ ? &root_ : key.ends_with(below_key_) && !below_.empty() ? &below_ : &other_;
     const bool metadata = key.ends_with("json") || key.find(".z") != std::string::npos;
     if (metadata && object == &other_) return done(Status::NotFound(key + ": does not exist"));

@@ -75,5 +75,31 @@ TEST(BackgroundActions, AServerThatDoesNotAnswerHoldsUpItsOwnDatasetsAlone) {
   take(far + 1);
 }
 
+TEST(BackgroundActions, ALoadThatNobodyWaitsForEnds) {
+  std::promise<void> end, asked;
+  const std::shared_future<void> ended(end.get_future());
+  std::once_flag first;
+  const ScriptedServer silent([&](const ServerRequest&) {
+    std::call_once(first, [&] { asked.set_value(); });
+    ended.wait();
+    return AnswerText("403 Forbidden", "");
+  });
+  Context context;
+  const auto voxels = VoxelServer::Start(context, {"inproc://background-actions-stop-test"}, Epoch{8}).value();
+  BackgroundActions background({}, {}, *voxels);
+  std::stop_source stop;
+  LoadDataset action{.name = "far", .load = 1, .source = {silent.url() + "/a.zarr", ""}, .stop = stop.get_token()};
+  ASSERT_FALSE(background.Perform(action).has_value());
+  asked.get_future().wait();
+  stop.request_stop();
+  std::optional<Status> status;
+  while (!status) {
+    Wait({}, &background.wakeup(), std::chrono::seconds(60));
+    background.HandleEvents([&](const CoordinatorEvent& event) { status = std::get<DatasetFailed>(event).status; });
+  }
+  EXPECT_EQ(status->code(), StatusCode::kCancelled);
+  end.set_value();
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -1,8 +1,12 @@
 // A service of a volume behind a web server: pictures are those of the voxels, and a server that fails holds up nobody else.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <future>
+#include <semaphore>
+#include <string>
 
 #include "client/embedded/embedded_service.h"
 #include "tests/data/stores/scripted_server.h"
@@ -21,17 +25,27 @@ class RemoteVolumesTest : public testing::Test {
   void SetUp() override {
     WriteSmallShards(ball_, directory_ / "ball.zarr");
     const ScriptedServer::Script serves = ServesFolder(directory_.path());
-    server_ = std::make_unique<ScriptedServer>(
-        [this, serves](const ServerRequest& request) { return broken_ ? AnswerText("403 Forbidden", "") : serves(request); });
+    server_ = std::make_unique<ScriptedServer>([this, serves](const ServerRequest& request) {
+      if (silent_ && request.target.find("/c/") != std::string::npos) {
+        held_.release();
+        ended_.wait();
+      }
+      return broken_ ? AnswerText("403 Forbidden", "") : serves(request);
+    });
     EmbeddedOptions service;
     service.workers = 2;
     service.coordinator.catalogue["remote"] = DataSource(server_->url() + "/ball.zarr", "");
+    for (int i = 0; i < kMore; ++i) service.coordinator.catalogue[fmt::format("remote{}", i)] = {server_->url() + "/ball.zarr", ""};
+    service.coordinator.catalogue["local"] = DataSource(directory_ / "ball.zarr", "");
     service.coordinator.catalogue["small"] = [small = small_]() -> Result<std::shared_ptr<const Volume>> { return small; };
     service.coordinator.machine.memory_bytes = std::uint64_t{512} << 10;  // no level of the ball but perhaps the coarsest ones
     auto started = EmbeddedService::Start(context_, std::move(service));
     ASSERT_TRUE(started.ok()) << started.status().message();
     service_ = *std::move(started);
     client_.emplace(service_->Connect().value());
+  }
+  void TearDown() override {
+    if (silent_) end_.set_value();
   }
   Result<Picture> Render(const std::string& dataset) {
     FrameRequest request = request_;
@@ -52,7 +66,11 @@ class RemoteVolumesTest : public testing::Test {
     request.level = "0";
     return request;
   }();
-  std::atomic<bool> broken_ = false;
+  static constexpr int kMore = 4;  // datasets of the same server
+  std::atomic<bool> broken_ = false, silent_ = false;
+  std::counting_semaphore<> held_{0};  // requests that are not answered
+  std::promise<void> end_;
+  const std::shared_future<void> ended_{end_.get_future()};
   std::unique_ptr<ScriptedServer> server_;
   Context context_;
   std::unique_ptr<EmbeddedService> service_;
@@ -70,6 +88,22 @@ TEST_F(RemoteVolumesTest, AServerThatFailsIsNamedAndIsUsedAgainWhenItIsBack) {
   ExpectPicture("small", *small_);
   broken_ = false;
   ExpectPicture("remote", *ball_);
+}
+
+// All that may wait for voxels does. The file is read all the same, before the server counts as silent.
+TEST_F(RemoteVolumesTest, AServerThatDoesNotAnswerHoldsUpNoFile) {
+  silent_ = true;
+  Client other = service_->Connect().value();
+  FrameRequest request = request_;
+  for (int i = 0; i < kMore; ++i) {
+    request.dataset = fmt::format("remote{}", i);
+    other.Submit(request, seconds(120));
+  }
+  for (std::size_t i = 0; i < kMore; ++i) held_.acquire();
+  ExpectPicture("local", *ball_);
+  while (const auto event = other.Next(seconds(0))) {
+    EXPECT_TRUE(std::holds_alternative<FrameProgress>(event->what)) << "the server was silent for too long, or the file waited for it";
+  }
 }
 
 }  // namespace

@@ -21,7 +21,8 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kOpensAtOnce = 2;  // so one file system that does not answer leaves others alone
+constexpr std::size_t kOpensAtOnce = 2;      // so one file system that does not answer leaves others alone
+constexpr std::size_t kFarOpensAtOnce = 64;  // behind addresses; so many servers that do not answer leave others alone
 
 }  // namespace
 
@@ -40,7 +41,7 @@ struct StoredVoxels::Shared {
   std::map<PlaceName, Place> places;
   Time asked;  // the last time that one was asked for
   std::set<Piece> reading;
-  BackgroundTasks opening{kOpensAtOnce};
+  BackgroundTasks opening{kOpensAtOnce}, opening_far{kFarOpensAtOnce};
 
   // The source at this place; null: it is not seen from here, or not known to be, and looked for if it is time. Called with the mutex.
   std::shared_ptr<VolumeSource> SourceAt(const StoredAt& stored, Time now, const std::shared_ptr<Shared>& self) {
@@ -79,7 +80,7 @@ struct StoredVoxels::Shared {
   }
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
-    opening.Post([self, stored] {
+    (SchemeOf(stored.source).empty() ? opening : opening_far).Post([self, stored] {
       Result<std::shared_ptr<VolumeSource>> source = Guarded("a source of voxels", [&] {
         std::unique_lock lock(self->mutex);
         std::shared_ptr<VolumeSource> beside = self->Beside(stored);  // opened while this waited for its turn

@@ -390,7 +390,7 @@ TEST_F(N5Test, ChannelsInFolders) {
 class Unlisted : public Store {
  public:
   explicit Unlisted(std::shared_ptr<Store> store) : store_(std::move(store)) {}
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     ++reads;
     store_->Read(key, range, most, std::move(done));
   }

@@ -11,7 +11,7 @@ namespace slabstream {
 MemoryArray::MemoryArray(ArrayShape shape, std::vector<std::byte> elements, SourceContext context)
     : shape_(std::move(shape)), elements_(std::move(elements)), context_(std::move(context)) {}
 
-void MemoryArray::ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) {
+void MemoryArray::ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted /*wanted*/) {
   std::function<void()> arrive = [this, at = std::vector(index.begin(), index.end()), under_way = Count(),
                                   done = std::move(done)]() mutable { done(Chunk(at, std::move(under_way))); };
   {

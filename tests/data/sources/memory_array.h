@@ -26,7 +26,7 @@ class MemoryArray : public ChunkedArray {
   bool held = false;  // chunks arrive by LetGo alone
 
   const ArrayShape& shape() const override { return shape_; }
-  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override;
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done, StillWanted wanted) override;
 
   std::uint64_t chunk_count() const;  // chunks of the array
   const std::byte* element(std::span<const std::uint64_t> at) const;

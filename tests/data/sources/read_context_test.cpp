@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 namespace slabstream {
@@ -29,6 +30,42 @@ TEST(ReadContextTest, OneTaskMayAlwaysBeUnderWay) {
   EXPECT_EQ(begun, std::vector<int>({1}));
   context.Release(100);
   EXPECT_EQ(begun, std::vector<int>({1, 2}));
+}
+
+// They take all that they may, and answer nothing.
+TEST(ReadContextTest, FilesAndOtherServersDoNotWaitForServersThatDoNotAnswer) {
+  constexpr std::uint64_t kRoom = 1000;
+  ReadContext context({.decode_threads = 1, .under_way_bytes = kRoom});
+  for (const int servers : {1, 4, 40}) {
+    std::size_t of_servers = 0, of_files = 0, of_another = 0;
+    for (int i = 0; i < servers; ++i) {
+      for (int chunk = 0; chunk < 200; ++chunk)
+        context.Admit(
+            10, [&] { ++of_servers; }, std::to_string(i));
+    }
+    EXPECT_LE(of_servers, 2 * kRoom / 10);
+    EXPECT_GE(of_servers, std::size_t(servers)) << "something of each";
+    for (int chunk = 0; chunk < 50; ++chunk) context.Admit(10, [&] { ++of_files; });
+    EXPECT_EQ(of_files, 50U);
+    context.Admit(
+        10, [&] { ++of_another; }, "another");
+    EXPECT_EQ(of_another, 1U);
+    for (int chunk = 0; chunk < 50; ++chunk) context.Release(10);
+    context.Release(10, "another");
+    const std::size_t begun = of_servers;
+    for (int i = 0; i < servers; ++i) {
+      for (int chunk = 0; chunk < 200; ++chunk) context.Release(10, std::to_string(i));
+    }
+    EXPECT_EQ(of_servers, 200U * std::size_t(servers)) << begun << " before they answered";
+  }
+}
+
+TEST(ReadContextTest, ASourceTellsItsServer) {
+  EXPECT_EQ(ServerOf("/data/scan.zarr"), "");
+  EXPECT_EQ(ServerOf("scan.nrrd?time=3"), "");
+  EXPECT_EQ(ServerOf("http://example.org:8080/a/b.zarr?time=3"), "example.org:8080");
+  EXPECT_EQ(ServerOf("s3://bucket/a.zarr"), "bucket");
+  EXPECT_EQ(ServerOf("s3://bucket/a.zarr?endpoint=http://10.0.0.1:9000"), "10.0.0.1:9000");
 }
 
 TEST(ReadContextTest, WhatWouldWaitElsewhereWaitsHere) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -29,11 +30,13 @@ TEST(AddressReach, TellsWhereAnAddressIs) {
       sockaddr_in6 v6{};
       v4.sin_family = AF_INET;
       v6.sin6_family = AF_INET6;
-      if (::inet_pton(AF_INET, address, &v4.sin_addr) == 1) {
-        EXPECT_EQ(ReachOf(reinterpret_cast<sockaddr*>(&v4)), reach) << address;
+      const bool is_v4 = ::inet_pton(AF_INET, address, &v4.sin_addr) == 1, is_v6 = ::inet_pton(AF_INET6, address, &v6.sin6_addr) == 1;
+      EXPECT_EQ(IsIp(address), is_v4 || is_v6) << address;
+      if (is_v4) {
+        EXPECT_EQ(ReachOf(TextOf(reinterpret_cast<sockaddr*>(&v4))), reach) << address;
       }
-      if (::inet_pton(AF_INET6, address, &v6.sin6_addr) == 1) {
-        EXPECT_EQ(ReachOf(reinterpret_cast<sockaddr*>(&v6)), reach) << address;
+      if (is_v6) {
+        EXPECT_EQ(ReachOf(TextOf(reinterpret_cast<sockaddr*>(&v6))), reach) << address;
       }
     }
   }
@@ -44,6 +47,34 @@ TEST(AddressReach, AServerLeadsToTheInternetOrStaysWhereItIs) {
   for (const Reach from : kAll) {
     for (const Reach to : kAll) EXPECT_EQ(MayLead(from, to), to == Reach::kInternet || (from == to && to != Reach::kLink));
   }
+}
+
+TEST(AddressReach, ANameStaysWhereItWasFirst) {
+  const std::pair<const char*, const char*> stays[] = {
+      {"1.1.1.1", "8.8.8.8"},        {"1.1.1.1", "2606:4700::1111"}, {"10.0.0.1", "10.255.0.1"},      {"10.0.0.1", "64:ff9b::a00:2"},
+      {"10.0.0.1", "fd12::1"},       {"fd12::1", "192.168.1.1"},     {"10.0.0.1", "::ffff:10.0.0.2"}, {"127.0.0.1", "::1"},
+      {"127.0.0.1", "127.0.1.1"},    {"10.0.0.1", "1.1.1.1"},        {"127.0.0.1", "1.1.1.1"},        {"fe80::1", "fe80::1"},
+      {"169.254.1.5", "169.254.1.5"}};
+  for (const auto& [first, now] : stays) EXPECT_TRUE(MayMove(first, now)) << first << " " << now;
+  const char* const inside[] = {
+      "127.0.0.1",  "::1",         "::ffff:127.0.0.1", "64:ff9b::7f00:1",        "2002:7f00:1::", "0.0.0.0",
+      "::",         "fe80::1",     "169.254.169.254",  "::ffff:169.254.169.254", "192.168.1.1",   "::ffff:192.168.1.1",
+      "172.16.0.1", "64:ff9b:1::1"};
+  for (const char* const now : inside) {
+    EXPECT_FALSE(MayMove("1.1.1.1", now)) << now;
+    if (ReachOf(now) != Reach::kPrivate || std::string(now).find('.') != std::string::npos) {
+      EXPECT_FALSE(MayMove("10.0.0.1", now)) << now;
+    }
+    if (ReachOf(now) != Reach::kMachine) {
+      EXPECT_FALSE(MayMove("127.0.0.1", now)) << now;
+    }
+    EXPECT_FALSE(MayMove("169.254.1.5", now)) << now;
+  }
+  EXPECT_FALSE(MayMove("1.1.1.1", "10.0.0.1"));
+  EXPECT_FALSE(MayMove("1.1.1.1", "fd12::1"));
+  EXPECT_FALSE(MayMove("fd12::1", "fec0::1"));
+  EXPECT_FALSE(MayMove("127.0.0.1", "10.0.0.1"));
+  EXPECT_FALSE(MayMove("1.1.1.1", "no address"));
 }
 
 }  // namespace

@@ -368,6 +368,52 @@ TEST_F(HttpStoreTest, AServerThatWasSilentIsAskedAgain) {
   end.set_value();
 }
 
+TEST_F(HttpStoreTest, WhatNobodyWantsAnyMoreEndsAtOnce) {
+  std::promise<void> end, asked;
+  const std::shared_future<void> ended(end.get_future());
+  std::atomic<int> count = 0;
+  const ScriptedServer server([&](const ServerRequest&) {
+    if (++count == int(HttpTransfers::kMostOfAHost)) asked.set_value();
+    ended.wait();
+    return AnswerText("200 OK", kTen);
+  });
+  const std::shared_ptr<Store> store = StoreAt(server.url());
+  std::atomic<bool> wanted = true;
+  std::vector<std::promise<Result<Bytes>>> answers(2 * HttpTransfers::kMostOfAHost);  // so that some wait
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const auto done = [&answer = answers[i]](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); };
+    store->Read(std::to_string(i), {}, 1000, done, [&] { return wanted.load(); });
+  }
+  asked.get_future().wait();
+  wanted = false;
+  for (auto& answer : answers) EXPECT_EQ(answer.get_future().get().status().code(), StatusCode::kCancelled);
+  end.set_value();
+}
+
+TEST_F(HttpStoreTest, AStoreThatIsToldToStopReadsNothingMore) {
+  std::promise<void> end, asked;
+  const std::shared_future<void> ended(end.get_future());
+  const ScriptedServer server([&](const ServerRequest& request) {
+    if (request.target == "/other") return AnswerText("200 OK", kTen);
+    asked.set_value();
+    ended.wait();
+    return AnswerText("200 OK", kTen);
+  });
+  std::stop_source stop;
+  std::shared_ptr<Store> store;
+  {
+    const StoresStop of_store(stop.get_token());
+    store = StoreAt(server.url());
+  }
+  const std::shared_ptr<Store> other = StoreAt(server.url());
+  std::future<Result<Bytes>> read = BeginRead(*store, "object");
+  asked.get_future().wait();
+  stop.request_stop();
+  EXPECT_EQ(read.get().status().code(), StatusCode::kCancelled);
+  EXPECT_EQ(Read(*other, "other").value(), kTen);
+  end.set_value();
+}
+
 TEST_F(HttpStoreTest, RedirectsAreFollowedWhereTheyMayLead) {
   const auto leads_to = [](const std::string& where) { return AnswerText("302 Found", "", "Location: " + where + "\r\n"); };
   const ScriptedServer here([&](const ServerRequest& request) {

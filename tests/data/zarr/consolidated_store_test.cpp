@@ -25,7 +25,7 @@ class SilentStore : public Store {
  public:
   explicit SilentStore(const std::string& folder) : folder_(FolderStore(folder)) {}
 
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     {
       const std::lock_guard lock(mutex_);
       asked_.push_back(key);

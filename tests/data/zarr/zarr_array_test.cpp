@@ -211,7 +211,7 @@ TEST(ZarrArrayTest, AnIndexThatPointsOutOfItsShardIsAnError) {
 class CountingStore : public Store {
  public:
   explicit CountingStore(std::shared_ptr<Store> store) : store_(std::move(store)) {}
-  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done, StillWanted /*wanted*/) override {
     ++(range.from_end ? indices : chunks);
     store_->Read(key, range, most, std::move(done));
   }
