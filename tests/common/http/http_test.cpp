@@ -1,0 +1,147 @@
+// WebSockets whose other end behaves as no browser does.
+#include "common/http/http.h"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/streambuf.hpp>
+#include <boost/asio/write.hpp>
+#include <future>
+#include <istream>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+namespace asio = boost::asio;
+using std::chrono::milliseconds;
+
+// Says nothing of its own. Keeps why it was closed.
+class Session final : public WebSocketSession {
+ public:
+  explicit Session(std::promise<std::string> closed) : closed_(std::move(closed)) {}
+  void OnOpen(WebSocketPeer&) override {}
+  void OnText(std::string_view) override {}
+  void OnClosed(const std::string& reason) override { closed_.set_value(reason); }
+
+ private:
+  std::promise<std::string> closed_;
+};
+
+class Server final : public HttpApplication {
+ public:
+  explicit Server(Duration silence) : work_(asio::make_work_guard(io_)) {
+    server_ = HttpServer::Start(io_, "127.0.0.1", 0, std::nullopt, {.silence = silence}, *this).value();
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~Server() override {
+    asio::post(io_, [this] {
+      server_->Stop();
+      work_.reset();
+    });
+    thread_.join();
+  }
+
+  std::uint16_t port() const { return server_->port(); }
+  std::future<std::string>& closed() { return closed_; }  // of the only session
+
+  void Handle(HttpRequest, std::function<void(HttpReply)> reply) override { reply({.status = 404}); }
+  std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest&) override {
+    std::promise<std::string> closed;
+    closed_ = closed.get_future();
+    return WebSocketAccepted{.session = std::make_shared<Session>(std::move(closed)), .subprotocol = "any"};
+  }
+  std::vector<std::pair<std::string, std::string>> CommonHeaders() const override { return {}; }
+  void CountRefusal(std::string_view) override {}
+
+ private:
+  asio::io_context io_{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  std::unique_ptr<HttpServer> server_;
+  std::future<std::string> closed_;
+  std::thread thread_;
+};
+
+class Peer {
+ public:
+  explicit Peer(const Server& server) {
+    socket_.connect({asio::ip::address_v4::loopback(), server.port()});
+    asio::write(socket_, asio::buffer(std::string("GET / HTTP/1.1\r\nHost: a\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                                                  "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n")));
+    const std::size_t head = asio::read_until(socket_, buffer_, "\r\n\r\n");
+    buffer_.consume(head);
+  }
+
+  // The payload of the next ping.
+  std::string Ping() {
+    const std::string head = Take(2);
+    EXPECT_EQ(head[0], '\x89');
+    return Take(std::size_t(head[1]));
+  }
+  // A short frame, masked by zeros. False: the connection has ended.
+  bool Send(int opcode, const std::string& payload) {
+    boost::system::error_code error;
+    asio::write(socket_, asio::buffer(std::string{char(0x80 | opcode), char(0x80 | payload.size())} + std::string(4, '\0') + payload),
+                error);
+    return !error;
+  }
+
+ private:
+  std::string Take(std::size_t bytes) {
+    if (buffer_.size() < bytes) asio::read(socket_, buffer_, asio::transfer_at_least(bytes - buffer_.size()));
+    std::string taken(bytes, '\0');
+    std::istream(&buffer_).read(taken.data(), std::streamsize(bytes));
+    return taken;
+  }
+
+  asio::io_context io_;
+  asio::ip::tcp::socket socket_{io_};
+  asio::streambuf buffer_;
+};
+
+constexpr int kText = 1, kPong = 10;
+constexpr char kUnanswered[] = "it did not answer a ping in time";
+
+// Sends a frame again and again until the session ends, and says why it did.
+std::string EndOfSending(Server& server, Peer& peer, int opcode, const std::string& payload) {
+  while (server.closed().wait_for(milliseconds(1)) != std::future_status::ready) peer.Send(opcode, payload);
+  return server.closed().get();
+}
+
+TEST(WebSocketTest, WhatAPageSendsIsNoAnswerToAPing) {
+  Server server(milliseconds(100));
+  Peer peer(server);
+  EXPECT_EQ(EndOfSending(server, peer, kText, "a view"), kUnanswered);
+}
+
+TEST(WebSocketTest, APongOfAnotherPingIsNoAnswer) {
+  for (const std::string& payload : {std::string(), std::string("0"), std::string(125, 'x')}) {
+    Server server(milliseconds(100));
+    Peer peer(server);
+    EXPECT_EQ(EndOfSending(server, peer, kPong, payload), kUnanswered) << payload;
+  }
+}
+
+TEST(WebSocketTest, WhoAnswersPingsStaysAndPingsDiffer) {
+  Server server(milliseconds(1500));
+  Peer peer(server);
+  std::string before;
+  for (int i = 0; i < 3; ++i) {
+    const std::string ping = peer.Ping();
+    EXPECT_NE(ping, before);
+    EXPECT_TRUE(peer.Send(kPong, ping));
+    before = ping;
+  }
+  EXPECT_EQ(server.closed().wait_for(milliseconds(0)), std::future_status::timeout);
+  EXPECT_EQ(EndOfSending(server, peer, kPong, before), kUnanswered);  // it has answered before, and then says the same
+}
+
+}  // namespace
+}  // namespace slabstream
