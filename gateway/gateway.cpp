@@ -171,7 +171,6 @@ class Gateway::Impl : public HttpApplication {
     Result<Asker> asker = *right == Right::kNone ? Asker() : AskerOf(request, *target);
     if (!asker.ok()) return counted(NoToken(asker.status()));
     if (const auto why = WhyNot(*right, asker->access)) return counted(NoRight(*why));
-    std::string bytes = route->second.takes_bytes ? std::move(request.body) : "";
     Result<PictureFields> fields = FieldsOf(*target, post && !route->second.takes_bytes ? std::string_view(request.body) : "");
     if (!fields.ok()) return counted(Failure(fields.status()));
     const auto shown = [counted, access = asker->access](HttpReply answer) {
@@ -184,7 +183,7 @@ class Gateway::Impl : public HttpApplication {
       if (trace != nullptr) trace->End(answer.status);
       shown(std::move(answer));
     };
-    route->second.handle({*std::move(fields), std::move(bytes), post, *std::move(asker), traced, request.gone, trace});
+    route->second.handle({*std::move(fields), std::move(request.body), post, *std::move(asker), traced, request.gone, trace});
   }
 
   std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) override {
@@ -204,7 +203,7 @@ class Gateway::Impl : public HttpApplication {
       const auto leaving = WhoMakesRoom(places, asker->token, MonotonicNow());
       if (!leaving) return Failure(429, fmt::format("there are {} views already, which is the limit", sessions_.size()));
       const auto session = std::next(sessions_.begin(), std::ptrdiff_t(*leaving));
-      (*session)->MakeRoom();
+      (*session)->End(kMadeRoom, "another page has this place: change the view to come back");
       sessions_.erase(session);
     }
     auto session = std::make_shared<ViewSession>(SessionSurroundings{.io = io_, .encoders = encoders_, .metrics = metrics_},
@@ -435,7 +434,7 @@ class Gateway::Impl : public HttpApplication {
     link_->RequestStop();
     movies_->Stop();
     uploads_->Stop();
-    for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End();
+    for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End(1001, "the gateway ends");
     // Farewells get a moment to leave.
     auto timer = std::make_shared<asio::steady_timer>(io_, std::chrono::milliseconds(200));
     timer->async_wait([this, timer](boost::system::error_code) {

@@ -70,12 +70,13 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
 void MovieRequests::Turntable(Asked asked) {
   Result<TurntableRequest> request = ParseTurntable(std::move(asked.fields));
   if (!request.ok()) return asked.reply(Failure(request.status()));
+  request->asker = std::move(asked.asker);
   if (const Status status = CheckHasMovieEncoder(); !status.ok()) return asked.reply(Failure(501, status.message()));
   if (movies_.size() >= std::size_t(kMaxMovies)) {
     metrics_.CountRefusal("movies");
     return asked.reply(Failure(429, fmt::format("{} movies are under way, which is the limit", movies_.size())));
   }
-  const auto movie = std::make_shared<TurntableMovie>(io_, context_, service_, metrics_, std::move(asked.asker), *std::move(request));
+  const auto movie = std::make_shared<TurntableMovie>(io_, context_, service_, metrics_, *std::move(request));
   movies_.insert(movie);
   boost::asio::post(makers_, [this, movie] {
     Status status = Guarded("the movie", [&] { return movie->Make(); });

@@ -80,12 +80,10 @@ void QuestionRequests::AskOfDataset(std::string_view name, Json (*json)(const st
 }
 
 void QuestionRequests::Histogram(Asked asked) { AskOfDataset<SummaryQuery>("histogram", HistogramJson, std::move(asked)); }
-
+void QuestionRequests::Labels(Asked asked) { AskOfDataset<SummaryQuery>("labels", LabelsJson, std::move(asked)); }
 void QuestionRequests::JointHistogram(Asked asked) {
   AskOfDataset<JointHistogramQuery>("joint-histogram", JointHistogramJson, std::move(asked));
 }
-
-void QuestionRequests::Labels(Asked asked) { AskOfDataset<SummaryQuery>("labels", LabelsJson, std::move(asked)); }
 
 void QuestionRequests::Value(Asked asked) {
   FieldReader read(std::move(asked.fields));

@@ -22,7 +22,7 @@ inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // how lon
 // A request over HTTP.
 struct Asked {
   PictureFields fields;  // all but the token
-  std::string body;      // of a POST, if it is no fields
+  std::string body;      // of a POST; in JSON its fields are among `fields`
   bool post = false;
   Asker asker;
   ReplyFunction reply;

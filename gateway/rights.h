@@ -1,8 +1,6 @@
 // The rights that requests need, and what a token gives and shows. Pure.
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -35,7 +33,7 @@ struct Asker {
   std::string token = {};
   std::function<void(const std::string& dataset)> reading = {};  // hears of what they may read and ask for; any thread; may be empty
 
-  // NotFound: the token does not show all of these, whether there are such datasets or not.
+  // NotFound: the token does not show all of these, whether there are any or not.
   Status MayRead(const std::vector<std::string>& datasets) const;
 };
 
@@ -60,8 +58,7 @@ Json AccessJson(const Access& access, bool takes_files);
 
 // A token for some datasets tells nothing of others, nor where data comes from.
 StatusReply ShownStatus(StatusReply status, const Access& access);
-// The service names others where a dataset is missing. Whoever may not see all reads the same line of a dataset that is not there as of one
-// that is not for them.
+// The service names others where a dataset is missing. Here that is one line, whatever the reason.
 Status ShownStatus(Status status, const Access& access);
 
 }  // namespace slabstream

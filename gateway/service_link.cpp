@@ -46,19 +46,14 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
 }
 
 ServiceLink::Ticket ServiceLink::Render(Asker asker, std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
-  return Post(
-      {.asker = std::move(asker), .frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = {}});
+  return Post({.asker = std::move(asker), .frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers)});
 }
 
 ServiceLink::Ticket ServiceLink::Ask(Asker asker, Inquiry question, Duration deadline, AnswerHandler done) {
   const auto answered = [done = std::move(done)](Result<Rendered> rendered) {
     done(rendered.ok() ? Result<Answer>(*std::move(rendered->answer)) : Result<Answer>(rendered.status()));
   };
-  return Post({.asker = std::move(asker),
-               .frames = {},
-               .deadline = deadline,
-               .handlers = {.progress = {}, .done = answered},
-               .question = std::move(question)});
+  return Post({.asker = std::move(asker), .deadline = deadline, .handlers = {.done = answered}, .question = std::move(question)});
 }
 
 void ServiceLink::Cancel(Ticket ticket) {
@@ -192,15 +187,14 @@ void ServiceLink::Forget(std::map<Ticket, OpenTask>::iterator task) {
 }
 
 std::vector<std::string> DatasetsOf(const ServiceLink::Inquiry& question) {
-  return std::visit(
-      []<class Query>(const Query& query) -> std::vector<std::string> {
-        if constexpr (requires { query.frame; })
-          return DatasetsOf(query.frame);
-        else if constexpr (!std::is_same_v<Query, StatusQuery>)
-          return {query.dataset};
-        return {};
-      },
-      question);
+  const auto of = []<class Query>(const Query& query) -> std::vector<std::string> {
+    if constexpr (requires { query.frame; }) return DatasetsOf(query.frame);
+    if constexpr (requires { query.dataset; }) return {query.dataset};
+    static_assert(
+        requires { query.frame; } || requires { query.dataset; } || std::is_same_v<Query, StatusQuery>);
+    return {};
+  };
+  return std::visit(of, question);
 }
 
 }  // namespace slabstream

@@ -32,8 +32,8 @@ class ServiceLink {
     std::optional<Answer> answer;   // to a question without frames
   };
   struct Handlers {
-    std::function<void(const FrameProgress&)> progress;  // may be empty
-    std::function<void(Result<Rendered>)> done;          // once, unless the ticket was cancelled before
+    std::function<void(const FrameProgress&)> progress = {};  // may be empty
+    std::function<void(Result<Rendered>)> done;               // once, unless the ticket was cancelled before
   };
 
   // `context` and what the handlers use must outlive it.
@@ -56,10 +56,10 @@ class ServiceLink {
   struct Task {
     Ticket ticket = 0;
     Asker asker;
-    std::vector<FrameRequest> frames;
+    std::vector<FrameRequest> frames = {};
     Duration deadline{};
     Handlers handlers;
-    std::optional<Inquiry> question;  // instead of frames
+    std::optional<Inquiry> question = {};  // instead of frames
   };
   struct OpenTask {
     Asker asker;

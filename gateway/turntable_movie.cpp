@@ -19,15 +19,9 @@ constexpr std::size_t kPartBytes = std::size_t{1} << 16;
 
 }  // namespace
 
-TurntableMovie::TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics, Asker asker,
+TurntableMovie::TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics,
                                TurntableRequest request)
-    : io_(io),
-      context_(context),
-      service_(std::move(service)),
-      metrics_(metrics),
-      asker_(std::move(asker)),
-      request_(std::move(request)),
-      output_(io) {}
+    : io_(io), context_(context), service_(std::move(service)), metrics_(metrics), request_(std::move(request)), output_(io) {}
 
 // ---- Make's thread
 
@@ -71,7 +65,7 @@ Status TurntableMovie::RenderAndEncode() {
       pictures_.emplace(index, std::move(rendered));
       changed_.notify_one();
     };
-    link.Render(asker_, {std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
+    link.Render(request_.asker, {std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
   };
   for (int i = 0, requested = 0; i < request_.frames; ++i) {
     while (requested < std::min(i + kInFlight, request_.frames)) request(requested++);
@@ -111,7 +105,7 @@ Status TurntableMovie::StartEncoder() {
 }
 
 Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
-  link.Ask(asker_, std::move(query), kAnswerDeadline, [this](Result<ServiceLink::Answer> reply) {
+  link.Ask(request_.asker, std::move(query), kAnswerDeadline, [this](Result<ServiceLink::Answer> reply) {
     const std::lock_guard lock(mutex_);
     answer_ = std::move(reply);
     changed_.notify_one();

@@ -25,6 +25,7 @@ namespace slabstream {
 
 struct TurntableRequest {
   RenderRequest render;  // the request of the first frame
+  Asker asker = {};
   int frames = 0;
   std::optional<TimeSteps> times = {};  // over which the frames are spread; none: the time of `render`
   CameraMove move = {};
@@ -34,8 +35,7 @@ struct TurntableRequest {
 class TurntableMovie final : public BodyStream, public std::enable_shared_from_this<TurntableMovie> {
  public:
   // `io`, `context` and `metrics` must outlive it.
-  TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics, Asker asker,
-                 TurntableRequest request);
+  TurntableMovie(boost::asio::io_context& io, Context& context, ServiceAddress service, Metrics& metrics, TurntableRequest request);
 
   // On a thread that stays as long as the process (Child): makes the movie, until it is done or abandoned. Says how it went.
   Status Make();
@@ -60,7 +60,6 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   Context& context_;
   const ServiceAddress service_;
   Metrics& metrics_;
-  const Asker asker_;
   const TurntableRequest request_;
   // Used by the io thread alone.
   boost::asio::posix::stream_descriptor output_;  // the encoder's output, while it is open

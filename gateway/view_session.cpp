@@ -16,10 +16,9 @@ namespace {
 
 namespace asio = boost::asio;
 
-constexpr Duration kDeadline = std::chrono::minutes(10);    // volumes may have to be loaded first
-constexpr std::size_t kLargePicture = 100'000;              // bytes: on its way, it may keep other messages waiting
-constexpr std::uint16_t kExpired = 4401, kMadeRoom = 4408;  // close codes: those from 4000 on are the application's
-constexpr double kMostDetail = 1000;                        // FrameRequest::detail
+constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
+constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
+constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
 std::string TextOf(const Json& json) { return json.dump(); }
 
@@ -70,17 +69,13 @@ void ViewSession::OnClosed(const std::string&) {
   closed_(*this);
 }
 
-void ViewSession::End() {
-  if (peer_ != nullptr) peer_->Close(1001, "the gateway ends");
-}
-
-void ViewSession::MakeRoom() {
-  if (peer_ != nullptr) peer_->Close(kMadeRoom, "another page has this place: change the view to come back");
+void ViewSession::End(std::uint16_t code, const std::string& why) {
+  if (peer_ != nullptr) peer_->Close(code, why);
 }
 
 bool ViewSession::HasExpired() {
   if (UnixNow() < asker_.access.until) return false;
-  peer_->Close(kExpired, asker_.access.ExpiredText());
+  End(kExpired, asker_.access.ExpiredText());
   return true;
 }
 

@@ -23,6 +23,8 @@
 
 namespace slabstream {
 
+inline constexpr std::uint16_t kExpired = 4401, kMadeRoom = 4408;  // close codes: those from 4000 on are the application's
+
 // What sessions share; all of it outlives them.
 struct SessionSurroundings {
   boost::asio::io_context& io;
@@ -42,8 +44,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
 
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
-  void End();       // the gateway stops
-  void MakeRoom();  // another page gets the place
+  void End(std::uint16_t code, const std::string& why);  // closes it
   SessionPlace place() const { return {asker_.token, machine_.used()}; }
   std::vector<std::string> datasets() const { return DatasetsOf(shown_); }  // of the latest picture
 

@@ -87,7 +87,6 @@ class Relay:
 
     def __init__(self, gateway: Callable[[Gateway | None], Gateway], say: Say, restarted: Callable[[], None]):
         self._gateway, self.say, self._restarted = gateway, say, restarted
-        self._lock = threading.Lock()
         self._asks: dict[int, _Ask] = {}
         self._streams: dict[int, _Stream] = {}
 
@@ -132,20 +131,13 @@ class Relay:
     # ---- requests
 
     def _ask(self, ask: int, method: str, path: str, body: bytes | None) -> None:
-        with self._lock:
-            if ask in self._asks:
-                return
-            full = len(self._asks) >= _MOST_ASKS
-            if not full:
-                self._asks[ask] = _Ask()
-        if full:
+        if len(self._asks) >= _MOST_ASKS:
             self.say({"answer": ask, "status": 429, "type": "application/json"}, [_error(f"{_MOST_ASKS} requests are under way, no more are taken")])
-        else:
-            threading.Thread(target=self._fetch, args=(_Here(), ask, method, path, body), name="slabstream ask", daemon=True).start()
+        elif ask not in self._asks:
+            asked = self._asks[ask] = _Ask()
+            threading.Thread(target=self._fetch, args=(_Here(), ask, asked, method, path, body), name="slabstream ask", daemon=True).start()
 
-    def _fetch(self, here: _Here, ask: int, method: str, path: str, body: bytes | None) -> None:
-        asked = self._asks[ask]
-
+    def _fetch(self, here: _Here, ask: int, asked: _Ask, method: str, path: str, body: bytes | None) -> None:
         def request(gateway: Gateway) -> http.client.HTTPConnection:
             asked.connection = connection = http.client.HTTPConnection(gateway.host, gateway.port, timeout=_ANSWER_SECONDS)
             connection.connect()
