@@ -276,8 +276,8 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
     asked_ = fmt::format("{:x}", std::random_device()());
     socket_.async_ping(websocket::ping_data(asked_), [self = shared_from_this()](Error error) {
       if (error || self->closing_) return;
-      self->answer_timer_.expires_after(
-          self->shared_->limits.silence);  // the ping has left, and what was to leave before it has its own limit
+      // From now on: what had to leave before it has a limit of its own.
+      self->answer_timer_.expires_after(self->shared_->limits.silence);
       self->answer_timer_.async_wait([self](Error stopped) {
         if (stopped || self->closing_) return;
         self->asked_.empty() ? self->Ping() : self->Drop("it did not answer a ping in time");

@@ -1,4 +1,4 @@
-// WebSockets whose other end behaves as no browser does.
+// Connections whose other end behaves as no browser does.
 #include "common/http/http.h"
 
 #include <gtest/gtest.h>
@@ -23,22 +23,26 @@ namespace {
 namespace asio = boost::asio;
 using std::chrono::milliseconds;
 
-// Says nothing of its own. Keeps why it was closed.
+// Sends so many bytes at once. Keeps why it was closed.
 class Session final : public WebSocketSession {
  public:
-  explicit Session(std::promise<std::string> closed) : closed_(std::move(closed)) {}
-  void OnOpen(WebSocketPeer&) override {}
+  Session(std::size_t bytes, std::promise<std::string> closed) : bytes_(bytes), closed_(std::move(closed)) {}
+  void OnOpen(WebSocketPeer& peer) override {
+    if (bytes_ > 0) peer.SendBinary("", std::make_shared<const std::vector<std::byte>>(bytes_));
+  }
   void OnText(std::string_view) override {}
   void OnClosed(const std::string& reason) override { closed_.set_value(reason); }
 
  private:
+  const std::size_t bytes_;
   std::promise<std::string> closed_;
 };
 
 class Server final : public HttpApplication {
  public:
-  explicit Server(Duration silence) : work_(asio::make_work_guard(io_)) {
-    server_ = HttpServer::Start(io_, "127.0.0.1", 0, std::nullopt, {.silence = silence}, *this).value();
+  // `bytes`: that a WebSocket's session sends.
+  explicit Server(const HttpLimits& limits, std::size_t bytes = 0) : bytes_(bytes), work_(asio::make_work_guard(io_)) {
+    server_ = HttpServer::Start(io_, "127.0.0.1", 0, std::nullopt, limits, *this).value();
     thread_ = std::thread([this] { io_.run(); });
   }
   ~Server() override {
@@ -56,12 +60,13 @@ class Server final : public HttpApplication {
   std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest&) override {
     std::promise<std::string> closed;
     closed_ = closed.get_future();
-    return WebSocketAccepted{.session = std::make_shared<Session>(std::move(closed)), .subprotocol = "any"};
+    return WebSocketAccepted{.session = std::make_shared<Session>(bytes_, std::move(closed)), .subprotocol = "any"};
   }
   std::vector<std::pair<std::string, std::string>> CommonHeaders() const override { return {}; }
   void CountRefusal(std::string_view) override {}
 
  private:
+  const std::size_t bytes_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_;
   std::unique_ptr<HttpServer> server_;
@@ -71,14 +76,26 @@ class Server final : public HttpApplication {
 
 class Peer {
  public:
-  explicit Peer(const Server& server) {
-    socket_.connect({asio::ip::address_v4::loopback(), server.port()});
+  explicit Peer(const Server& server) { socket_.connect({asio::ip::address_v4::loopback(), server.port()}); }
+  void Upgrade() {
     asio::write(socket_, asio::buffer(std::string("GET / HTTP/1.1\r\nHost: a\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                                                   "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n")));
     const std::size_t head = asio::read_until(socket_, buffer_, "\r\n\r\n");
     buffer_.consume(head);
   }
 
+  // Sends bytes as they are, and then one of `more` again and again until the other end closes the connection. What it says before that.
+  std::string Drip(const std::string& bytes, const std::string& more) {
+    asio::write(socket_, asio::buffer(bytes));
+    std::future<std::string> said = std::async(std::launch::async, [this] {
+      boost::system::error_code end;
+      asio::read(socket_, buffer_, end);
+      return Take(buffer_.size());
+    });
+    boost::system::error_code error;
+    while (said.wait_for(milliseconds(1)) != std::future_status::ready) asio::write(socket_, asio::buffer(more), error);
+    return said.get();
+  }
   // The payload of the next ping.
   std::string Ping() {
     const std::string head = Take(2);
@@ -106,6 +123,7 @@ class Peer {
   asio::streambuf buffer_;
 };
 
+constexpr Duration kForEver = std::chrono::hours(1);
 constexpr int kText = 1, kPong = 10;
 constexpr char kUnanswered[] = "it did not answer a ping in time";
 
@@ -116,22 +134,25 @@ std::string EndOfSending(Server& server, Peer& peer, int opcode, const std::stri
 }
 
 TEST(WebSocketTest, WhatAPageSendsIsNoAnswerToAPing) {
-  Server server(milliseconds(100));
+  Server server({.silence = milliseconds(100)});
   Peer peer(server);
+  peer.Upgrade();
   EXPECT_EQ(EndOfSending(server, peer, kText, "a view"), kUnanswered);
 }
 
 TEST(WebSocketTest, APongOfAnotherPingIsNoAnswer) {
   for (const std::string& payload : {std::string(), std::string("0"), std::string(125, 'x')}) {
-    Server server(milliseconds(100));
+    Server server({.silence = milliseconds(100)});
     Peer peer(server);
+    peer.Upgrade();
     EXPECT_EQ(EndOfSending(server, peer, kPong, payload), kUnanswered) << payload;
   }
 }
 
 TEST(WebSocketTest, WhoAnswersPingsStaysAndPingsDiffer) {
-  Server server(milliseconds(1500));
+  Server server({.silence = milliseconds(1500)});
   Peer peer(server);
+  peer.Upgrade();
   std::string before;
   for (int i = 0; i < 3; ++i) {
     const std::string ping = peer.Ping();
@@ -141,6 +162,21 @@ TEST(WebSocketTest, WhoAnswersPingsStaysAndPingsDiffer) {
   }
   EXPECT_EQ(server.closed().wait_for(milliseconds(0)), std::future_status::timeout);
   EXPECT_EQ(EndOfSending(server, peer, kPong, before), kUnanswered);  // it has answered before, and then says the same
+}
+
+TEST(WebSocketTest, AMessageLeavesInTimeWhateverThePageSends) {
+  Server server({.writing = milliseconds(100), .silence = kForEver}, std::size_t{64} << 20);
+  Peer peer(server);
+  peer.Upgrade();
+  EXPECT_EQ(EndOfSending(server, peer, kText, "a view"), "a message did not leave in time");
+}
+
+TEST(HttpTest, ARequestArrivesWithinItsTimeByteByByteOrNot) {
+  for (const char* begin : {"", "GET / HTTP/1.1\r\nHost: a\r\nX: ", "POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n"}) {
+    Server server({.header_bytes = std::size_t{1} << 20, .reading = milliseconds(100)});
+    Peer peer(server);
+    EXPECT_EQ(peer.Drip(begin, "x"), "") << begin;
+  }
 }
 
 }  // namespace
