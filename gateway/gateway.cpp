@@ -168,18 +168,12 @@ class Gateway::Impl : public HttpApplication {
       answer.headers.emplace_back("Allow", !route->second.post ? "GET, HEAD" : !route->second.get ? "POST" : "GET, HEAD, POST");
       return counted(std::move(answer));
     }
-    const Result<Access> access = *right == Right::kNone ? Access() : AccessOf(request, *target);
-    if (!access.ok()) return counted(NoToken(access.status()));
-    if (const auto why = WhyNot(*right, *access)) return counted(NoRight(*why));
+    Result<Asker> asker = *right == Right::kNone ? Asker() : AskerOf(request, *target);
+    if (!asker.ok()) return counted(NoToken(asker.status()));
+    if (const auto why = WhyNot(*right, asker->access)) return counted(NoRight(*why));
     Result<PictureFields> fields = FieldsOf(*target, post && !route->second.takes_bytes ? std::string_view(request.body) : "");
     if (!fields.ok()) return counted(Failure(fields.status()));
-    for (const std::string& name : *right == Right::kNone ? std::vector<std::string>() : NamedDatasets(*fields)) {
-      if (const auto why = WhyNotShown(name, *access)) return counted(NoRight(*why));
-      uploads_->Touch(name, MonotonicNow());
-    }
-    const auto shown = [counted, access = *access](HttpReply answer) {
-      // The service names other datasets where one is missing.
-      if (access.datasets && answer.status == 404) answer = Failure(ShownStatus(Status::NotFound(""), access));
+    const auto shown = [counted, access = asker->access](HttpReply answer) {
       if (answer.rest != nullptr && access.until != Access::kForEver) answer.rest = std::make_shared<EndingStream>(answer.rest, access);
       counted(std::move(answer));
     };
@@ -189,7 +183,7 @@ class Gateway::Impl : public HttpApplication {
       if (trace != nullptr) trace->End(answer.status);
       shown(std::move(answer));
     };
-    route->second.handle({request, *std::move(fields), *access, traced, trace});
+    route->second.handle({*std::move(fields), std::move(request.body), post, *std::move(asker), traced, request.gone, trace});
   }
 
   std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) override {
@@ -197,17 +191,23 @@ class Gateway::Impl : public HttpApplication {
     const Result<Target> target = ParseTarget(request.target);
     if (!target.ok()) return Failure(target.status());
     if (BelowBase(target->path) != "/api/v1/view") return Failure(404, "the WebSocket is /api/v1/view");
-    const Result<Access> access = AccessOf(request, *target);
-    if (!access.ok()) return NoToken(access.status());
+    Result<Asker> asker = AskerOf(request, *target);
+    if (!asker.ok()) return NoToken(asker.status());
     if (std::ranges::find(request.subprotocols, kViewProtocol) == request.subprotocols.end()) {
       return Failure(400, fmt::format("the WebSocket needs the subprotocol {}", kViewProtocol));
     }
     if (sessions_.size() >= std::size_t(options_.max_sessions)) {
       CountRefusal("sessions");
-      return Failure(429, fmt::format("there are {} views already, which is the limit", sessions_.size()));
+      std::vector<SessionPlace> places;
+      for (const ViewSession* session : sessions_) places.push_back(session->place());
+      const auto leaving = WhoMakesRoom(places, asker->token, MonotonicNow());
+      if (!leaving) return Failure(429, fmt::format("there are {} views already, which is the limit", sessions_.size()));
+      const auto session = std::next(sessions_.begin(), std::ptrdiff_t(*leaving));
+      (*session)->End(kMadeRoom, "another page has this place: change the view to come back");
+      sessions_.erase(session);
     }
     auto session = std::make_shared<ViewSession>(SessionSurroundings{.io = io_, .encoders = encoders_, .metrics = metrics_},
-                                                 std::make_unique<ServiceLink>(context_, service_), news_, *access,
+                                                 std::make_unique<ServiceLink>(context_, service_), news_, *std::move(asker),
                                                  [this](ViewSession& closed) { sessions_.erase(&closed); });
     sessions_.insert(session.get());
     return WebSocketAccepted{.session = std::move(session), .subprotocol = std::string(kViewProtocol)};
@@ -229,13 +229,6 @@ class Gateway::Impl : public HttpApplication {
   void CountRefusal(std::string_view reason) override { metrics_.CountRefusal(reason); }
 
  private:
-  struct Asked {
-    const HttpRequest& request;
-    PictureFields fields;  // all but the token
-    const Access& access;
-    ReplyFunction reply;
-    RequestTracePointer trace;  // may be null
-  };
   struct Route {
     // The right that each method needs. One that is not named is not taken.
     std::optional<Right> get;  // HEAD, too
@@ -249,7 +242,7 @@ class Gateway::Impl : public HttpApplication {
 
   std::map<std::string, Route, std::less<>> Routes() {
     const auto answer = [](std::function<HttpReply(const Access&)> make) {
-      return [make = std::move(make)](const Asked& asked) { asked.reply(make(asked.access)); };
+      return [make = std::move(make)](const Asked& asked) { asked.reply(make(asked.asker.access)); };
     };
     const auto text = [&](std::string (*make)()) {
       return answer([make, made = std::string()](const Access&) mutable {
@@ -284,14 +277,10 @@ class Gateway::Impl : public HttpApplication {
                                     return JsonReply({{"datasets", DatasetsJson(ShownStatus(news_->status, access).datasets)}});
                                   })};
     const auto bind = [](auto& requests, auto method) {
-      return [&requests, method](Asked asked) {
-        std::invoke(method, *requests, std::move(asked.fields), std::move(asked.reply), asked.request.gone);
-      };
+      return [&requests, method](Asked asked) { std::invoke(method, *requests, std::move(asked)); };
     };
     const auto picture = [this](auto method, PictureFileType type) {
-      return [this, method, type](Asked asked) {
-        std::invoke(method, *pictures_, type, std::move(asked.fields), std::move(asked.reply), asked.request.gone, std::move(asked.trace));
-      };
+      return [this, method, type](Asked asked) { std::invoke(method, *pictures_, type, std::move(asked)); };
     };
     for (const PictureFileTypeNames& names : PictureFileTypes()) {
       const auto route = [&](const char* kind) -> Route& { return routes[fmt::format("/api/v1/{}{}", kind, names.ending)]; };
@@ -308,15 +297,11 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/statistics"] = {.get = kView, .traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.get = kView, .post = kView, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.get = kView, .traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
-    routes["/api/v1/parameters"] = {.get = kView, .post = kSteer, .handle = [this](Asked asked) {
-                                      questions_->Parameters(std::move(asked.fields), asked.request.method == "POST",
-                                                             std::move(asked.reply), asked.request.gone);
-                                    }};
+    routes["/api/v1/parameters"] = {.get = kView, .post = kSteer, .handle = bind(questions_, &QuestionRequests::Parameters)};
     routes["/api/v1/upload"] = {.post = kSend, .takes_bytes = true, .handle = [this](Asked asked) {
                                   std::vector<std::string> taken;
                                   for (const DatasetStatus& dataset : news_->status.datasets) taken.push_back(dataset.name);
-                                  uploads_->Handle(std::move(asked.fields), asked.request.body, taken, std::move(asked.reply),
-                                                   asked.request.gone);
+                                  uploads_->Handle(std::move(asked), taken);
                                 }};
     routes["/api/v1/view"] = {.get = kView, .handle = answer([](const Access&) { return Failure(426, "this is a WebSocket"); })};
     return routes;
@@ -359,7 +344,7 @@ class Gateway::Impl : public HttpApplication {
     return Failure(403, *why);
   }
 
-  Result<Access> AccessOf(const HttpRequest& request, const Target& target) const {
+  Result<Asker> AskerOf(const HttpRequest& request, const Target& target) {
     std::string_view token;
     const auto protocol = std::ranges::find_if(request.subprotocols, [](const auto& each) { return each.starts_with(kTokenProtocol); });
     const auto field = std::ranges::find(target.fields, "token", &PictureField::name);
@@ -370,7 +355,13 @@ class Gateway::Impl : public HttpApplication {
     } else if (field != target.fields.end()) {
       token = field->text;
     }
-    return CheckAccess(token, options_.token, UnixNow());
+    Result<Access> access = CheckAccess(token, options_.token, UnixNow());
+    if (!access.ok()) return access.status();
+    // Files that pages have sent stay while somebody looks at them.
+    const auto reading = [this](const std::string& dataset) {
+      asio::post(io_, [this, dataset] { uploads_->Touch(dataset, MonotonicNow()); });
+    };
+    return Asker{*std::move(access), std::string(token), reading};
   }
 
   HttpReply NoToken(const Status& why) {
@@ -388,7 +379,7 @@ class Gateway::Impl : public HttpApplication {
   // How the service is, once a second, and more often while it is gone.
   void AskStatus() {
     constexpr Duration kPatience = std::chrono::seconds(2);
-    monitor_->Ask(StatusQuery{}, kPatience, [this](Result<ServiceLink::Answer> answer) {
+    monitor_->Ask({}, StatusQuery{}, kPatience, [this](Result<ServiceLink::Answer> answer) {
       asio::post(io_, [this, answer = std::move(answer)] {
         if (!stopping_) OnStatus(answer);
       });
@@ -443,7 +434,7 @@ class Gateway::Impl : public HttpApplication {
     link_->RequestStop();
     movies_->Stop();
     uploads_->Stop();
-    for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End();
+    for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End(1001, "the gateway ends");
     // Farewells get a moment to leave.
     auto timer = std::make_shared<asio::steady_timer>(io_, std::chrono::milliseconds(200));
     timer->async_wait([this, timer](boost::system::error_code) {

@@ -67,13 +67,14 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
 
 }  // namespace
 
-void MovieRequests::Turntable(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  Result<TurntableRequest> request = ParseTurntable(std::move(fields));
-  if (!request.ok()) return reply(Failure(request.status()));
-  if (const Status status = CheckHasMovieEncoder(); !status.ok()) return reply(Failure(501, status.message()));
+void MovieRequests::Turntable(Asked asked) {
+  Result<TurntableRequest> request = ParseTurntable(std::move(asked.fields));
+  if (!request.ok()) return asked.reply(Failure(request.status()));
+  request->asker = std::move(asked.asker);
+  if (const Status status = CheckHasMovieEncoder(); !status.ok()) return asked.reply(Failure(501, status.message()));
   if (movies_.size() >= std::size_t(kMaxMovies)) {
     metrics_.CountRefusal("movies");
-    return reply(Failure(429, fmt::format("{} movies are under way, which is the limit", movies_.size())));
+    return asked.reply(Failure(429, fmt::format("{} movies are under way, which is the limit", movies_.size())));
   }
   const auto movie = std::make_shared<TurntableMovie>(io_, context_, service_, metrics_, *std::move(request));
   movies_.insert(movie);
@@ -84,12 +85,12 @@ void MovieRequests::Turntable(PictureFields fields, ReplyFunction reply, const G
       movie->End(std::move(status));
     });
   });
-  *gone = [this, movie] {
+  *asked.gone = [this, movie] {
     metrics_.CountRefusal("gone");
     movie->Abandon();
   };
   // The reply begins with the movie's first bytes: until then the service's errors have a status of their own.
-  movie->Read([movie, reply = std::move(reply)](Result<std::string> first) {
+  movie->Read([movie, reply = std::move(asked.reply)](Result<std::string> first) {
     if (!first.ok()) return reply(Failure(first.status()));
     reply({.type = "video/mp4",
            .body = *std::move(first),

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "client/request/picture_fields.h"
-#include "gateway/reply.h"
+#include "gateway/requests_under_way.h"
 #include "gateway/turntable_movie.h"
 
 namespace slabstream {
@@ -24,7 +24,7 @@ class MovieRequests {
       : io_(io), context_(context), service_(std::move(service)), metrics_(metrics), makers_(kMaxMovies) {}
   ~MovieRequests() { Join(); }
 
-  void Turntable(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Turntable(Asked asked);
 
   // Gives up all movies.
   void Stop();

@@ -21,19 +21,19 @@ HttpReply FileReply(PictureFileType type, const Result<std::vector<std::byte>>& 
 
 }  // namespace
 
-void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode,
-                               ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
+void PictureRequests::MakeFile(PictureFileType type, Asked asked, std::vector<FrameRequest> frames, const PictureFormat& format,
+                               EncodeFunction encode) {
   for (FrameRequest& frame : frames) {
     frame.straight8 = type == PictureFileType::kPng && HoldsStraight8(format);
     frame.straight8_over = OpaqueBackground(format);
     frame.key = format.annotations.needs_key();
   }
-  if (const Status status = CheckCanDraw(format.annotations); !status.ok()) return reply(Failure(status));
-  under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
-    const auto done = [this, type, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
-                       asked = MonotonicNow()](Result<ServiceLink::Rendered> rendered) {
+  if (const Status status = CheckCanDraw(format.annotations); !status.ok()) return asked.reply(Failure(status));
+  under_way_.Begin(std::move(asked.reply), asked.gone, [&](const RequestsUnderWay::Finish& finish) {
+    const auto done = [this, type, encode = std::move(encode), finish, trace = std::move(asked.trace), dataset = frames.front().dataset,
+                       since = MonotonicNow()](Result<ServiceLink::Rendered> rendered) {
       if (!rendered.ok()) {
-        if (trace != nullptr) trace->AddFailure(dataset, asked, rendered.status());
+        if (trace != nullptr) trace->AddFailure(dataset, since, rendered.status());
         return finish([status = rendered.status()] { return Failure(status); });
       }
       if (trace != nullptr) trace->AddFrames(dataset, rendered->pictures);
@@ -51,15 +51,14 @@ void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> f
         finish([type, file, renderer] { return FileReply(type, *file, renderer); });
       });
     };
-    return link_.Render(std::move(frames), kAnswerDeadline, {.progress = {}, .done = done});
+    return link_.Render(std::move(asked.asker), std::move(frames), kAnswerDeadline, {.progress = {}, .done = done});
   });
 }
 
-void PictureRequests::Render(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone,
-                             RequestTracePointer trace) {
-  Result<RenderRequest> render = ParseRenderFields(fields);
-  if (!render.ok()) return reply(Failure(render.status()));
-  if (const Status status = CheckPictureSize(type, render->frame.size); !status.ok()) return reply(Failure(status));
+void PictureRequests::Render(PictureFileType type, Asked asked) {
+  Result<RenderRequest> render = ParseRenderFields(asked.fields);
+  if (!render.ok()) return asked.reply(Failure(render.status()));
+  if (const Status status = CheckPictureSize(type, render->frame.size); !status.ok()) return asked.reply(Failure(status));
   const auto encode = [type, request = *render](const ServiceLink::Rendered& rendered) {
     const Picture& picture = rendered.pictures.front();
     const FrameRequest made = AsMade(request.frame, picture.statistics);
@@ -68,16 +67,15 @@ void PictureRequests::Render(PictureFileType type, const PictureFields& fields, 
                              .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return PictureFile(type, picture.image, picture.size, request.format, notes);
   };
-  MakeFile(type, {render->frame}, render->format, encode, std::move(reply), gone, std::move(trace));
+  MakeFile(type, std::move(asked), {render->frame}, render->format, encode);
 }
 
-void PictureRequests::Slice(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone,
-                            RequestTracePointer trace) {
-  Result<SliceRequest> slice = ParseSliceFields(fields);
-  if (!slice.ok()) return reply(Failure(slice.status()));
+void PictureRequests::Slice(PictureFileType type, Asked asked) {
+  Result<SliceRequest> slice = ParseSliceFields(asked.fields);
+  if (!slice.ok()) return asked.reply(Failure(slice.status()));
   Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
-  if (!frames.ok()) return reply(Failure(frames.status()));
-  if (const Status status = CheckPictureSize(type, slice->size()); !status.ok()) return reply(Failure(status));
+  if (!frames.ok()) return asked.reply(Failure(frames.status()));
+  if (const Status status = CheckPictureSize(type, slice->size()); !status.ok()) return asked.reply(Failure(status));
   const auto encode = [type, request = *slice](ServiceLink::Rendered rendered) {
     PictureNotes notes{.key = std::move(rendered.pictures.front().key)};
     std::vector<PictureImage> images;
@@ -87,17 +85,18 @@ void PictureRequests::Slice(PictureFileType type, const PictureFields& fields, R
     }
     return PictureFile(type, SideBySide(images, request.frame.size), request.size(), request.format, notes);
   };
-  MakeFile(type, *std::move(frames), slice->format, encode, std::move(reply), gone, std::move(trace));
+  MakeFile(type, std::move(asked), *std::move(frames), slice->format, encode);
 }
 
-void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {
-  const Result<RenderRequest> render = ParseRenderFields(fields);
-  if (!render.ok()) return reply(Failure(render.status()));
+void PictureRequests::Command(const Asked& asked) {
+  const Result<RenderRequest> render = ParseRenderFields(asked.fields);
+  if (!render.ok()) return asked.reply(Failure(render.status()));
+  if (const Status status = asked.asker.MayRead(DatasetsOf(render->frame)); !status.ok()) return asked.reply(Failure(status));
   PictureRecord record;
   record.source = render->frame.dataset;
   record.request = render->frame;
   record.format = render->format;
-  reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", MapFilesOf(render->frame)}}));
+  asked.reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", MapFilesOf(render->frame)}}));
 }
 
 }  // namespace slabstream

@@ -3,7 +3,6 @@
 
 #include "client/pictures/picture_writer.h"
 #include "client/request/picture_fields.h"
-#include "gateway/request_trace.h"
 #include "gateway/requests_under_way.h"
 
 namespace boost::asio {
@@ -18,16 +17,14 @@ class PictureRequests {
   PictureRequests(boost::asio::io_context& io, boost::asio::thread_pool& encoders, Metrics& metrics, ServiceLink& link, int most)
       : encoders_(encoders), metrics_(metrics), link_(link), under_way_(io, metrics, link, "pictures", most) {}
 
-  // `trace` may be null.
-  void Render(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
-  void Slice(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
-  void Command(const PictureFields& fields, const ReplyFunction& reply, const Gone& gone);
+  void Render(PictureFileType type, Asked asked);
+  void Slice(PictureFileType type, Asked asked);
+  void Command(const Asked& asked);
 
  private:
   // Renders the frames, has `encode` make a file of the pictures on an encoder's thread, and replies with it.
   using EncodeFunction = std::function<Result<std::vector<std::byte>>(ServiceLink::Rendered)>;
-  void MakeFile(PictureFileType type, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode,
-                ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
+  void MakeFile(PictureFileType type, Asked asked, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode);
 
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;

@@ -52,10 +52,10 @@ Query AboutAlone(FieldReader& read, Query query) {
 QuestionRequests::QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link)
     : metrics_(metrics), link_(link), under_way_(io, metrics, link, "questions", kMaxQuestions) {}
 
-void QuestionRequests::Ask(std::string_view name, const FieldReader& read, ServiceLink::Inquiry question, const MakeFunction& make,
-                           ReplyFunction reply, const Gone& gone) {
-  if (!read.status().ok()) return reply(Failure(read.status()));
-  under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
+void QuestionRequests::Ask(std::string_view name, const FieldReader& read, Asked asked, ServiceLink::Inquiry question,
+                           const MakeFunction& make) {
+  if (!read.status().ok()) return asked.reply(Failure(read.status()));
+  under_way_.Begin(std::move(asked.reply), asked.gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, name, make, finish, begin = MonotonicNow()](Result<ServiceLink::Answer> answer) {
       finish([this, name, make, begin, held = std::make_shared<const Result<ServiceLink::Answer>>(std::move(answer))] {
         if (!held->ok()) return Failure(held->status());
@@ -65,52 +65,45 @@ void QuestionRequests::Ask(std::string_view name, const FieldReader& read, Servi
         return made;
       });
     };
-    return link_.Ask(std::move(question), kAnswerDeadline, done);
+    return link_.Ask(std::move(asked.asker), std::move(question), kAnswerDeadline, done);
   });
 }
 
 template <class Query, class Reply>
-void QuestionRequests::AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), PictureFields fields,
-                                    ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), Asked asked) {
+  FieldReader read(std::move(asked.fields));
   Query query = AboutAlone(read, Query());
   const auto make = [json, dataset = query.dataset](const ServiceLink::Answer& answer) {
     return JsonReply(json(dataset, std::get<Reply>(answer)));
   };
-  Ask(name, read, std::move(query), make, std::move(reply), gone);
+  Ask(name, read, std::move(asked), std::move(query), make);
 }
 
-void QuestionRequests::Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  AskOfDataset<SummaryQuery>("histogram", HistogramJson, std::move(fields), std::move(reply), gone);
+void QuestionRequests::Histogram(Asked asked) { AskOfDataset<SummaryQuery>("histogram", HistogramJson, std::move(asked)); }
+void QuestionRequests::Labels(Asked asked) { AskOfDataset<SummaryQuery>("labels", LabelsJson, std::move(asked)); }
+void QuestionRequests::JointHistogram(Asked asked) {
+  AskOfDataset<JointHistogramQuery>("joint-histogram", JointHistogramJson, std::move(asked));
 }
 
-void QuestionRequests::JointHistogram(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  AskOfDataset<JointHistogramQuery>("joint-histogram", JointHistogramJson, std::move(fields), std::move(reply), gone);
-}
-
-void QuestionRequests::Labels(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  AskOfDataset<SummaryQuery>("labels", LabelsJson, std::move(fields), std::move(reply), gone);
-}
-
-void QuestionRequests::Value(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::Value(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   const Vec3 point = read.Value(ParsePoint("at", read.Need("at", kPointHelp)));
   const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
-  Ask("value", read, AboutAlone(read, SampleQuery{.points = {point}}), make, std::move(reply), gone);
+  Ask("value", read, std::move(asked), AboutAlone(read, SampleQuery{.points = {point}}), make);
 }
 
-void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::Profile(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   const std::string from_text = read.Need("from", kLineHelp), to_text = read.Need("to", kLineHelp);
   const Vec3 from = read.Value(ParsePoint("from", from_text)), to = read.Value(ParsePoint("to", to_text));
   const std::string samples_text = read.Get("samples", std::to_string(kProfileSamples));
   const int samples = std::max(read.Value(ParseInteger("samples", samples_text, 2, int(kMaxSamplePoints))), 2);
   const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(ProfileJson(std::get<SampleReply>(answer).samples)); };
-  Ask("profile", read, AboutAlone(read, SampleQuery{.points = PointsAlong(from, to, samples)}), make, std::move(reply), gone);
+  Ask("profile", read, std::move(asked), AboutAlone(read, SampleQuery{.points = PointsAlong(from, to, samples)}), make);
 }
 
-void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::Statistics(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   const ClipBox box = read.Value(ParseClipBox("box", read.Get("box", kWholeBox)));
   const std::string labels = read.Get("labels", "false"), format = read.Get("format", "json");
   const bool by_label = labels == "true" || labels.empty(), csv = format == "csv";
@@ -124,11 +117,11 @@ void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, con
     if (csv) return HttpReply{.type = "text/csv; charset=utf-8", .body = LabelStatisticsCsv(found), .headers = {}};
     return JsonReply(by_label ? LabelStatisticsJson(found) : BoxStatisticsJson(found.statistics));
   };
-  Ask("statistics", read, AboutAlone(read, StatisticsQuery{.box = box, .labels = by_label}), make, std::move(reply), gone);
+  Ask("statistics", read, std::move(asked), AboutAlone(read, StatisticsQuery{.box = box, .labels = by_label}), make);
 }
 
-void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::Pick(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   const std::string x_text = read.Need("x", kPixelXHelp), y_text = read.Need("y", kPixelYHelp);
   const RenderRequest render = read.Value(ParseRenderFields(read.rest()));
   const double x = read.Value(ParseNumber("x", x_text, {0, double(render.frame.size.width)}));
@@ -136,11 +129,11 @@ void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gon
   const auto make = [frame = render.frame](const ServiceLink::Answer& answer) {
     return JsonReply(PickJson(std::get<PickReply>(answer), frame));
   };
-  Ask("pick", read, PickQuery{.frame = render.frame, .x = x, .y = y}, make, std::move(reply), gone);
+  Ask("pick", read, std::move(asked), PickQuery{.frame = render.frame, .x = x, .y = y}, make);
 }
 
-void QuestionRequests::Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(fields);
+void QuestionRequests::Transfer(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   SummaryQuery query = About(read, SummaryQuery());
   for (const PictureField& field : read.rest()) {
     if (field.name != "dataset" && field.name != "transfer" && field.name != "scalar-range") {
@@ -155,19 +148,19 @@ void QuestionRequests::Transfer(const PictureFields& fields, ReplyFunction reply
   const auto make = [name = preset != nullptr ? *preset : "function"](const ServiceLink::Answer& answer) {
     return HttpReply{.body = FormatParaViewColorMap(std::get<SummaryReply>(answer).transfer, name)};
   };
-  Ask("transfer", read, std::move(query), make, std::move(reply), gone);
+  Ask("transfer", read, std::move(asked), std::move(query), make);
 }
 
-void QuestionRequests::Parameters(PictureFields fields, bool post, ReplyFunction reply, const Gone& gone) {
-  FieldReader read(std::move(fields));
+void QuestionRequests::Parameters(Asked asked) {
+  FieldReader read(std::move(asked.fields));
   SteerDataset order;
   if (read.Has("set")) {
-    if (!post) return reply(Failure(405, "parameters are set by POST"));
+    if (!asked.post) return asked.reply(Failure(405, "parameters are set by POST"));
     order.values = read.Value(ParseSteeredValues("set", read.Need("set", "")));
   }
   order.dataset = read.Dataset();
   const auto make = [](const ServiceLink::Answer& answer) { return JsonReply(SimulationJson(std::get<SteerReply>(answer).simulation)); };
-  Ask("parameters", read, std::move(order), make, std::move(reply), gone);
+  Ask("parameters", read, std::move(asked), std::move(order), make);
 }
 
 }  // namespace slabstream

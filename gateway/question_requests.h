@@ -6,7 +6,6 @@
 
 #include "client/request/picture_fields.h"
 #include "common/json/json.h"
-#include "gateway/request_fields.h"
 #include "gateway/requests_under_way.h"
 
 namespace slabstream {
@@ -16,25 +15,23 @@ class QuestionRequests {
   // All must outlive this.
   QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link);
 
-  void Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void JointHistogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Labels(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Value(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Profile(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Pick(PictureFields fields, ReplyFunction reply, const Gone& gone);
-  void Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
-  void Parameters(PictureFields fields, bool post, ReplyFunction reply, const Gone& gone);  // only a POST changes any
+  void Histogram(Asked asked);
+  void JointHistogram(Asked asked);
+  void Labels(Asked asked);
+  void Value(Asked asked);
+  void Profile(Asked asked);
+  void Statistics(Asked asked);
+  void Pick(Asked asked);
+  void Transfer(Asked asked);
+  void Parameters(Asked asked);  // only a POST changes any
 
  private:
   using MakeFunction = std::function<HttpReply(const ServiceLink::Answer&)>;
   // Replies with the mistake of `read` if there is one.
-  void Ask(std::string_view name, const FieldReader& read, ServiceLink::Inquiry question, const MakeFunction& make, ReplyFunction reply,
-           const Gone& gone);
+  void Ask(std::string_view name, const FieldReader& read, Asked asked, ServiceLink::Inquiry question, const MakeFunction& make);
   // A question about a dataset alone, whose answer becomes JSON.
   template <class Query, class Reply>
-  void AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), PictureFields fields, ReplyFunction reply,
-                    const Gone& gone);
+  void AskOfDataset(std::string_view name, Json (*json)(const std::string&, const Reply&), Asked asked);
 
   Metrics& metrics_;
   ServiceLink& link_;

@@ -7,6 +7,8 @@
 
 #include "gateway/metrics.h"
 #include "gateway/reply.h"
+#include "gateway/request_fields.h"
+#include "gateway/request_trace.h"
 #include "gateway/service_link.h"
 
 namespace boost::asio {
@@ -16,6 +18,17 @@ class io_context;
 namespace slabstream {
 
 inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // how long the service may take
+
+// A request over HTTP.
+struct Asked {
+  PictureFields fields;  // all but the token
+  std::string body;      // of a POST; in JSON its fields are among `fields`
+  bool post = false;
+  Asker asker;
+  ReplyFunction reply;
+  Gone gone;
+  RequestTracePointer trace;  // may be null
+};
 
 class RequestsUnderWay {
  public:

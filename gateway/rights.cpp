@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <tuple>
 #include <utility>
 
-#include "client/request/request_options.h"
-#include "client/request/values.h"
 #include "common/base/printable.h"
 
 namespace slabstream {
@@ -29,21 +30,27 @@ Json AccessJson(const Access& access, bool takes_files) {
           {"exp", access.until != Access::kForEver ? Json(access.until) : Json()}};
 }
 
-std::vector<std::string> NamedDatasets(const PictureFields& fields) {
-  std::vector<std::string> named;
-  for (const auto& [name, text] : fields) {
-    if (name == "dataset") named.push_back(text);
-    const RequestOption* const option = FindRequestOption(name);
-    if (option == nullptr || option->path != "shapes") continue;
-    const Result<ShapeChoice> shape = ParseShape(name, text);
-    if (shape.ok()) named.push_back(shape->shape);  // what is wrong is refused by whoever makes the picture
-  }
-  return named;
+std::vector<std::string> DatasetsOf(const FrameRequest& request) {
+  std::vector<std::string> names = {request.dataset};
+  for (const ShapeChoice& choice : request.shapes) names.push_back(choice.shape);
+  return names;
 }
 
-std::optional<std::string> WhyNotShown(std::string_view dataset, const Access& access) {
-  if (access.Shows(dataset)) return std::nullopt;
-  return fmt::format("the token does not show dataset '{}'", Printable(std::string(dataset.substr(0, 128))));
+Status Asker::MayRead(const std::vector<std::string>& datasets) const {
+  const auto shown = [this](const std::string& name) { return access.Shows(name); };
+  if (!std::ranges::all_of(datasets, shown)) return ShownStatus(Status::NotFound(""), access);
+  if (reading) std::ranges::for_each(datasets, reading);
+  return Status::Ok();
+}
+
+std::optional<std::size_t> WhoMakesRoom(std::span<const SessionPlace> places, std::string_view holder, Time now) {
+  std::map<std::string_view, std::size_t> counts;
+  for (const SessionPlace& place : places) ++counts[place.holder];
+  const auto is_idle = [&](const SessionPlace& place) { return now - place.used >= kIdleAfter; };
+  const auto rank = [&](const SessionPlace& place) { return std::tuple(is_idle(place), counts[place.holder], now - place.used); };
+  const auto first = std::ranges::max_element(places, {}, rank);
+  if (first == places.end() || !(is_idle(*first) || counts[first->holder] >= counts[holder] + 2)) return std::nullopt;
+  return std::size_t(first - places.begin());
 }
 
 StatusReply ShownStatus(StatusReply status, const Access& access) {

@@ -1,6 +1,7 @@
 #include "gateway/service_link.h"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "common/base/log.h"
@@ -44,15 +45,15 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
   return ticket;
 }
 
-ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
-  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = {}});
+ServiceLink::Ticket ServiceLink::Render(Asker asker, std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
+  return Post({.asker = std::move(asker), .frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers)});
 }
 
-ServiceLink::Ticket ServiceLink::Ask(Inquiry question, Duration deadline, AnswerHandler done) {
+ServiceLink::Ticket ServiceLink::Ask(Asker asker, Inquiry question, Duration deadline, AnswerHandler done) {
   const auto answered = [done = std::move(done)](Result<Rendered> rendered) {
     done(rendered.ok() ? Result<Answer>(*std::move(rendered->answer)) : Result<Answer>(rendered.status()));
   };
-  return Post({.frames = {}, .deadline = deadline, .handlers = {.progress = {}, .done = answered}, .question = std::move(question)});
+  return Post({.asker = std::move(asker), .deadline = deadline, .handlers = {.done = answered}, .question = std::move(question)});
 }
 
 void ServiceLink::Cancel(Ticket ticket) {
@@ -128,7 +129,11 @@ void ServiceLink::TakeOrders() {
 }
 
 void ServiceLink::Begin(Task task) {
+  Status may = task.question ? task.asker.MayRead(DatasetsOf(*task.question)) : Status::Ok();
+  for (const FrameRequest& frame : task.frames) may = may.ok() ? task.asker.MayRead(DatasetsOf(frame)) : may;
+  if (!may.ok()) return task.handlers.done(std::move(may));
   OpenTask& open = open_[task.ticket];
+  open.asker = std::move(task.asker);
   open.handlers = std::move(task.handlers);
   open.rendered.pictures.resize(task.frames.size());
   for (const FrameRequest& frame : task.frames) open.requests.push_back(client_->Submit(frame, task.deadline));
@@ -150,7 +155,7 @@ void ServiceLink::Handle(ClientEvent event) {
     return;
   }
   if (auto* failure = std::get_if<Status>(&event.what)) {
-    Status status = std::move(*failure);
+    Status status = ShownStatus(std::move(*failure), task.asker.access);
     requests_.erase(request);
     const auto done = std::move(task.handlers.done);
     Forget(found);
@@ -179,6 +184,17 @@ void ServiceLink::Forget(std::map<Ticket, OpenTask>::iterator task) {
     if (requests_.erase(id) > 0) client_->Cancel(id);
   }
   open_.erase(task);
+}
+
+std::vector<std::string> DatasetsOf(const ServiceLink::Inquiry& question) {
+  const auto of = []<class Query>(const Query& query) -> std::vector<std::string> {
+    if constexpr (requires { query.frame; }) return DatasetsOf(query.frame);
+    if constexpr (requires { query.dataset; }) return {query.dataset};
+    static_assert(
+        requires { query.frame; } || requires { query.dataset; } || std::is_same_v<Query, StatusQuery>);
+    return {};
+  };
+  return std::visit(of, question);
 }
 
 }  // namespace slabstream

@@ -1,7 +1,8 @@
 // ServiceLink: a client of the service on a thread of its own, for those who must not wait. Each link is a client of its own to the
 // service, which shares its workers fairly among clients.
 //
-// It connects by itself, at once and again after the service was gone.
+// It connects by itself, at once and again after the service was gone. All that the gateway reads of the service comes through a link, and
+// this is where rights to datasets are checked: by what the finished request reads, in whatever words it was asked for.
 #pragma once
 
 #include <condition_variable>
@@ -16,6 +17,7 @@
 
 #include "client/client.h"
 #include "common/base/status.h"
+#include "gateway/rights.h"
 
 namespace slabstream {
 
@@ -30,8 +32,8 @@ class ServiceLink {
     std::optional<Answer> answer;   // to a question without frames
   };
   struct Handlers {
-    std::function<void(const FrameProgress&)> progress;  // may be empty
-    std::function<void(Result<Rendered>)> done;          // once, unless the ticket was cancelled before
+    std::function<void(const FrameProgress&)> progress = {};  // may be empty
+    std::function<void(Result<Rendered>)> done;               // once, unless the ticket was cancelled before
   };
 
   // `context` and what the handlers use must outlive it.
@@ -41,10 +43,10 @@ class ServiceLink {
   ServiceLink& operator=(const ServiceLink&) = delete;
 
   // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
-  // thread. Unavailable: the service does not answer.
-  Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
+  // thread. Unavailable: the service does not answer. NotFound: there is no such dataset, or none that `asker` may read.
+  Ticket Render(Asker asker, std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
   // Any thread. As Render; `done` is called on the link's thread, once, unless the ticket was cancelled before.
-  Ticket Ask(Inquiry question, Duration deadline, AnswerHandler done);
+  Ticket Ask(Asker asker, Inquiry question, Duration deadline, AnswerHandler done);
   // Any thread. The handlers may still be called if they are about to be.
   void Cancel(Ticket ticket);
   // Any thread, returns at once: the link's thread begins to end. Then the destructor hardly waits.
@@ -53,12 +55,14 @@ class ServiceLink {
  private:
   struct Task {
     Ticket ticket = 0;
-    std::vector<FrameRequest> frames;
+    Asker asker;
+    std::vector<FrameRequest> frames = {};
     Duration deadline{};
     Handlers handlers;
-    std::optional<Inquiry> question;  // instead of frames
+    std::optional<Inquiry> question = {};  // instead of frames
   };
   struct OpenTask {
+    Asker asker;
     Handlers handlers;
     std::vector<RequestId> requests;  // one for each frame, or that of the question
     Rendered rendered;
@@ -92,5 +96,8 @@ class ServiceLink {
   bool stopping_ = false;
   std::thread thread_;
 };
+
+// The datasets that a question reads.
+std::vector<std::string> DatasetsOf(const ServiceLink::Inquiry& question);
 
 }  // namespace slabstream

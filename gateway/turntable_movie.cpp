@@ -65,7 +65,7 @@ Status TurntableMovie::RenderAndEncode() {
       pictures_.emplace(index, std::move(rendered));
       changed_.notify_one();
     };
-    link.Render({std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
+    link.Render(request_.asker, {std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
   };
   for (int i = 0, requested = 0; i < request_.frames; ++i) {
     while (requested < std::min(i + kInFlight, request_.frames)) request(requested++);
@@ -105,7 +105,7 @@ Status TurntableMovie::StartEncoder() {
 }
 
 Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
-  link.Ask(std::move(query), kAnswerDeadline, [this](Result<ServiceLink::Answer> reply) {
+  link.Ask(request_.asker, std::move(query), kAnswerDeadline, [this](Result<ServiceLink::Answer> reply) {
     const std::lock_guard lock(mutex_);
     answer_ = std::move(reply);
     changed_.notify_one();

@@ -25,6 +25,7 @@ namespace slabstream {
 
 struct TurntableRequest {
   RenderRequest render;  // the request of the first frame
+  Asker asker = {};
   int frames = 0;
   std::optional<TimeSteps> times = {};  // over which the frames are spread; none: the time of `render`
   CameraMove move = {};

@@ -49,33 +49,33 @@ std::string FileNameForService(std::string_view name) {
   return safe.empty() ? "_" : safe;
 }
 
-void Uploads::Handle(PictureFields fields, std::string body, const std::vector<std::string>& taken, ReplyFunction reply, const Gone& gone) {
-  if (most_bytes_ == 0) return reply(Failure(403, "this gateway takes no files: it was started with --max-upload 0"));
-  FieldReader read(std::move(fields));
-  if (read.Has("file")) return Begin(std::move(read), taken, reply);
+void Uploads::Handle(Asked asked, const std::vector<std::string>& taken) {
+  if (most_bytes_ == 0) return asked.reply(Failure(403, "this gateway takes no files: it was started with --max-upload 0"));
+  FieldReader read(std::move(asked.fields));
+  if (read.Has("file")) return Begin(std::move(read), taken, asked.reply);
   const std::string id = read.Need("upload", "what the request with `file` and `bytes` has answered");
-  if (!read.status().ok()) return reply(Failure(read.status()));
+  if (!read.status().ok()) return asked.reply(Failure(read.status()));
   const Place upload = uploads_.find(id);
   if (upload == uploads_.end()) {
     constexpr auto kMinutes = std::chrono::duration_cast<std::chrono::minutes>(kUnseen).count();
-    return reply(Failure(404, fmt::format("there is no such upload: it failed, or was removed after {} minutes unseen", kMinutes)));
+    return asked.reply(Failure(404, fmt::format("there is no such upload: it failed, or was removed after {} minutes unseen", kMinutes)));
   }
   upload->second.used = MonotonicNow();
   if (read.Has("drop")) {
     const ReplyFunction waiting = std::move(upload->second.waiting);
     uploads_.erase(upload);
     if (waiting) waiting(Failure(404, "the upload was dropped"));
-    return reply(JsonReply(Json::object()));
+    return asked.reply(JsonReply(Json::object()));
   }
   if (upload->second.failure) {
     const Status why = *upload->second.failure;
     uploads_.erase(upload);
-    return reply(Failure(why));
+    return asked.reply(Failure(why));
   }
   const std::uint64_t begin = NeedCount(read, "begin", "where in the file the body begins", 0);
   read.NothingElse();
-  if (!read.status().ok()) return reply(Failure(read.status()));
-  Continue(upload, begin, std::move(body), std::move(reply), gone);
+  if (!read.status().ok()) return asked.reply(Failure(read.status()));
+  Continue(upload, begin, std::move(asked.body), std::move(asked.reply), asked.gone);
 }
 
 void Uploads::Begin(FieldReader read, const std::vector<std::string>& taken, const ReplyFunction& reply) {

@@ -21,8 +21,7 @@
 #include "client/request/picture_fields.h"
 #include "common/base/time.h"
 #include "gateway/metrics.h"
-#include "gateway/reply.h"
-#include "gateway/request_fields.h"
+#include "gateway/requests_under_way.h"
 
 namespace slabstream {
 
@@ -42,7 +41,7 @@ class Uploads {
       : io_(io), context_(context), service_(std::move(service)), metrics_(metrics), most_bytes_(most_bytes) {}
 
   // `taken`: names of the service's datasets.
-  void Handle(PictureFields fields, std::string body, const std::vector<std::string>& taken, ReplyFunction reply, const Gone& gone);
+  void Handle(Asked asked, const std::vector<std::string>& taken);
   // A page or a request shows the dataset, which may be any.
   void Touch(std::string_view dataset, Time now);
   void RemoveUnseen(Time now);

@@ -120,6 +120,7 @@ ViewMachine::Actions ViewMachine::OnEncodeFailed(Time now) {
 
 ViewMachine::Actions ViewMachine::OnAck(std::uint64_t frame, Duration in_page, Time now) {
   if (!link_.OnAck(frame, in_page, now)) return {};
+  used_ = now;
   if (link_.connection_time() > kVideoAbove && link_.delay() >= kFar) video_until_ = now + kVideoFor;
   if (link_.picture_time() > kSmallAbove) small_ = true;
   if (link_.picture_time() < kLargeBelow) small_ = false;

@@ -55,6 +55,7 @@ class ViewMachine {
  public:
   using Actions = std::vector<ViewAction>;
 
+  explicit ViewMachine(Time opened = {}) : used_(opened) {}
   // `seq` rises from view to view; one that does not is ignored. `video`: the page can show it.
   Actions OnView(std::uint64_t seq, bool video, Time now);
   // finest: with less coarseness the picture would be the same. shadowed: the view has shadows or ambient occlusion.
@@ -72,6 +73,8 @@ class ViewMachine {
   // When OnTime is due; nullopt: nothing waits for a time.
   std::optional<Time> wake_time() const { return wake_; }
   const PageLink& link() const { return link_; }
+  // When the page last acknowledged a picture that it had been sent; before that, the time of the constructor.
+  Time used() const { return used_; }
   // The JPEG quality of a moving picture, by the time that pictures take on the connection.
   int Quality() const;
 
@@ -95,6 +98,7 @@ class ViewMachine {
   void AdaptScale(bool no_coarser, Duration time, Time now);
   void WakeAt(Time time);
 
+  Time used_{};
   std::uint64_t latest_ = 0;  // the newest view; 0: none yet
   Time latest_since_{};
   bool refused_ = false;      // the latest view

@@ -18,7 +18,6 @@ namespace asio = boost::asio;
 
 constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
 constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
-constexpr std::uint16_t kExpired = 4401;                  // close code: those from 4000 on are the application's
 constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
 std::string TextOf(const Json& json) { return json.dump(); }
@@ -41,11 +40,11 @@ int Scaled(int pixels, double scale) { return std::max(1, int(double(pixels) * s
 }  // namespace
 
 ViewSession::ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news,
-                         Access access, std::function<void(ViewSession&)> closed)
+                         Asker asker, std::function<void(ViewSession&)> closed)
     : around_(surroundings),
       link_(std::move(link)),
       news_(std::move(news)),
-      access_(std::move(access)),
+      asker_(std::move(asker)),
       closed_(std::move(closed)),
       timer_(surroundings.io) {}
 
@@ -70,19 +69,13 @@ void ViewSession::OnClosed(const std::string&) {
   closed_(*this);
 }
 
-void ViewSession::End() {
-  if (peer_ != nullptr) peer_->Close(1001, "the gateway ends");
-}
-
-std::vector<std::string> ViewSession::datasets() const {
-  std::vector<std::string> named = view_ ? NamedDatasets(view_->options) : std::vector<std::string>();
-  std::erase_if(named, [this](const std::string& name) { return !access_.Shows(name); });
-  return named;
+void ViewSession::End(std::uint16_t code, const std::string& why) {
+  if (peer_ != nullptr) peer_->Close(code, why);
 }
 
 bool ViewSession::HasExpired() {
-  if (UnixNow() < access_.until) return false;
-  peer_->Close(kExpired, access_.ExpiredText());
+  if (UnixNow() < asker_.access.until) return false;
+  End(kExpired, asker_.access.ExpiredText());
   return true;
 }
 
@@ -125,16 +118,15 @@ void ViewSession::OnNews(std::shared_ptr<const ServiceNews> news) {
 void ViewSession::SendStatus() {
   if (peer_ == nullptr || HasExpired()) return;
   Json json = {{"type", "status"}, {"service", slabstream::NameOf(news_->health)}, {"reason", news_->reason}};
-  const Json status = StatusJson(ShownStatus(news_->status, access_));
+  const Json status = StatusJson(ShownStatus(news_->status, asker_.access));
   for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
   peer_->SendText(TextOf(json));
   pinged_at_ = MonotonicNow();
   peer_->SendText(TextOf(Json{{"type", "ping"}, {"ping", ++pings_}}));
 }
 
-void ViewSession::SendError(std::uint64_t seq, const Status& why) {
+void ViewSession::SendError(std::uint64_t seq, const Status& status) {
   if (peer_ == nullptr) return;
-  const Status status = ShownStatus(why, access_);
   peer_->SendText(TextOf({{"type", "error"}, {"seq", seq}, {"code", ToString(status.code())}, {"error", status.message()}}));
 }
 
@@ -174,11 +166,6 @@ void ViewSession::Render(const ViewAction& action) {
   const double scale = action.scale, coarseness = action.coarseness;
   const std::uint64_t order = ++orders_;
   Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
-  if (job.ok()) {
-    for (const std::string& name : NamedDatasets(view_->options)) {
-      if (const auto why = WhyNotShown(name, access_); why && job.ok()) job = Status::InvalidArgument(*why);
-    }
-  }
   if (!job.ok()) {
     SendError(seq, job.status());
     rendering_ = Rendering{.order = order};
@@ -210,7 +197,7 @@ void ViewSession::Render(const ViewAction& action) {
   rendering.view.format = std::move(job->format);
   rendering.view.timeline = view_->timeline;
   const auto self = shared_from_this();
-  rendering.ticket = link_->Render(std::move(job->frames), kDeadline,
+  rendering.ticket = link_->Render(asker_, std::move(job->frames), kDeadline,
                                    {.progress =
                                         [self, order](const FrameProgress& progress) {
                                           asio::post(self->around_.io, [self, order, progress] { self->OnProgress(order, progress); });
@@ -273,7 +260,7 @@ void ViewSession::FetchNextTimes(const FrameRequest& shown) {
   std::vector<FrameRequest> next = NextTimes(shown, before.time, times);
   if (next.empty()) return;
   if (fetching_ != 0) link_->Cancel(fetching_);
-  fetching_ = link_->Render(std::move(next), kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
+  fetching_ = link_->Render(asker_, std::move(next), kDeadline, {.progress = {}, .done = [](const Result<ServiceLink::Rendered>&) {}});
 }
 
 void ViewSession::Encode(PictureCoding coding, int quality) {

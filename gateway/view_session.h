@@ -23,6 +23,8 @@
 
 namespace slabstream {
 
+inline constexpr std::uint16_t kExpired = 4401, kMadeRoom = 4408;  // close codes: those from 4000 on are the application's
+
 // What sessions share; all of it outlives them.
 struct SessionSurroundings {
   boost::asio::io_context& io;
@@ -32,8 +34,8 @@ struct SessionSurroundings {
 
 class ViewSession final : public WebSocketSession, public std::enable_shared_from_this<ViewSession> {
  public:
-  // `access`: what the page's token gives; it ends the session, too. `closed` is called at the end, when the session leaves.
-  ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news, Access access,
+  // `asker`: the page; the end of what its token gives ends the session, too. `closed` is called at the end, when the session leaves.
+  ViewSession(SessionSurroundings surroundings, std::unique_ptr<ServiceLink> link, std::shared_ptr<const ServiceNews> news, Asker asker,
               std::function<void(ViewSession&)> closed);
 
   void OnOpen(WebSocketPeer& peer) override;
@@ -42,8 +44,9 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
 
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
-  void End();                                 // the gateway stops
-  std::vector<std::string> datasets() const;  // the volume and the shapes of the latest view, as far as the token shows them
+  void End(std::uint16_t code, const std::string& why);  // closes it
+  SessionPlace place() const { return {asker_.token, machine_.used()}; }
+  std::vector<std::string> datasets() const { return DatasetsOf(shown_); }  // of the latest picture
 
  private:
   void Handle(ViewMessage view);
@@ -56,16 +59,16 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void Encode(PictureCoding coding, int quality);
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
   void Send(std::uint64_t frame);
-  void SendError(std::uint64_t seq, const Status& why);
+  void SendError(std::uint64_t seq, const Status& status);
   void SetTimer();
 
   SessionSurroundings around_;
   std::unique_ptr<ServiceLink> link_;  // null after OnClosed
   std::shared_ptr<const ServiceNews> news_;
-  const Access access_;
+  const Asker asker_;
   std::function<void(ViewSession&)> closed_;
   WebSocketPeer* peer_ = nullptr;  // null before OnOpen and after OnClosed
-  ViewMachine machine_;
+  ViewMachine machine_{MonotonicNow()};
   boost::asio::steady_timer timer_;
 
   std::optional<ViewMessage> view_;  // the latest

@@ -5,6 +5,8 @@
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
 
+#include <strings.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -35,6 +37,7 @@ std::string ToBase64Url(std::string_view bytes) {
 }
 
 std::optional<std::string> FromBase64Url(std::string_view text) {
+  if (text.find_first_of("+/=") != std::string_view::npos) return std::nullopt;
   std::string letters(text);
   std::ranges::replace(letters, '-', '+');
   std::ranges::replace(letters, '_', '/');
@@ -63,6 +66,18 @@ Json ObjectOf(std::string_view part) {
 
 Status Mistake(std::string_view why) { return Status::InvalidArgument(fmt::format("the token is signed, but {}", why)); }
 
+// RFC 7515 4.1: what a server does not know of a header is to be ignored, unless `crit` is there, which names extensions that must be
+// known. None is known here. `b64` changes what is signed, and must never stand without it.
+Status CheckHeader(const Json& header) {
+  if (!header.contains("alg") || header["alg"] != Json(kAlgorithm)) return Mistake("its header does not say that its algorithm is HS256");
+  for (const char* name : {"crit", "b64"}) {
+    if (header.contains(name)) return Mistake(fmt::format("its header has '{}', and no extension of tokens is known here", name));
+  }
+  const Json type = header.contains("typ") ? header["typ"] : Json("JWT");
+  if (type.is_string() && ::strcasecmp(type.get<std::string>().c_str(), "JWT") == 0) return Status::Ok();
+  return Mistake("its header says by 'typ' that it is no JWT");
+}
+
 Result<Access> AccessOf(const Json& claims) {
   Access access;
   bool ends = false;
@@ -75,8 +90,9 @@ Result<Access> AccessOf(const Json& claims) {
       access.datasets = value.get<std::vector<std::string>>();
     } else if (name == "view_only" && value.is_boolean()) {
       access.view_only = value.get<bool>();
-    } else if (name != "iat") {
-      return Mistake(fmt::format("its claim '{}' is none of exp, datasets and view_only with their types", Printable(name.substr(0, 64))));
+    } else if (name != "iat" || !value.is_number()) {
+      return Mistake(
+          fmt::format("its claim '{}' is none of exp, iat, datasets and view_only with their types", Printable(name.substr(0, 64))));
     }
   }
   if (!ends) return Mistake("it has no claim exp: the Unix time in seconds at which it expires");
@@ -128,9 +144,7 @@ Result<Access> CheckAccess(std::string_view token, std::string_view secret, std:
   if (secret.size() < kLeastSecretBytes || !SameToken(token.substr(last + 1), Signature(text, secret))) {
     return Status::InvalidArgument(std::string(kWrong));
   }
-  if (const Json header = ObjectOf(text.substr(0, first)); !header.contains("alg") || header["alg"] != Json(kAlgorithm)) {
-    return Mistake("its header does not say that its algorithm is HS256");
-  }
+  if (Status status = CheckHeader(ObjectOf(text.substr(0, first))); !status.ok()) return status;
   const Json claims = ObjectOf(text.substr(first + 1));
   if (claims.is_null()) return Mistake("its claims are no JSON object");
   Result<Access> access = AccessOf(claims);

@@ -1,8 +1,8 @@
 // Tokens that say what their holder may do and until when, signed with a server's own token, so that the server keeps no list of them. They
 // are JSON Web Tokens (RFC 7519) signed by HMAC-SHA256, so other programs that know the server's token may make them, too:
 //   {"alg": "HS256"}   {"exp": 1764450000, "datasets": ["head"], "view_only": true}
-// `exp` is needed; without `datasets` they are all meant; `iat` is ignored. A claim of another name might narrow what the token gives: it
-// is refused. Pure. Any thread.
+// `exp` is needed; without `datasets` they are all meant; `iat` is ignored. A claim of another name might narrow what the token gives, and
+// so might an extension that the header names in `crit` (RFC 7515 4.1.11): both are refused. Pure. Any thread.
 #pragma once
 
 #include <cstdint>

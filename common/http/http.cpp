@@ -17,6 +17,7 @@
 #include <boost/beast/websocket/ssl.hpp>
 #include <deque>
 #include <map>
+#include <random>
 #include <set>
 #include <utility>
 
@@ -169,13 +170,17 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
       : Connection(std::move(shared), address),
         socket_(std::move(stream)),
         accepted_(std::move(accepted)),
-        timer_(socket_.get_executor()) {}
+        timer_(socket_.get_executor()),
+        answer_timer_(socket_.get_executor()) {}
 
   void Run(const http::request<http::string_body>& request) {
     beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has times of its own
     const HttpLimits& limits = shared_->limits;
-    socket_.set_option(
-        websocket::stream_base::timeout{.handshake_timeout = limits.reading, .idle_timeout = limits.silence, .keep_alive_pings = true});
+    socket_.set_option(websocket::stream_base::timeout{
+        .handshake_timeout = limits.reading, .idle_timeout = websocket::stream_base::none(), .keep_alive_pings = false});
+    socket_.control_callback([this](websocket::frame_type kind, beast::string_view text) {
+      if (kind == websocket::frame_type::pong && View(text) == asked_) asked_.clear();
+    });
     socket_.set_option(websocket::stream_base::decorator([this](websocket::response_type& response) {
       for (const auto& [name, value] : shared_->application.CommonHeaders()) response.set(name, value);
       response.set(http::field::sec_websocket_protocol, accepted_.subprotocol);
@@ -187,6 +192,7 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
       if (error) return self->End(error.message());
       self->open_ = true;
       self->accepted_.session->OnOpen(*self);
+      self->Ping();
       self->Read();
     });
   }
@@ -265,6 +271,20 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
     CloseNow();
   }
 
+  // The other end answers with the number in the ping, which it knows only when it has read all that left before.
+  void Ping() {
+    asked_ = fmt::format("{:x}", std::random_device()());
+    socket_.async_ping(websocket::ping_data(asked_), [self = shared_from_this()](Error error) {
+      if (error || self->closing_) return;
+      // From now on: what had to leave before it has a limit of its own.
+      self->answer_timer_.expires_after(self->shared_->limits.silence);
+      self->answer_timer_.async_wait([self](Error stopped) {
+        if (stopped || self->closing_) return;
+        self->asked_.empty() ? self->Ping() : self->Drop("it did not answer a ping in time");
+      });
+    });
+  }
+
   void Read() {
     socket_.async_read(buffer_, [self = shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
   }
@@ -284,6 +304,7 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
   void End(const std::string& why) {
     if (std::exchange(ended_, true)) return;
     timer_.cancel();
+    answer_timer_.cancel();
     closing_ = true;
     accepted_.session->OnClosed(why_.empty() ? why : why_);
     CloseNow();
@@ -291,7 +312,8 @@ class WebSocketConnection final : public Connection, public WebSocketPeer, publi
 
   websocket::stream<Stream, false> socket_;  // false: without compression, which pictures have already
   WebSocketAccepted accepted_;
-  asio::steady_timer timer_;
+  asio::steady_timer timer_, answer_timer_;
+  std::string asked_;  // in a ping that was not answered yet; empty: there is none
   beast::flat_buffer buffer_;
   std::deque<Message> queue_;  // the first one is being written, if any is
   std::optional<websocket::close_reason> close_after_write_;

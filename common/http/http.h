@@ -29,7 +29,7 @@ struct HttpLimits {
   std::size_t connections_an_address = 128;          // the same; so one address alone cannot keep others out
   Duration reading = std::chrono::seconds(30);       // for a request to arrive, also on a connection that waits for one
   Duration writing = std::chrono::seconds(30);       // for a response or message to leave
-  Duration silence = std::chrono::seconds(30);       // how long a WebSocket may be silent, pings and their answers included
+  Duration silence = std::chrono::seconds(30);       // for a WebSocket to answer a ping; what it sends otherwise is no answer
 };
 
 using Gone = std::shared_ptr<std::function<void()>>;

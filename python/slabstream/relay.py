@@ -17,6 +17,7 @@ the gateway sends at most 16 pictures that the page has not acknowledged.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import contextvars
 import http.client
 import json
@@ -35,7 +36,7 @@ from .gateway import Gateway
 
 _ANSWER_SECONDS = 150.0  # longer than the gateway's own limit, which says why
 _OPEN_SECONDS = 10.0
-_MOST_ASKS = 64
+_MOST_ASKS, _MOST_STREAMS = 64, 16  # under way
 _MOST_TEXTS = 256   # of a stream, on their way to the gateway
 _MOST_MESSAGES = 4  # of a stream, on their way to the page
 _SILENT_SECONDS = 10.0  # that a stream's page may be, while the kernel is free
@@ -67,13 +68,26 @@ class _Here:
         return self._loop is not None and (self._loop.is_closed() or not self._loop.is_running())
 
 
+class _Ask:
+    """A request under way, until its thread ends."""
+
+    def __init__(self) -> None:
+        self.connection: http.client.HTTPConnection | None = None
+        self.wanted = True
+
+    def cancel(self) -> None:
+        self.wanted = False
+        if self.connection is not None and self.connection.sock is not None:
+            with contextlib.suppress(OSError):  # the answer has come
+                self.connection.sock.shutdown(socket.SHUT_RDWR)
+
+
 class Relay:
     """`gateway`: as gateway_of(), of one service. `say` sends a message to the pages. `restarted`: the gateway has another address now."""
 
     def __init__(self, gateway: Callable[[Gateway | None], Gateway], say: Say, restarted: Callable[[], None]):
         self._gateway, self.say, self._restarted = gateway, say, restarted
-        self._lock = threading.Lock()
-        self._asks: dict[int, http.client.HTTPConnection | None] = {}
+        self._asks: dict[int, _Ask] = {}
         self._streams: dict[int, _Stream] = {}
 
     def hear(self, message: dict[str, Any], buffers: Sequence[Any]) -> None:
@@ -81,9 +95,13 @@ class Relay:
         if "ask" in message:
             self._ask(message["ask"], str(message.get("method", "GET")), str(message.get("path", "")), bytes(buffers[0]) if buffers else None)
         elif "cancel" in message:
-            self._cancel(message["cancel"])
+            if message["cancel"] in self._asks:
+                self._asks[message["cancel"]].cancel()
         elif "open" in message and message["open"] not in self._streams:
-            self._streams[message["open"]] = _Stream(self, message["open"])
+            if len(self._streams) < _MOST_STREAMS:
+                self._streams[message["open"]] = _Stream(self, message["open"])
+            else:
+                self.say({"closed": message["open"], "reason": f"{_MOST_STREAMS} streams of this widget are open, no more are taken"}, [])
         elif "alive" in message:
             for each in message["alive"]:
                 if each in self._streams:
@@ -97,8 +115,8 @@ class Relay:
     def close(self) -> None:
         for stream in list(self._streams.values()):
             stream.close("the widget is closed")
-        for ask in list(self._asks):
-            self._cancel(ask)
+        for ask in list(self._asks.values()):
+            ask.cancel()
 
     def connected(self, here: _Here, connect: Callable[[Gateway], Any]) -> Any:
         """What `connect` makes of the gateway. One that is gone is started again."""
@@ -113,48 +131,31 @@ class Relay:
     # ---- requests
 
     def _ask(self, ask: int, method: str, path: str, body: bytes | None) -> None:
-        with self._lock:
-            full = len(self._asks) >= _MOST_ASKS
-            if not full:
-                self._asks[ask] = None
-        if full:
+        if len(self._asks) >= _MOST_ASKS:
             self.say({"answer": ask, "status": 429, "type": "application/json"}, [_error(f"{_MOST_ASKS} requests are under way, no more are taken")])
-        else:
-            threading.Thread(target=self._fetch, args=(_Here(), ask, method, path, body), name="slabstream ask", daemon=True).start()
+        elif ask not in self._asks:
+            asked = self._asks[ask] = _Ask()
+            threading.Thread(target=self._fetch, args=(_Here(), ask, asked, method, path, body), name="slabstream ask", daemon=True).start()
 
-    def _fetch(self, here: _Here, ask: int, method: str, path: str, body: bytes | None) -> None:
+    def _fetch(self, here: _Here, ask: int, asked: _Ask, method: str, path: str, body: bytes | None) -> None:
         def request(gateway: Gateway) -> http.client.HTTPConnection:
-            connection = http.client.HTTPConnection(gateway.host, gateway.port, timeout=_ANSWER_SECONDS)
+            asked.connection = connection = http.client.HTTPConnection(gateway.host, gateway.port, timeout=_ANSWER_SECONDS)
             connection.connect()
-            with self._lock:
-                if ask in self._asks:
-                    self._asks[ask] = connection
-            connection.request(method, f"/api/v1/{path}", body, {"Authorization": f"Bearer {gateway.token}"})
+            if asked.wanted:  # else nobody has closed the connection
+                connection.request(method, f"/api/v1/{path}", body, {"Authorization": f"Bearer {gateway.token}"})
             return connection
 
         try:
-            connection = self.connected(here, request)
-            try:
-                response = connection.getresponse()
-                status, kind, found = response.status, response.getheader("Content-Type", ""), response.read()
-            finally:
-                connection.close()
+            response = self.connected(here, request).getresponse()
+            status, kind, found = response.status, response.getheader("Content-Type", ""), response.read()
         except (OSError, ValueError, http.client.HTTPException, SlabstreamError) as error:
             status, kind, found = 503, "application/json", _error(str(error) or type(error).__name__)
-        with self._lock:
-            wanted = ask in self._asks
-            self._asks.pop(ask, None)
-        if wanted:
+        finally:
+            if asked.connection is not None:
+                asked.connection.close()
+            del self._asks[ask]
+        if asked.wanted:
             here.call(lambda: self.say({"answer": ask, "status": status, "type": kind}, [found]))
-
-    def _cancel(self, ask: int) -> None:
-        with self._lock:
-            connection = self._asks.pop(ask, None)
-        if connection is not None and connection.sock is not None:
-            try:
-                connection.sock.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass  # the answer has come
 
     def end(self, stream: int) -> None:
         self._streams.pop(stream, None)

@@ -823,7 +823,7 @@ class TokenTest(WithService):
         body = json.dumps(fields) if in_body else "" if method == "POST" else None
         target = path if in_body else path + "?" + urllib.parse.urlencode(fields)
         status, headers, answer = gateway.request(target, method=method, body=body)
-        return status, json.loads(answer)["error"] if status in (401, 403) else ""
+        return status, json.loads(answer)["error"] if status in (401, 403, 404) else ""
 
     def test_every_request_wants_its_right(self):
         known = {
@@ -849,7 +849,7 @@ class TokenTest(WithService):
                     for other in ("b", "none"):  # whether there is one or not
                         self.assertEqual(
                             self.ask(own.holding(datasets=["a"]), path, method, other, in_body),
-                            (403, f"the token does not show dataset '{other}'"),
+                            (404, "there is no such dataset"),
                             asked,
                         )
         upload = own.json("/api/v1/upload?file=x.nrrd&bytes=1", method="POST", body=b"")[1]["upload"]
@@ -877,7 +877,36 @@ class TokenTest(WithService):
                              ("/api/v1/command?dataset=a", '{"dataset": "b"}'), ("/api/v1/command", '{"dataset": ["a", "b"]}'),
                              ("/api/v1/command", '{"dataset": "a", "dataset": "b"}'), ("/api/v1/command?%64ataset=b", None)):
             status, answer = holder.json(target, **({} if body is None else {"method": "POST", "body": body}))
-            self.assertIn(status, (400, 403), (target, body, answer))
+            self.assertIn(status, (400, 404), (target, body, answer))
+
+    def test_a_shape_is_a_dataset_in_every_spelling(self):
+        corners = "1 1 1\n20 1 1\n1 20 18\n"
+        (self.programs.folder / "secret.ply").write_text(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+            "property list uchar int vertex_indices\nend_header\n" + corners + "3 0 1 2\n")
+        self.programs.run("data", "add", f"secret={self.programs.folder}/secret.ply", "--endpoint", self.endpoint)
+        both, one = self.gateway.holding(datasets=["a", "secret"]), self.gateway.holding(datasets=["a"])
+        paths = [*PICTURES, "/api/v1/command", "/api/v1/pick", "/api/v1/turntable.mp4"]
+        page = Page(one)
+        self.addCleanup(page.close)
+        for spelling in ("shape", "mesh", "lines", "points"):
+            for name in ("secret", "none", "secret,color=red,opacity=0.5", "a,secret"):
+                for path in paths:
+                    fields = {"dataset": "a", spelling: name, **{key: self.FIELDS[key] for key in self.TAKEN.get(path.split("/")[-1].split(".")[0], [])}}
+                    asked = path, fields
+                    if "slice" in path:
+                        fields["plane"] = "zyx"
+                    answers = [one.json(path + "?" + urllib.parse.urlencode(fields)), one.json(path, method="POST", body=json.dumps(fields))]
+                    if name == "a,secret" or "slice" in path and answers[0][0] == 400:
+                        self.assertEqual([status for status, _ in answers], [400, 400], asked)
+                    else:
+                        self.assertEqual(answers, 2 * [(404, {"error": "there is no such dataset"})], asked)
+            seq = page.view({"dataset": "a", "size": 16, spelling: "secret"})
+            error = page.text("error", lambda error: error["seq"] == seq)  # noqa: B023
+            self.assertEqual((error["code"], error["error"]), ("not found", "there is no such dataset"))
+            for gateway in (both, self.gateway):
+                self.assertEqual(gateway.request(f"/api/v1/render.png?dataset=a&size=16&{spelling}=secret")[0], 200)
+        page.final(page.view({"dataset": "a", "size": 16}))
 
     def test_a_page_sees_what_its_token_shows(self):
         page = Page(self.gateway.holding(datasets=["a", "gone"]))
@@ -885,8 +914,8 @@ class TokenTest(WithService):
         self.assertEqual([each["name"] for each in page.text("status", lambda status: status["datasets"])["datasets"]], ["a"])
         page.final(page.view({"dataset": "a", "size": 16}))
         for name, why in (
-            ("b", "the token does not show dataset 'b'"),
-            ("none", "the token does not show dataset 'none'"),
+            ("b", "there is no such dataset"),
+            ("none", "there is no such dataset"),
             ("gone", "there is no such dataset"),
         ):
             seq = page.view({"dataset": name, "size": 16})
@@ -939,6 +968,9 @@ class TokenTest(WithService):
             ({}, None, "no claim exp"),
             ({"exp": hour}, {"alg": "none"}, "HS256"),
             ({"exp": hour}, {"typ": "JWT"}, "HS256"),
+            ({"exp": hour}, {"alg": "HS256", "crit": ["exp"]}, "'crit'"),
+            ({"exp": hour}, {"alg": "HS256", "crit": []}, "'crit'"),
+            ({"exp": hour}, {"alg": "HS256", "b64": False}, "'b64'"),
             ([], None, "object"),
             ({"exp": str(hour)}, None, "'exp'"),
             ({"exp": hour, "datasets": "a"}, None, "'datasets'"),
@@ -958,7 +990,7 @@ class TokenTest(WithService):
         self.assertEqual(link, f"http://{self.gateway.authority}/#token={token}&dataset=a")
         holder = Gateway(link)
         self.assertEqual(holder.json("/api/v1/datasets")[1]["datasets"][0]["name"], "a")
-        self.assertEqual(holder.request("/api/v1/render.png?dataset=b")[0], 403)
+        self.assertEqual(holder.request("/api/v1/render.png?dataset=b")[0], 404)
         self.assertEqual(holder.request("/api/v1/upload?file=a.nrrd&bytes=3", method="POST", body=b"")[0], 403)
         claims = json.loads(base64.urlsafe_b64decode(token.split(".")[1] + "=="))
         self.assertAlmostEqual(claims["exp"], time.time() + 3600, delta=TIMEOUT)
@@ -1334,6 +1366,33 @@ class SlowReaderTest(WithService):
         # The largest picture is 64 MB of floats, the others 23: a few are on their way, but not 1200.
         self.assertLess(most - before, 400 << 20)
         self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
+
+
+class ManyPagesTest(WithService):
+    """More pages than there are sessions."""
+
+    def test_one_token_does_not_keep_out_others(self):
+        first = self.page()
+        first.final(first.view({"dataset": "a", "size": 16}))
+        others = [self.page() for _ in range(63)]
+        shown = others[0]
+        shown.final(shown.view({"dataset": "a", "size": 16}))
+        with self.assertRaisesRegex(Refused, "429"):
+            self.page()
+        guest = self.gateway.holding(view_only=True)
+        pages = []
+        for _ in range(3):
+            pages.append(Page(guest))
+            self.addCleanup(pages[-1].close)
+            pages[-1].final(pages[-1].view({"dataset": "a", "size": 16}))
+        with self.assertRaises(Closed) as closed:  # it has drawn a picture, but no other one for longer
+            while True:
+                first.receive()
+        self.assertEqual(closed.exception.code, 4408)
+        # Those who have shown a picture since stay.
+        shown.final(shown.view({"dataset": "a", "size": 16, "azimuth": 3}))
+        with self.assertRaisesRegex(Refused, "429"):
+            self.page()
 
 
 class CrowdTest(WithService):

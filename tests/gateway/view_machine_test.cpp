@@ -69,6 +69,22 @@ TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
   EXPECT_THAT(machine.OnAck(1, {}, At(90)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 2}));
 }
 
+TEST(ViewMachineTest, ItIsUsedByPicturesThatThePageHasDrawn) {
+  ViewMachine machine(At(-5));
+  machine.OnView(1, false, At(0));  // whoever sends views may show none of them
+  machine.OnRendered(true, false, At(30));
+  machine.OnAck(1, {}, At(31));  // a picture that was not sent
+  EXPECT_EQ(machine.used(), At(-5));
+  machine.OnEncoded(At(35));
+  machine.OnAck(2, {}, At(36));
+  machine.OnEcho(milliseconds(1), At(37));
+  EXPECT_EQ(machine.used(), At(-5));
+  machine.OnAck(1, {}, At(45));
+  EXPECT_EQ(machine.used(), At(45));
+  machine.OnAck(1, {}, At(60));  // again
+  EXPECT_EQ(machine.used(), At(45));
+}
+
 TEST(ViewMachineTest, FarAwayPicturesAreSentBehindOneAnotherAndStayWhole) {
   ViewMachine machine;
   machine.OnEcho(milliseconds(200), At(-500));

@@ -8,6 +8,7 @@ import os
 import pathlib
 import queue
 import signal
+import socket
 import struct
 import sys
 import textwrap
@@ -166,6 +167,21 @@ class Widgets(WithAService):
         page.say({"close": 2})
         page.hear(lambda message: message == {"closed": 2, "reason": ""})
 
+    def test_no_more_streams_are_opened_than_a_widget_may_have(self) -> None:
+        _, page = self.widget()
+        with unittest.mock.patch.object(relay, "_MOST_STREAMS", 2):
+            page.stream(1)
+            page.stream(2)
+            page.say({"open": 2})  # it is open
+            page.say({"open": 3})
+            message, _ = page.hear(lambda message: message.get("closed") in (2, 3))
+            self.assertEqual(message, {"closed": 3, "reason": "2 streams of this widget are open, no more are taken"})
+            page.say({"close": 1})
+            page.hear(lambda message: message == {"closed": 1, "reason": ""})
+            page.stream(3)
+            page.view(3, 1, dataset="head", size="40x40")
+            page.final(3, 1)
+
     def test_a_gateway_that_was_killed_is_started_again(self) -> None:
         widget, page = self.widget()
         before = widget._address
@@ -283,6 +299,72 @@ class Widgets(WithAService):
         for message in ({}, {"send": 9, "text": ""}, {"close": 9}, {"cancel": 9}, {"alive": [9]}, {"other": 1}):
             page.say(message)
         self.assertEqual(page.ask(1, "datasets")[0]["status"], 200)
+
+
+class SilentGateway:
+    """Takes connections and answers none."""
+
+    token = "token"
+
+    def __init__(self) -> None:
+        self.listener = socket.create_server(("127.0.0.1", 0), backlog=512)
+        self.listener.settimeout(SECONDS)
+        self.host, self.port = self.listener.getsockname()
+
+    def accept(self) -> socket.socket:
+        connection, _ = self.listener.accept()
+        connection.settimeout(SECONDS)
+        return connection
+
+
+class Asks(unittest.TestCase):
+    def setUp(self) -> None:
+        self.gateway, self.said, self.started = SilentGateway(), queue.Queue(), threading.Event()
+        self.addCleanup(self.gateway.listener.close)
+        self.relay = relay.Relay(self.find, lambda message, _: self.said.put(message), lambda: None)
+
+    def find(self, gone: object) -> SilentGateway:
+        self.started.wait(SECONDS)
+        return self.gateway
+
+    def threads(self) -> list:
+        return [each for each in threading.enumerate() if each.name == "slabstream ask"]
+
+    def ask(self, number: int) -> None:
+        self.relay.hear({"ask": number, "path": "datasets"}, [])
+
+    def test_a_cancelled_request_ends_its_connection(self) -> None:
+        self.started.set()
+        for number in range(5):
+            self.ask(number)
+            with self.gateway.accept() as connection:
+                self.assertIn(b"GET /api/v1/datasets ", connection.recv(65536))
+                self.relay.hear({"cancel": number}, [])
+                self.assertEqual(connection.recv(65536), b"")
+        self.assertTrue(self.said.empty())
+
+    def test_cancelled_requests_count_until_they_have_ended(self) -> None:
+        for number in range(200):
+            self.ask(number)
+            self.relay.hear({"cancel": number}, [])
+        self.assertEqual(len(self.threads()), relay._MOST_ASKS)
+        self.assertEqual({self.said.get_nowait()["status"] for _ in range(200 - relay._MOST_ASKS)}, {429})
+        self.started.set()
+        for _ in range(relay._MOST_ASKS):
+            with self.gateway.accept() as connection:
+                self.assertEqual(connection.recv(65536), b"")  # nobody asks for anything
+        for thread in self.threads():
+            thread.join(SECONDS)
+        self.assertEqual((self.threads(), self.said.qsize()), ([], 0))
+
+    def test_the_same_number_is_one_request(self) -> None:
+        self.ask(1)
+        self.ask(1)
+        self.assertEqual(len(self.threads()), 1)
+        self.relay.close()
+        self.started.set()
+        with self.gateway.accept() as connection:
+            self.assertEqual(connection.recv(65536), b"")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 export interface Stream {
   onopen: () => void;
   onmessage: (data: string | ArrayBuffer) => void;
-  onclose: (reason: string, expired?: boolean) => void; // also if it never opened. `expired`: the token has
+  onclose: (reason: string, code?: number) => void; // also if it never opened. `code`: of docs/http.md
   readonly isOpen: boolean;
   send(text: string): void; // while it is open
   close(): void;
@@ -14,12 +14,12 @@ export interface Connection {
   open(): Stream; // of api/v1/view
 }
 
-const EXPIRED = 4401; // close code
+export const EXPIRED = 4401, MADE_ROOM = 4408; // close codes
 
 class SocketStream implements Stream {
   onopen = (): void => undefined;
   onmessage = (_: string | ArrayBuffer): void => undefined;
-  onclose = (_: string, __?: boolean): void => undefined;
+  onclose = (_: string, __?: number): void => undefined;
   private readonly socket: WebSocket;
 
   constructor(address: URL, token: string) {
@@ -27,7 +27,7 @@ class SocketStream implements Stream {
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => this.onopen();
     this.socket.onmessage = event => this.onmessage(event.data as string | ArrayBuffer);
-    this.socket.onclose = event => this.onclose(event.reason, event.code === EXPIRED);
+    this.socket.onclose = event => this.onclose(event.reason, event.code);
   }
 
   get isOpen(): boolean { return this.socket.readyState === WebSocket.OPEN; }

@@ -1,6 +1,6 @@
 // One stream of pictures of docs/http.md, with one view that changes. It connects again by itself.
 import type { Api, Dataset, Options } from "./api";
-import type { Stream } from "./connection";
+import { EXPIRED, MADE_ROOM, type Stream } from "./connection";
 import type { Vec3 } from "./vec";
 import { VideoPictures } from "./video";
 
@@ -54,6 +54,7 @@ export class Session {
   private attempts = 0;
   private timer = 0;
   private ended = false;
+  private rests = false; // another page has the place, until the user wants another view
   private wanted: View | null = null;
   private sent = new Map<number, SentView>();
   private lastSent = "";
@@ -74,9 +75,10 @@ export class Session {
   // The latest view wins; one that equals the last one is not sent.
   show(view: View, inputAt = performance.now()): void {
     this.wanted = view;
-    if (!this.stream?.isOpen) return;
     const text = JSON.stringify(view);
     if (text === this.lastSent) return;
+    if (this.rests) this.connect();
+    if (!this.stream?.isOpen) return;
     this.lastSent = text;
     const seq = ++this.seq;
     this.sent.set(seq, { ...view, seq, inputAt });
@@ -126,11 +128,12 @@ export class Session {
     this.stream = null;
     if (this.ended) return;
     this.events.connection?.("lost", reason);
-    this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
+    if (!this.rests) this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
   }
 
   private connect(): void {
     if (this.api.refusal) return;
+    this.rests = false;
     this.events.connection?.("connecting", "");
     const stream = this.stream = this.api.connection.open();
     this.video.close();
@@ -152,8 +155,9 @@ export class Session {
       if (typeof data === "string") this.onText(data);
       else this.drawn = this.onPicture(stream, data, this.drawn);
     };
-    stream.onclose = (reason, expired) => {
-      if (expired) this.api.refuse(reason);
+    stream.onclose = (reason, code) => {
+      if (code === EXPIRED) this.api.refuse(reason);
+      this.rests = code === MADE_ROOM && this.stream === stream;
       this.lose(stream, reason);
     };
   }
