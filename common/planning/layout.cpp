@@ -250,6 +250,7 @@ struct LayoutMaker::State {
       return double(unread ? VoxelsRead(*unread, padded, filled[id]) : padded.voxel_count());
     });
     layout.levels = std::move(made.levels);
+    std::ranges::replace(layout.levels, LevelMap::kOutside, std::uint8_t(request.coarser.size()));
     layout.filled = std::move(filled);
     return layout;
   }

@@ -24,8 +24,10 @@ inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max
 
 struct Layout {
   Partition partition;
-  std::vector<std::uint32_t> owners;      // by box: its slot, or kNoSlot
-  std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
+  std::vector<std::uint32_t> owners;  // by box: its slot, or kNoSlot
+  // By box: the level that it is drawn from (LevelBox), of a box outside the picture the coarsest one. Shapes may give it a slot all the
+  // same. Empty: all from 0.
+  std::vector<std::uint8_t> levels = {};
   // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
   LeastExtinction extinction = {};  // the volume's least extinction; empty: not known

@@ -40,7 +40,7 @@ class Worlds(unittest.TestCase):
         return path
 
     def start(self, program: pathlib.Path, *options: str, out: str = "out") -> subprocess.Popen:
-        command = [sys.executable, WORLDS, program, self.folder / out, "--piece", "10", *options]
+        command = [sys.executable, WORLDS, program, self.folder / out, "--piece", "10", "--at-once", *options]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def run_worlds(self, program: pathlib.Path, *options: str, out: str = "out") -> tuple[int, str]:

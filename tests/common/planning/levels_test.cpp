@@ -476,6 +476,38 @@ TEST(LevelsOfTest, NeighbouringZonesDifferByALevelAtMost) {
   }
 }
 
+// Views that show a corner of the volume, or nothing of it: the bounds of large zones may lie in the picture where those of smaller ones
+// do not.
+TEST(LevelsOfTest, APictureBesideTheVolumeHasALevel) {
+  Random random(330);
+  SCOPED_TRACE(random.trace());
+  int nothing = 0;
+  for (int round = 0; round < 3000; ++round) {
+    VolumeGeometry finest = RandomGeometry(random);
+    for (const Axis axis : kAxes) finest.size[axis] = 16 * random.Integer(1, 40) + random.Integer(0, 7);
+    finest.spacing = random.Real(0.1, 4) * Vec3{1, 1, 1};
+    VolumeLevels levels = HalvedLevels(finest, 3);
+    if (random.Chance(0.5)) levels.refined.assign(3, std::make_shared<const std::vector<Box>>());
+    FrameRequest request = RandomRequestOf(random, finest, levels.levels.back().geometry);
+    request.renderer = "raycast";
+    request.view.projection = random.Chance(0.8) ? Projection::kPerspective : Projection::kOrthographic;
+    request.view.eye.reset();
+    request.view.look_at = finest.ToWorld(finest.centre()) + random.Real(0.5, 4) * BoundingRadius(finest) * RandomAxes(random)[0];
+    request.view.distance = random.Real(0.3, 5) * BoundingRadius(finest);
+    if (random.Chance(0.3)) request.clipping = RandomClipping(random, finest);
+    const Result<LevelMap> map = LevelsOf(request, levels);
+    if (!map.ok()) continue;
+    ASSERT_FALSE(map->levels.empty()) << "round " << round;
+    if (!map->one_level()) {
+      ASSERT_TRUE(std::ranges::any_of(map->of_zone, [](std::uint8_t level) { return level != LevelMap::kOutside; })) << "round " << round;
+    } else {
+      ++nothing;
+    }
+  }
+  EXPECT_GT(nothing, 100);
+  EXPECT_LT(nothing, 3000);
+}
+
 TEST(LevelsOfTest, WhatCannotBeMixedIsDrawnFromOneLevel) {
   Random random(329);
   SCOPED_TRACE(random.trace());

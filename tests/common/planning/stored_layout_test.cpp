@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "common/planning/worker_memory.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
 #include "tests/common/planning/plan_support.h"
@@ -211,6 +212,50 @@ TEST(IndexedLayout, BoxesOfEachLevelOfAPictureAreLeftOut) {
   for (const std::size_t level : {0, 1}) {
     EXPECT_GT(shown.at(level), 0);
     EXPECT_GT(left_out.at(level), 0);
+  }
+}
+
+// A shape gives boxes to workers whatever the picture shows of the volume there, so each of them has a level: one of the setup.
+TEST(StoredLayout, ABoxOutsideThePictureThatAShapeReachesHasALevel) {
+  const VolumeSummary fine = StoredSummary({512, 64, 64}, Uniform(16));
+  VolumeSummary coarse = StoredSummary({256, 32, 32}, Uniform(16));
+  coarse.description.geometry.spacing = {2, 2, 2};
+  coarse.description.geometry.orientation.origin = {0.5, 0.5, 0.5};
+  constexpr std::uint8_t kNone = LevelMap::kOutside;
+  const LevelMap nothing = {.side = Uniform(64), .counts = {8, 1, 1}, .of_zone = std::vector<std::uint8_t>(8, kNone)};
+  const LevelMap some = {.side = Uniform(64), .counts = {8, 1, 1}, .of_zone = {kNone, kNone, 0, 0, 0, kNone, kNone, kNone}};
+  const LevelMap mixed = {.levels = {0, 1}, .side = Uniform(64), .counts = {8, 1, 1}, .of_zone = {kNone, 0, 1, 1, kNone, kNone, 1, kNone}};
+  for (const char* const renderer : {"raycast", "mip", "xray", "splat", "shear"}) {
+    for (const LevelMap* const map : {&nothing, &some, &mixed}) {
+      if (map->levels.size() > 1 && !FindRenderer(renderer)->Can(Ability::kLevels)) continue;
+      for (const int workers : {1, 3, 64}) {
+        FrameRequest request = SomeRequest();
+        request.renderer = renderer;
+        ResolvedRequest resolved = Resolved(request, fine);
+        if (map->levels.size() > 1) resolved.coarser = {{2, std::make_shared<const VolumeSummary>(coarse)}};
+        FrameSetup setup = MakeFrameSetup(resolved).value();
+        setup.shapes.resize(1);
+        setup.shapes.front().high = {511, 63, 63};
+        const auto layout = std::make_shared<const Layout>(MakeLayout({.summary = &fine,
+                                                                       .volume = &resolved.volume,
+                                                                       .policy = &resolved.policy,
+                                                                       .slots = std::uint32_t(workers),
+                                                                       .box_bytes_target = 256 << 10,
+                                                                       .map = map,
+                                                                       .coarser = resolved.coarser}));
+        const Roster roster = FullRoster(workers);
+        const FramePlan plan = PlanFrame(setup, resolved.policy, roster, layout).value();
+        ExpectSound(plan, roster);
+        const std::vector<Placement> placements = PlacementsOf(plan);
+        if (setup.format == PixelFormat::kRgba) {
+          EXPECT_EQ(placements.size(), plan.layout->owners.size()) << renderer << ": the shape reaches all boxes";
+        }
+        for (const Placement& placement : placements) ASSERT_LE(placement.level, setup.coarser.size()) << renderer;
+        std::vector<WorkerLimit> limits;
+        for (const WorkerId worker : roster.slots) limits.push_back({worker, std::uint64_t{1} << 30});
+        EXPECT_TRUE(FramesThatFit(plan, fine, limits).ok()) << renderer;
+      }
+    }
   }
 }
 
