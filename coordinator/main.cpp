@@ -88,7 +88,7 @@ int Run(int argc, char** argv) {
     options.folders = {found.folders.begin(), found.folders.end()};
     options.machine.log_level = LeastLogLevel();
     options.machine.web_traffic = HttpTransfers::TrafficOfProcess;
-    LimitMemory(options.machine.memory_bytes);
+    LimitMemory(options.machine.memory_bytes / 16 * 15);  // the rest is for pictures that clients have not read
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options), metrics);
   });

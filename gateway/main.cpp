@@ -65,6 +65,7 @@ Status Serve(Options options) {
   const Status told = FlushOutput();
   if (told.ok()) {
     NotifyReady();
+    const std::jthread idle = ReleaseWhileIdle();
     const sigset_t signals = StopSignals();
     int signal = 0;
     (void)::sigwait(&signals, &signal);

@@ -95,6 +95,7 @@ int Run(int argc, char** argv) {
     options.machine.compression = *ParseCompression(compress);
     options.machine.web_traffic = HttpTransfers::TrafficOfProcess;
     options.share_memory = !frames_only;
+    options.machine.spare_for_images = [limit = options.machine.memory_bytes] { return SpareForImages(limit - KeptBytes(limit) / 2); };
     SetReadMemory(options.machine.memory_bytes);
     KeepBlocks(KeptBytes(options.machine.memory_bytes));
     if (Status kept = KeepObjects(cache); !kept.ok()) return kept;

@@ -14,6 +14,7 @@
 #include "client/service/service_state.h"
 #include "common/base/printable.h"
 #include "common/cli/program.h"
+#include "common/memory/large_buffers.h"
 #include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/shape_data.h"
@@ -141,6 +142,7 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
     if (!shares.ok()) return shares.status();
     options.coordinator.machine.memory_bytes = shares->coordinator;
     options.worker.memory_bytes = shares->worker;
+    options.worker.spare_for_images = [limit = connection.local_memory] { return SpareForImages(limit - KeptBytes(limit) / 2); };
   }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();

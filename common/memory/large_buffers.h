@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <thread>
 
 namespace slabstream {
@@ -27,5 +28,13 @@ inline void KeepFrameBuffers() {
 // of 8 million pixels takes some hundred MiB of images at each worker, and to take them anew from the system costs more than to render
 // them. Any thread.
 void KeepBlocks(std::size_t bytes);
+
+// What the process holds in RAM, with what it reads of other processes' memory and of files. 0: the system does not tell. Any thread.
+std::uint64_t ResidentBytes();
+// Gives what is kept for reuse back to the system: blocks, and free memory of the heaps. Takes some milliseconds. Any thread.
+void ReleaseFreeMemory();
+// What the process may take for images until it holds `most`, those that it has included. If it holds more, it calls ReleaseFreeMemory
+// first. Any thread.
+std::int64_t SpareForImages(std::uint64_t most);
 
 }  // namespace slabstream

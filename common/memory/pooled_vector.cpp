@@ -1,7 +1,11 @@
 #include "common/memory/pooled_vector.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <atomic>
 #include <bit>
+#include <fstream>
 #include <mutex>
 #include <unordered_map>
 
@@ -63,6 +67,12 @@ class Pool {
   void KeepMore(std::size_t bytes) {
     const std::lock_guard lock(mutex_);
     most_kept_ = std::max(most_kept_, bytes);
+  }
+
+  void Release() {
+    const std::lock_guard lock(mutex_);
+    for (const Block& kept : std::exchange(blocks_, {})) Free(kept.data, kept.bytes);
+    bytes_ = 0;
   }
 
   std::optional<ArenaName> arena() {
@@ -133,13 +143,18 @@ Pool& BlocksOf(BlockPool pool) {
 }
 Pool& SharedBlocks() { return BlocksOf(BlockPool::kShared); }
 
+std::atomic<std::int64_t> shared_in_use = 0;  // bytes
+
 }  // namespace
 
 void* TakeBlock(BlockPool pool, std::size_t bytes) {
-  return bytes < kLeastKept ? TakeMemory(bytes, kLeastKept) : BlocksOf(pool).Take(BlockBytes(bytes));
+  void* const block = bytes < kLeastKept ? TakeMemory(bytes, kLeastKept) : BlocksOf(pool).Take(BlockBytes(bytes));
+  if (pool == BlockPool::kShared) shared_in_use += std::int64_t(bytes);
+  return block;
 }
 
 void GiveBackBlock(BlockPool pool, void* block, std::size_t bytes) {
+  if (pool == BlockPool::kShared) shared_in_use -= std::int64_t(bytes);
   if (bytes < kLeastKept) {
     FreeMemory(block, bytes, kLeastKept);
   } else {
@@ -150,6 +165,24 @@ void GiveBackBlock(BlockPool pool, void* block, std::size_t bytes) {
 void KeepBlocks(std::size_t bytes) {
   if (!kWatched) SharedBlocks().KeepMore(bytes);
 }
+
+// The second number of /proc/self/statm is in pages.
+std::uint64_t ResidentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t addresses = 0, resident = 0;
+  return statm >> addresses >> resident ? resident * std::uint64_t(::sysconf(_SC_PAGESIZE)) : 0;
+}
+
+void ReleaseFreeMemory() {
+  for (const BlockPool pool : {BlockPool::kShared, BlockPool::kOwn}) BlocksOf(pool).Release();
+  (void)::malloc_trim(0);
+}
+
+std::int64_t SpareForImages(std::uint64_t most) {
+  if (ResidentBytes() > most) ReleaseFreeMemory();
+  return std::int64_t(most) + shared_in_use - std::int64_t(ResidentBytes());
+}
+
 Status ShareBlocks() { return SharedBlocks().Share(); }
 std::optional<ArenaName> SharedBlocksArena() { return SharedBlocks().arena(); }
 

@@ -1,26 +1,18 @@
 #include "common/metrics/process_metrics.h"
 
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <system_error>
 
 #include "common/base/version.h"
+#include "common/memory/large_buffers.h"
 
 namespace slabstream {
 namespace {
 
 double Seconds(const timeval& time) { return double(time.tv_sec) + double(time.tv_usec) / 1e6; }
-
-std::optional<std::uint64_t> ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  std::uint64_t size = 0, resident = 0;
-  if (!(file >> size >> resident)) return std::nullopt;
-  return resident * std::uint64_t(::sysconf(_SC_PAGESIZE));
-}
 
 std::optional<std::uint64_t> OpenFiles() {
   std::error_code error;
@@ -35,9 +27,8 @@ std::optional<std::uint64_t> OpenFiles() {
 void AddProcess(Exposition& out, std::uint64_t memory_limit) {
   out.Family("build_info", MetricType::kGauge, "1, with the version of the program.");
   out.Value(std::uint64_t{1}, {{"version", Version()}});
-  if (const auto bytes = ResidentBytes()) {
-    out.Single("process_resident_memory_bytes", MetricType::kGauge, "Memory of the process that is in RAM, shared memory included.",
-               *bytes);
+  if (const std::uint64_t bytes = ResidentBytes(); bytes != 0) {
+    out.Single("process_resident_memory_bytes", MetricType::kGauge, "Memory of the process that is in RAM, shared memory included.", bytes);
   }
   if (memory_limit != 0) {
     out.Single("process_memory_limit_bytes", MetricType::kGauge, "Memory that the process may take (--memory).", memory_limit);

@@ -1,7 +1,6 @@
 #include "common/volume/memory_budget.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <fstream>
@@ -9,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "common/memory/large_buffers.h"
 #include "common/text/parse_number.h"
 
 namespace slabstream {
@@ -46,14 +46,9 @@ std::int64_t ControlGroupAvailableBytes() {
 
 std::atomic<std::int64_t> own_limit = kUnlimited;
 
-// The second number of /proc/self/statm is what the process holds, in pages.
 std::int64_t OwnAvailableBytes() {
   const std::int64_t limit = own_limit;
-  if (limit == kUnlimited) return kUnlimited;
-  std::ifstream statm("/proc/self/statm");
-  std::int64_t addresses = 0, resident = 0;
-  if (!(statm >> addresses >> resident)) return kUnlimited;
-  return std::max<std::int64_t>(0, limit - resident * ::sysconf(_SC_PAGESIZE));
+  return limit == kUnlimited ? kUnlimited : std::max<std::int64_t>(0, limit - std::int64_t(ResidentBytes()));
 }
 
 }  // namespace
@@ -63,7 +58,10 @@ void LimitMemory(std::uint64_t bytes) { own_limit = std::int64_t(bytes); }
 std::int64_t AvailableMemoryBytes() { return std::min({SystemBytes("MemAvailable:"), ControlGroupAvailableBytes(), OwnAvailableBytes()}); }
 
 Status CheckFitsMemory(std::int64_t bytes, std::string_view what) {
-  const std::int64_t available = AvailableMemoryBytes();
+  std::int64_t available = AvailableMemoryBytes();
+  if (bytes <= available) return Status::Ok();
+  ReleaseFreeMemory();
+  available = AvailableMemoryBytes();
   if (bytes <= available) return Status::Ok();
   return Status::ResourceExhausted(
       fmt::format("{} needs {} MiB of memory, but only {} MiB are available", what, bytes / kMebi, available / kMebi));

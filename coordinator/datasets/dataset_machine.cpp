@@ -405,6 +405,9 @@ bool DatasetMachine::State::IsAwaited(DatasetId dataset) const {
 
 void DatasetMachine::State::LoadData(const std::string& name) {
   const LoadId load = datasets.BeginLoad(name, now);
+  // Room first: while it is loaded, both would be there.
+  while (datasets.bytes() + datasets.LoadingBytes() > DatasetShare(config.memory_bytes) && UnloadOne()) {
+  }
   actions.emplace_back(LoadDataset{.name = name,
                                    .load = load,
                                    .source = datasets.Find(name)->source,

@@ -237,6 +237,20 @@ std::uint64_t DatasetTable::bytes(const std::function<bool(DatasetId)>& which) c
   return total;
 }
 
+std::uint64_t DatasetTable::LoadingBytes() const {
+  const auto kind = [](const std::string& name) {  // a field, a plane, or a level
+    const std::size_t last = name.rfind('\n');
+    return last == std::string::npos ? name + "\nfield" : DatasetOfPart(name) + name.substr(last, name.find(' ', last) - last);
+  };
+  std::map<std::string, std::uint64_t> largest;
+  VisitAll(*this, [&](const std::string& name, const Entry& entry) { largest[kind(name)] = std::max(largest[kind(name)], entry.bytes); });
+  std::uint64_t bytes = 0;
+  VisitAll(*this, [&](const std::string& name, const Entry& entry) {
+    if (entry.state == DatasetState::kLoading) bytes += largest[kind(name)];
+  });
+  return bytes;
+}
+
 bool DatasetTable::Holds(DatasetId dataset) const {
   bool held = retired_.contains(dataset);
   VisitAll(*this, [&](const std::string&, const Entry& entry) { held |= entry.state == DatasetState::kReady && entry.id == dataset; });

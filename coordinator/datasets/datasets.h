@@ -148,6 +148,8 @@ class DatasetTable {
 
   // Bytes of all voxels, the retired ones too; or of some of them.
   std::uint64_t bytes(const std::function<bool(DatasetId)>& which = [](DatasetId) { return true; }) const;
+  // What is being loaded will take, as far as is known: as much as the largest other part of its kind.
+  std::uint64_t LoadingBytes() const;
   bool Holds(DatasetId dataset) const;  // ready or retired
   std::size_t retired() const { return retired_.size(); }
   // Of one that is ready without levels, or is being loaded (0): whose voxels, if any, may go.

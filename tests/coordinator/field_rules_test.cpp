@@ -22,17 +22,18 @@ SubmitFrame Showing(RequestId request, std::vector<std::string> channels, const 
 
 class FieldRules : public testing::Test {
  protected:
-  static ScriptConfig Config() {
+  static ScriptConfig Config(std::uint64_t memory_bytes) {
     ScriptConfig config = TestConfig();
     config.datasets = {{"block", DataSource("/named/block.tif", "", {.overlay = "/named/map.nii"})}};
+    config.memory_bytes = memory_bytes;
     return config;
   }
-  FieldRules() : script(Config()) { script.Join(11, 1); }
+  explicit FieldRules(std::uint64_t memory_bytes = 0) : script(Config(memory_bytes)) { script.Join(11, 1); }
 
   // The end of a load. Each load has voxels of its own.
-  Actions Loaded(const LoadDataset& load) {
+  Actions Loaded(const LoadDataset& load, std::uint64_t bytes = 0) {
     return script.Step(
-        DatasetLoaded{load.name, load.load, load.load, BlockSummary(), 0, stamp_, IsPart(load.name) ? nullptr : ThreeChannels()});
+        DatasetLoaded{load.name, load.load, load.load, BlockSummary(), bytes, stamp_, IsPart(load.name) ? nullptr : ThreeChannels()});
   }
   Actions LoadedAll(std::size_t from = 0) {
     Actions actions;
@@ -79,6 +80,28 @@ TEST_F(FieldRules, AFrameShowsAllChannelsOnceTheyAreThere) {
   EXPECT_EQ(setup.fields[1].levels.at(0).dataset, script.loads[2].load);
   EXPECT_EQ(setup.fields[0].look.blend, Blend::kAdd);
   EXPECT_NE(setup.transfer.colors, setup.fields[0].look.transfer.colors);
+}
+
+class FieldsInLittleMemory : public FieldRules {
+ protected:
+  FieldsInLittleMemory() : FieldRules(400 * kMebi) {}  // 300 MiB for voxels
+};
+
+// While a part is read, it takes memory already. What must go for it goes before that.
+TEST_F(FieldsInLittleMemory, RoomIsMadeBeforeAnotherTimeIsLoaded) {
+  const auto visit = [&](RequestId request, const std::string& channel, const std::string& time) {
+    const std::size_t from = script.loads.size();
+    Actions actions = script.Client(kClient, Showing(request, {channel}, time));
+    const std::size_t unloaded = Of<UnloadDataset>(actions).size();
+    for (std::size_t i = from; i < script.loads.size(); ++i)
+      CoordinatorScript::Append(actions, Loaded(LoadDataset(script.loads[i]), 100 * kMebi));
+    script.AnswerAll(NothingChanged(std::move(actions)));
+    return unloaded;
+  };
+  EXPECT_EQ(visit(1, "0", "0"), 0U);
+  EXPECT_EQ(visit(2, "0", "1"), 0U);
+  EXPECT_EQ(visit(3, "0", "2"), 0U);
+  EXPECT_EQ(visit(4, "0", "3"), 1U) << "400 MiB would be there when it is loaded";
 }
 
 TEST_F(FieldRules, EachFieldHasALightVolumeIfThereAreShadows) {

@@ -90,6 +90,24 @@ TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnot
   EXPECT_THAT(All<StartRender>(Rendered(first)), SizeIs(1));
 }
 
+// Each makes data and an image of its own. One after the other they go on, whatever is missing.
+TEST_F(RenderTurnsTest, NoneBeginsBesideAnotherWhileTheProcessHoldsTooMuch) {
+  std::int64_t spare = -std::int64_t{1} << 30;
+  WorkerConfig config = Config();
+  config.memory_bytes = std::uint64_t{1} << 32;
+  config.spare_for_images = [&spare] { return spare; };
+  Start(config);
+  const StartRender first = All<StartRender>(Assign(FrameOf(1, 1))).at(0);
+  EXPECT_THAT(All<StartRender>(Assign(FrameOf(2, 2))), IsEmpty());
+  EXPECT_THAT(All<StartRender>(After(std::chrono::seconds(3))), IsEmpty());
+  const auto second = All<StartRender>(Feed(Rendered(first)));
+  ASSERT_THAT(second, SizeIs(1));
+  EXPECT_EQ(second[0].client, 2U);
+  EXPECT_THAT(All<StartRender>(Assign(FrameOf(3, 3))), IsEmpty());
+  spare = std::int64_t{1} << 30;
+  EXPECT_THAT(All<StartRender>(Feed(After(std::chrono::seconds(1)))), SizeIs(1)) << "there is room again";
+}
+
 TEST_F(RenderTurnsTest, ARenderThatPausesCanBeCancelled) {
   const StartRender large = All<StartRender>(Assign(FrameOf(1, 1))).at(0);
   now += std::chrono::seconds(1);

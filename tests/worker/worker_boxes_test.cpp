@@ -317,6 +317,30 @@ TEST_F(WorkerBoxesTest, ImagesOfFramesTakeRoomFromCachedVoxels) {
       << "the one that the frame does not need";
 }
 
+// What the formula does not count, the process measures: caches of renderers, holes in its heaps, memory of other workers.
+TEST_F(WorkerBoxesTest, WhatIsMeasuredBeyondTheLimitTakesRoomFromCachedVoxels) {
+  std::int64_t spare = std::int64_t{1} << 30;
+  WorkerConfig config = Config();
+  config.memory_bytes = std::uint64_t{1} << 32;
+  config.spare_for_images = [&spare] { return spare; };
+  Start(config);
+  for (std::uint32_t group = 0; group < 3; ++group) {
+    const auto render = All<StartRender>(Feed(Tell(Sized(1, group, {16, 16})))).at(0);
+    EXPECT_THAT(All<DropBox>(Rendered(render)), IsEmpty());
+  }
+  spare = -1;
+  for (int look = 0; look < 2; ++look) {
+    EXPECT_THAT(All<DropBox>(After(milliseconds(200))), SizeIs(1));
+    EXPECT_THAT(All<DropBox>(Tell(Tick{})), IsEmpty()) << "memory comes back late; until the next look it is not missed again";
+  }
+  spare = 1 << 20;
+  EXPECT_THAT(All<DropBox>(After(seconds(1))), IsEmpty());
+  spare = -std::int64_t{1} << 30;
+  EXPECT_THAT(All<DropBox>(After(seconds(1))), SizeIs(1));
+  EXPECT_EQ(machine->sizes().boxes, 0U);
+  EXPECT_THAT(All<StartRender>(Feed(Tell(Sized(2, 0, {16, 16})))), SizeIs(1)) << "a frame that is alone goes on";
+}
+
 TEST_F(WorkerBoxesTest, AnImageThatWaitsForOneInFrontOfItTakesRoomToo) {
   constexpr std::uint64_t kBox = 128 * 128 * 80;
   const GroupAssignment behind = Sized(1, 1, {4096, 4096});

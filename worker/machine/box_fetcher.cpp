@@ -213,6 +213,15 @@ std::uint64_t BoxFetcher::BegunBytes() const {
   return bytes;
 }
 
+std::uint64_t BoxFetcher::HeldBytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& [generation, padded] : boxes_) {
+    const bool whole = padded.is_complete() && padded.sources.empty();
+    bytes += whole ? padded.bytes : padded.bytes * padded.stored / std::max<std::size_t>(padded.chunk_count, 1);
+  }
+  return bytes;
+}
+
 void BoxFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions) {
   const ChunkPlace place{chunk.box, chunk.chunk};
   HeldBox* padded = FindRequested(chunk.dataset, place);

@@ -74,6 +74,9 @@ class BoxFetcher {
   // Whether there is room for what another render derives from this padded box: about as much as its voxels (worker_memory.h).
   bool HasRoomBeside(Generation padded) const { return boxes_.at(padded).RawBytes() <= room_ - std::min(room_, cached_bytes_); }
 
+  // Whether padded boxes that have begun to take memory exceed the room.
+  bool TakesTooMuch() const { return BegunBytes() > room_; }
+
   // Requests missing chunks of these padded boxes, which each client needs in this order, within the credit (one chunk is always allowed)
   // and the room. So many of the first client's begin to take memory `at_any_rate`, even if there is no room.
   void RequestChunks(std::span<const std::vector<Generation>> by_client, std::size_t at_any_rate, Epoch epoch, WorkerId worker, Time now,
@@ -91,6 +94,8 @@ class BoxFetcher {
   void Trim(WorkerActions& actions);
 
   std::uint64_t cached_bytes() const { return cached_bytes_; }
+  // Those of cached_bytes whose memory is taken by now: chunks that are stored, and what is complete.
+  std::uint64_t HeldBytes() const;
   bool reads_stored() const {
     return std::ranges::any_of(boxes_, [](const auto& box) { return box.second.stored_at != nullptr; });
   }

@@ -88,6 +88,7 @@ void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& action
 }
 
 RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
+  if (!begun_.empty() && boxes_.TakesTooMuch()) return waiting_.end();
   for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
     if (Complete(job->second) && HasRoom(job->second)) return job;
   }

@@ -6,7 +6,8 @@
 //
 // A render that is told to pause stops only between two of its pieces. A render that is cancelled ends soon, but not at once. So other
 // renders run beside it for a moment. Renders of several clients, paused ones included, use the same padded box at the same time, as long
-// as there is room for what each of them derives. Each job pins its boxes.
+// as there is room for what each of them derives. While boxes take more than their room, no render begins beside others. Each job pins its
+// boxes.
 #pragma once
 
 #include <map>

@@ -19,6 +19,8 @@ namespace slabstream {
 
 namespace {
 
+constexpr Duration kMeasure = std::chrono::milliseconds(100);
+
 // Among all that the assignment names; null: it names none such.
 const Peer* PeerIn(const GroupAssignment& assignment, WorkerId worker) {
   for (const auto* peers : {&assignment.peers, &assignment.others}) {
@@ -127,6 +129,7 @@ struct WorkerMachine::State {
   void GiveShapes();              // to those that await them
   void Trouble(const GroupKey& key, Status status, WorkerId unreachable = 0);
   void Tend();  // what is due, and what voxels and renderings need
+  void Measure();
   std::uint64_t RoomForVoxels() const;
   Time NextWake() const;
   void FailGroup(const GroupKey& key, const Status& status);
@@ -138,6 +141,8 @@ struct WorkerMachine::State {
   Duration heartbeat{}, timeout{};
   Time next_heartbeat;
   Time next_register = Time::min();
+  Time next_measure = Time::min();
+  std::optional<std::int64_t> measured;  // what is left for voxels and images, as it was measured last
   std::uint32_t rendered_ranks = 0;
   std::optional<Time> leave_by;  // it is leaving
   bool ended = false;
@@ -594,6 +599,7 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 
 void WorkerMachine::State::Tend() {
   boxes.ExpireRequests(now);
+  if (config.spare_for_images && now >= next_measure) Measure();
   if (config.memory_bytes != 0) boxes.SetRoom(RoomForVoxels());
   early_images.ForgetBefore(now - config.early_image_patience);
   early_tiles.ForgetBefore(now - config.early_image_patience);
@@ -614,17 +620,25 @@ void WorkerMachine::State::Tend() {
   wake = NextWake();
 }
 
+// The formula does not count everything: caches of renderers, holes in heaps, memory of other workers. What it leaves out takes room from
+// voxels. Until the next look it counts as the same: what is dropped may be given back to the system only later.
+void WorkerMachine::State::Measure() {
+  measured = std::int64_t(boxes.HeldBytes()) + config.spare_for_images();
+  next_measure = now + kMeasure;
+}
+
 // What the images of the present frames leave of memory_bytes.
 std::uint64_t WorkerMachine::State::RoomForVoxels() const {
-  std::uint64_t taken = IdleMemoryBytes(config.memory_bytes) + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
-  std::uint64_t light = 0;  // frames share it
+  const std::uint64_t others = IdleMemoryBytes(config.memory_bytes) + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
+  std::uint64_t taken = 0, light = 0;  // frames share the light
   for (const auto& [id, frame] : frames) {
     light = std::max(light, frame.shared_bytes);
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
     taken += frame.group_bytes * std::uint64_t(runs) + frame.tile_bytes;
     if (frame.accumulator) taken += frame.group_bytes * frame.accumulator->groups_waiting() + frame.picture_bytes;
   }
-  return config.memory_bytes - std::min(config.memory_bytes, taken + light);
+  const std::int64_t all = std::min(std::int64_t(config.memory_bytes) - std::int64_t(others), measured.value_or(INT64_MAX));
+  return std::uint64_t(std::max<std::int64_t>(all - std::int64_t(taken + light), 0));
 }
 
 Time WorkerMachine::State::NextWake() const {

@@ -99,6 +99,9 @@ struct WorkerConfig {
   Duration tile_patience = std::chrono::seconds(1);            // then a rank is rendered without the tiles of other workers
   // What this process reads from web servers, unless others tell of it; null: nothing.
   std::function<std::vector<WebTraffic>()> web_traffic = nullptr;
+  // What the process may take for images, those that it has included (common/memory/large_buffers.h), beside all else that it holds. Null:
+  // nobody measures it, and the formula alone counts.
+  std::function<std::int64_t()> spare_for_images = nullptr;
 };
 
 // The pixels of a PartialImage: runs, or another process' memory.

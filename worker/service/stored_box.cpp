@@ -131,6 +131,8 @@ BoxData& StoredBox::DataFor(ClientId client) {
 void StoredBox::Return(BoxData& data) {
   const std::lock_guard lock(mutex_);
   data.LeaveVoxels();
+  data.SetLight(nullptr);  // they belong to the frame, and so would stay
+  data.SetShapes(nullptr);
   for (Derived& each : derived_) {
     if (&each.data != &data) continue;
     each.lent = false;
