@@ -42,7 +42,7 @@ class Metadata(JsonDocument):
             if below.split("/")[0] in self.without or inner or (self.only and below.split("/")[-1] not in self.only):
                 continue
             for key, value in self._traits(below).items():
-                setattr(node, key, value(self) if callable(value) else value)
+                setattr(node, key, value(self, node) if callable(value) else value)
             if below in self.whole:
                 node.set = None
             nodes.append(node)

@@ -103,8 +103,7 @@ def judge(node, change, before, after, foreign, random):
     """The verdict of a change, and why. `foreign`: its answers before and after; None: it reads none; after None: it refuses the file."""
     if after.broken:
         return "crashed", after.broken
-    new, gone = [[note for note in one.notes if note not in other.notes] for one, other in ((after, before), (before, after))]
-    texts = [after.error] if after.error else new or gone  # a note about what is not there any more is not there either
+    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes]
     if after.error:
         return ("refused", "") if named(texts, node) else ("unnamed", after.error)
     wrong = difference(after, foreign[1], random) if foreign[1] is not None else ""
@@ -119,4 +118,7 @@ def judge(node, change, before, after, foreign, random):
         return "told", ""
     if wrong:
         return "wrong", wrong
-    return ("unnamed", " / ".join(texts)) if after.same_data(before) else ("used", "")
+    if not after.same_data(before):
+        return "used", ""
+    gone = [note for note in before.notes if note not in after.notes]
+    return ("told", "") if named(gone, node) else ("unnamed", " / ".join(texts))

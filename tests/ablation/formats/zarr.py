@@ -1,18 +1,16 @@
 """Arrays of Zarr 2 and 3 as xarray, zarr-python and numcodecs write them, with CF's attributes and coordinates."""
-import importlib
 import shutil
 
 import numcodecs
 import numpy as np
 import tensorstore
 import xarray
+import zarr
+from zarr.codecs import BytesCodec, GzipCodec
+from zarr.storage import ZipStore
 
 from ablation import Change, Sample
 from array_documents import Metadata, answer, kinds_of, numbers
-
-zarr = importlib.import_module("zarr")  # the library, not this module
-from_zarr = importlib.import_module("zarr.codecs")
-storage = importlib.import_module("zarr.storage")
 
 NAMES = ("time", "z", "y", "x")
 UNITS = ("m", "km", "mm", "degrees_north")
@@ -50,7 +48,7 @@ def again(name, **options):
 
 
 def traits(*changes):
-    return {"more": lambda document: [change(document) for change in changes]}
+    return {"more": lambda document, _: [change(document) for change in changes]}
 
 
 # Names by which messages say what of a chunk does not fit: its size, or how it is packed.
@@ -64,11 +62,11 @@ ARRAY2 = {"dtype": {**traits(again("samples are int32", dtype="<i4"), again("sam
           **{f"filters/*/{word}": {"names": ("filters", *CHUNK)} for word in ("id", "dtype", "astype", "elementsize")},
           "filters/*/dtype": {"words": ("<i4", ">f4"), "names": ("filters", *CHUNK)}, "filters": {"names": CHUNK}, "filters/*": {"names": CHUNK}}
 ARRAY3 = {"data_type": {**traits(again("samples are int32", dtype="int32"), again("samples are float64", dtype="float64"),
-                                 again("the other byte order", serializer=from_zarr.BytesCodec(endian="big"))),
+                                 again("the other byte order", serializer=BytesCodec(endian="big"))),
                         "names": CHUNK},
-          "codecs": {**traits(again("packed by gzip", compressors=from_zarr.GzipCodec())), "names": CHUNK},
+          "codecs": {**traits(again("packed by gzip", compressors=GzipCodec())), "names": CHUNK},
           "shape": {"names": ("axes", *CHUNK)}, "fill_value": {"role": "fill"}, "chunk_grid/configuration/chunk_shape": {"names": CHUNK},
-          "codecs/*": {"names": ("codecs", *CHUNK)}, "codecs/*/name": {"names": CHUNK}, "codecs/*/configuration/order": {"names": CHUNK},
+          "codecs/*/configuration/codecs/*/name": {"names": CHUNK}, "codecs/*": {"names": ("codecs", *CHUNK)}, "codecs/*/name": {"names": CHUNK}, "codecs/*/configuration/order": {"names": CHUNK},
           "codecs/*/configuration": {"names": ("codecs", *CHUNK)}, "codecs/*/configuration/endian": {"words": ("little", "big")},
           "codecs/*/configuration/index_location": {"words": ("start", "end"), "names": ("shard", *CHUNK)},
           "codecs/*/configuration/chunk_shape": {"names": ("shard", *CHUNK)}, "codecs/*/configuration/index_codecs": {"names": ("shard",)},
@@ -98,8 +96,10 @@ def group_documents(folder, version):
 
 
 def dataset_documents(folder, version):
-    """Values, coordinates and the group of a dataset of xarray."""
-    documents = array_documents(folder / "temp", version) + group_documents(folder, version)
+    """Values, coordinates and the group of a dataset of xarray. What arrays say by themselves is changed in samples of one array."""
+    file, table = (".zarray", ARRAY2) if version == 2 else ("zarr.json", ARRAY3)
+    documents = [Metadata(folder / "temp" / file, f"member{version}", only=("shape", "zarr_format", "node_type", "fill_value"), traits=table)]
+    documents += [attributes(folder / "temp", version, "", CF), *group_documents(folder, version)]
     for axis in ("x", "y", "time"):
         if (folder / axis).is_dir():
             documents += [attributes(folder / axis, version, f"coordinate-{axis}-", COORDINATE)]
@@ -217,13 +217,13 @@ def write_tensorstore(folder):
 
 
 def write_zip(path):
-    with storage.ZipStore(path, mode="w") as store:
+    with ZipStore(path, mode="w") as store:
         array = zarr.create_array(store, name="density", shape=(5, 6, 7), dtype="float32", chunks=(5, 6, 7), dimension_names=["z", "y", "x"])
         array[...] = numbers((5, 6, 7), "float32")
 
 
 def read_zip(path):
-    with storage.ZipStore(path, mode="r") as store:
+    with ZipStore(path, mode="r") as store:
         return answer(zarr.open_group(store, mode="r")["density"][...], kinds_of("zyx"))
 
 
@@ -275,7 +275,7 @@ def samples(_):
         xarray_sample("uneven", 2, lambda: dataset(temperatures(False)[0], times=False, uneven=True)),
         xarray_sample("bounds", 3, lambda: dataset(temperatures(False)[0], times=False, bounds=True)),
         xarray_sample("missing", 3, lambda: dataset(temperatures()[0], {"dtype": "int16", "missing_value": np.int16(-7)}, times=False)),
-        array_sample("plain2", 2, write_plain("uint16", 2, **named(2))),
+        array_sample("plain2", 2, write_plain("uint16", 2, compressors=numcodecs.Blosc(), **named(2))),
         array_sample("plain3", 3, write_plain("int16", 3, **named(3))),
         array_sample("nameless", 3, write_plain("float32", 3)),
         array_sample("half", 2, write_plain(">f2", 2, compressors=numcodecs.Zlib(), order="F", **named(2))),
