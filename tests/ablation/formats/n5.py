@@ -9,7 +9,7 @@ from ablation import Change, Sample
 from array_documents import Metadata, affine, answer, numbers
 from documents import XmlDocument
 
-UNITS = ("nm", "um", "mm", "pixel")
+UNITS = ("mm", "pixel")
 COMMENT, IDENTIFIER, DATE = {"kind": "comment"}, {"kind": "identifier"}, {"kind": "date"}
 ARRAY = ("dataType", "dimensions", "blockSize", "compression")
 PACKED = ("block", "damaged", "bytes", "compression")
@@ -62,7 +62,8 @@ TRAITS = {"dataType": {"more": changes(again("samples are int32", "int32"), agai
           "scale": {"role": "spacing"}, "translate": {"role": "offset"}, "resolution": {"role": "spacing"}, "offset": {"role": "offset"},
           "affineTransform": {"role": "affine"}, "name": COMMENT, "pixelWidth": {"role": "spacing"}, "numChannels": {"names": ("channels",)},
           "numFrames": {"names": ("axes",)}, "numSlices": {"names": ("slices", "channels")}, "n5": {}, "@type": IDENTIFIER, "description": COMMENT,
-          "path": {"names": ("must be a dataset",)}}
+          "path": {"names": ("must be a dataset", "a part of it is empty")}, "axes": {"names": ("scale",)},
+          "multiscales/*/axes/*": {"names": ("scale",)}}
 
 
 def array_document(folder):
@@ -85,27 +86,63 @@ def along(axes, numbers_of, missing):
     return [float(numbers_of[axes.index(axis)]) if axis in axes else missing for axis in "xyz"]
 
 
-def cosem(folder):
-    """Levels with `transform`, and what older programs read instead (https://github.com/janelia-cosem/schemas)."""
+def cosem(folder, own=True):
+    """Levels with `transform`, and what older programs read instead (https://github.com/janelia-cosem/schemas). `own`: in the levels, too."""
     data = numbers((8, 6, 4), "uint8")
     listed = []
     for level, factor in enumerate((1, 2)):
         scale = [size * factor for size in VOXEL]
         transform = {"axes": ["z", "y", "x"], "units": ["nm"] * 3, "scale": scale,
                      "translate": [10 + size * (factor - 1) / 2 for size in VOXEL]}
-        write(folder / "em" / f"s{level}", data[::factor, ::factor, ::factor], transform=transform,
-              pixelResolution={"dimensions": scale[::-1], "unit": "nm"})
+        more = {"transform": transform, "pixelResolution": {"dimensions": scale[::-1], "unit": "nm"}}
+        write(folder / "em" / f"s{level}", data[::factor, ::factor, ::factor], **(more if own else {}))
         listed.append({"path": f"s{level}", "transform": transform})
     tell(folder, n5="2.5.1")
     tell(folder / "em", axes=["x", "y", "z"], units=["nm"] * 3, scales=[[1, 1, 1], [2, 2, 2]], name="em",
          multiscales=[{"name": "em", "datasets": listed}], pixelResolution={"dimensions": VOXEL[::-1], "unit": "nm"})
 
 
+def first_level(folder):
+    """What `multiscales` says of its first dataset, and the path of it; s0 without it."""
+    listed = said(folder).get("multiscales", [{"datasets": [{"path": "s0"}]}])[0]["datasets"][0]
+    return listed, folder / listed["path"]
+
+
 def read_cosem(folder):
-    transform = said(folder / "em" / "s0").get("transform") or said(folder / "em")["multiscales"][0]["datasets"][0]["transform"]
+    """By the schema of COSEM and n5-metadata: lists are in the order of the axes that they name; voxels stay where they are."""
+    listed, path = first_level(folder / "em")
+    transform = said(path).get("transform") or listed["transform"]
     axes = transform.get("axes", ["z", "y", "x"])
-    return answer(opened(folder / "em" / "s0").read().result(), list("xyz"),
+    return answer(opened(path).read().result(), list("xyz"),
                   affine=affine(along(axes, transform["scale"], 1.0), along(axes, transform.get("translate", [0] * 3), 0.0)))
+
+
+def pixels(folder, own=False):
+    """A pyramid of n5-spark: the group says how large voxels are and how levels shrink; or, `own`, each level does."""
+    data, size = numbers((8, 6, 4), "uint8"), {"dimensions": [4.0, 8.0, 40.0], "unit": "um"}
+    for level, factor in enumerate((1, 2)):
+        more = {"downsamplingFactors": [factor] * 3, "pixelResolution": size} if own else {}
+        write(folder / "em" / f"s{level}", data[::factor, ::factor, ::factor], **more)
+    tell(folder, n5="2.5.1")
+    tell(folder / "em", name="em")
+    if not own:
+        tell(folder / "em", axes=["x", "y", "z"], units=["nm"] * 3, scales=[[1, 1, 1], [2, 2, 2]], pixelResolution=size)
+
+
+def shrunk(size, factors):
+    """Spacing and origin of a level whose voxels are the means of blocks (n5-viewer)."""
+    factors = np.array(factors, float)
+    if len(size) != 3 or len(factors) != 3 or not np.all(factors > 0):
+        raise ValueError("not factors of three axes")
+    return affine(factors * size, 0.5 * (factors - 1) * size)
+
+
+def read_pixels(folder):
+    attributes = {**said(folder / "em" / "s0"), **said(folder / "em")}
+    axes = attributes.get("axes", ["x", "y", "z"])
+    factors = attributes.get("downsamplingFactors") or attributes.get("scales", [[1] * 3])[0]
+    size = np.array(along(axes, attributes["pixelResolution"]["dimensions"], 1.0))
+    return answer(opened(folder / "em" / "s0").read().result(), axes, affine=shrunk(size, factors))
 
 
 def ngff(folder):
@@ -121,14 +158,16 @@ def ngff(folder):
 
 
 def read_ngff(folder):
-    multiscale = said(folder / "em")["multiscales"][0]
-    axes, scale, shift = [axis["name"] for axis in multiscale["axes"]], [1.0] * 3, [0.0] * 3
-    for one in multiscale["datasets"][0]["coordinateTransformations"]:
+    listed, path = first_level(folder / "em")
+    axes, scale, shift = [axis["name"] for axis in said(folder / "em")["multiscales"][0]["axes"]], [1.0] * 3, [0.0] * 3
+    if sorted(axes) != ["x", "y", "z"]:
+        raise ValueError("not the axes of a volume")
+    for one in listed["coordinateTransformations"]:
         if one["type"] == "scale":
             scale, shift = np.multiply(scale, one["scale"]), np.multiply(shift, one["scale"])
         elif one["type"] == "translation":
             shift = np.add(shift, one["translation"])
-    return answer(opened(folder / "em" / "s0").read().result(), list("xyz"), affine=affine(along(axes, list(scale), 1.0), along(axes, list(shift), 0.0)))
+    return answer(opened(path).read().result(), list("xyz"), affine=affine(along(axes, list(scale), 1.0), along(axes, list(shift), 0.0)))
 
 
 def single(folder):
@@ -164,7 +203,7 @@ def paintera(folder):
     write(folder / "labels" / "s0", numbers((8, 6, 4), "uint64", most=5), {"type": "raw"}, maxId=4, isLabelMultiset=False)
     write(folder / "labels" / "s1", numbers((4, 3, 2), "uint64", most=5), {"type": "raw"}, maxId=4, downsamplingFactors=[2.0, 2.0, 2.0])
     tell(folder / "labels", multiScale=True, resolution=[4.0, 8.0, 40.0], offset=[100.0, 200.0, 400.0], maxId=4, isLabel=True,
-         painteraData={"type": "label"}, value_range=None)
+         painteraData={"type": "label"})
     tell(folder, n5="2.5.1")
 
 
@@ -173,25 +212,30 @@ def read_paintera(folder):
     return answer(opened(folder / "labels" / "s0").read().result(), list("xyz"), affine=affine(attributes["resolution"], attributes.get("offset", [0] * 3)))
 
 
-def viewer(folder):
-    """Channels as n5-viewer reads them (its page, Usage)."""
+def viewer(folder, in_root=False):
+    """Channels as n5-viewer reads them (its page, Usage): each says how large its voxels are, or all in the attributes of the root."""
+    size = {"pixelResolution": {"unit": "um", "dimensions": [0.25, 0.5, 2.0]}}
+    tell(folder, n5="2.5.1", name="some data", scales=[[1, 1, 1], [2, 2, 2]], affineTransform=[[1, 0, 0, 8], [0, 1.25, 0, 4], [0, 0, 0.85, 2]],
+         **(size if in_root else {}))
     for channel in range(2):
         data = numbers((8, 6, 4), "uint16", channel)
-        write(folder / f"c{channel}" / "s0", data)
-        write(folder / f"c{channel}" / "s1", data[::2, ::2, ::2], downsamplingFactors=[2, 2, 2])
-    tell(folder, n5="2.5.1", name="some data", scales=[[1, 1, 1], [2, 2, 2]], pixelResolution={"unit": "um", "dimensions": [0.25, 0.5, 2.0]},
-         affineTransform=[[1, -0.3, -0.25, 0], [0, 1.25, 0, 0], [0, 0, 0.85, 0]])
+        for level, factor in enumerate((1, 2)):
+            write(folder / f"c{channel}" / f"s{level}", data[::factor, ::factor, ::factor])
+        tell(folder / f"c{channel}", **({} if in_root else size))
 
 
 def read_viewer(folder):
+    """Attributes of the root are used for channels that lack them. `affineTransform` is compared nowhere: it stays red, as ignored."""
     both = [opened(folder / f"c{channel}" / "s0").read().result() for channel in range(2)]
-    return answer(np.stack(both, axis=3), list("xyzc"), affine=affine(said(folder)["pixelResolution"]["dimensions"], [0.0] * 3))
+    attributes = {**said(folder), **said(folder / "c0")}
+    factors = attributes.get("scales", [[1] * 3])[0]
+    return answer(np.stack(both, axis=3), list("xyzc"), affine=shrunk(np.array(attributes["pixelResolution"]["dimensions"]), factors))
 
 
 def fiji(folder):
     """A hyperstack with ImageJ's own attributes, as Fiji's plugin N5 writes it with the metadata type `ImageJ`."""
-    write(folder / "stack", numbers((7, 6, 2, 5, 3), "uint16"), {"type": "xz", "preset": 6}, [4, 6, 1, 3, 1], name="stack", fps=0.0, frameInterval=2.5,
-          pixelWidth=0.25, pixelHeight=0.5, pixelDepth=2.0, pixelUnit="um", xOrigin=4.0, yOrigin=0.0, zOrigin=1.0, numChannels=2, numSlices=5,
+    write(folder / "stack", numbers((7, 6, 2, 5, 3), "uint16"), {"type": "xz", "preset": 6}, [4, 6, 1, 3, 1], name="stack", fps=0.4, frameInterval=2.5,
+          pixelWidth=0.25, pixelHeight=0.5, pixelDepth=2.0, pixelUnit="um", xOrigin=4.0, yOrigin=2.0, zOrigin=1.0, numChannels=2, numSlices=5,
           numFrames=3, type=1, imageProperties={"Info": "a microscope"})
     tell(folder, n5="2.5.1")
 
@@ -234,7 +278,7 @@ def views(folder):
         for time in range(2):
             group, data = folder / f"setup{setup}" / f"timepoint{time}", numbers((8, 6, 4), "uint16", 2 * setup + time)
             for level, factor in enumerate((1, 2)):
-                write(group / f"s{level}", data[::factor, ::factor, ::factor], downsamplingFactors=[factor] * 3)
+                write(group / f"s{level}", data[::factor, ::factor, ::factor])
             tell(group, multiScale=True, resolution=[1.0, 1.0, 1.0])
     tell(folder, n5="2.5.1")
     setups = "".join(SETUP.format(i) for i in range(2))
@@ -251,21 +295,28 @@ def read_views(folder):
 
 
 class Views(XmlDocument):
-    """The XML file or the settings of BigDataViewer. Ids of attributes and names for people are of these kinds."""
+    """The XML file or the settings of BigDataViewer. Elements of `WHOLE` have no nodes in them, and an element of one text is that text."""
 
-    KINDS = {"Name/text": "comment", "Attributes/Tile/name/text": "comment", "SourceGroup/name/text": "comment"}
+    KINDS = {"Name/text": "comment", "BasePath/text": "comment"}
+    ROLES = {"voxelSize/size/text": "spacing", "voxelSize/unit/text": "unit", "affine/text": "affine"}
+    WHOLE = ("Attributes", "MinMaxGroups", "SourceGroups", "Timepoints", "BasePath", "ImageLoader", "attributes")
 
     def nodes(self):
         nodes = super().nodes()
+        texts = {node.path[:-len("/text")] for node in nodes if node.path.endswith("/text")}
+        kept = []
         for node in nodes:
+            words = node.path.split("/")
+            if node.path in texts and words[-1] not in self.WHOLE or any(word in self.WHOLE for word in words[:-1]):
+                continue
             node.kind = next((kind for end, kind in self.KINDS.items() if node.path.endswith(end)), "")
-            node.role = {"voxelSize/size/text": "spacing", "voxelSize/unit/text": "unit"}.get("/".join(node.path.split("/")[-3:]), "")
-        return nodes
+            node.role = next((role for end, role in self.ROLES.items() if node.path.endswith(end)), "")
+            kept.append(node)
+        return kept
 
 
 def view_documents(folder):
     return [place_document(folder / "setup0", "setup"), place_document(folder / "setup0" / "timepoint0", "timepoint"),
-            place_document(folder / "setup0" / "timepoint0" / "s1", "view-level"),
             Views(folder.with_suffix(".xml"), "xml"), Views(folder.with_suffix(".settings.xml"), "settings")]
 
 
@@ -275,28 +326,37 @@ def sample(name, make, read, documents, array="", sidecars=()):
                   lambda made: read(made / folder), sidecars)
 
 
-def group_documents(name, group="em"):
+def level_documents(group="em"):
     """Of the group of levels and of two of its levels."""
-    return lambda folder: [array_document(folder / group / "s0"), place_document(folder / group, name),
-                           *(place_document(folder / group / level, f"{name}-{level}") for level in ("s0", "s1"))]
+    return lambda folder: [array_document(folder / group / "s0"), place_document(folder / group, "group"),
+                           place_document(folder / group / "s0", "level"), place_document(folder / group / "s1", "lower")]
 
 
-def array_documents(name, path):
+def single_documents(name, path):
     return lambda folder: [array_document(folder / path), place_document(folder / path, name), Metadata(folder / "attributes.json", "root", traits=TRAITS)]
 
 
 def viewer_documents(folder):
-    return [array_document(folder / "c0" / "s0"), place_document(folder / "c0" / "s1", "viewer-s1"), Metadata(folder / "attributes.json", "viewer", traits=TRAITS)]
+    return [Metadata(folder / "attributes.json", "viewer", traits=TRAITS), place_document(folder / "c0", "viewer-channel")]
+
+
+def size_in_root(folder):
+    """Alone: this sample is read wrongly as it is."""
+    return [Metadata(folder / "attributes.json", "viewer", only=("pixelResolution", "dimensions"), traits=TRAITS)]
 
 
 def samples(_):
     return [
-        sample("single", single, read_single, array_documents("tensorstore", "raw"), "raw"),
-        sample("cosem", cosem, read_cosem, group_documents("cosem"), "em"),
-        sample("ngff", ngff, read_ngff, group_documents("ngff"), "em"),
-        sample("funkelab", funkelab, read_funkelab, array_documents("funkelab", "raw"), "raw"),
-        sample("paintera", paintera, read_paintera, group_documents("paintera", "labels"), "labels"),
-        sample("fiji", fiji, read_fiji, array_documents("fiji", "stack"), "stack"),
+        sample("single", single, read_single, single_documents("single", "raw"), "raw"),
+        sample("pixels", pixels, read_pixels, level_documents(), "em"),
+        sample("spark", lambda folder: pixels(folder, True), read_pixels, level_documents(), "em"),
+        sample("cosem", cosem, read_cosem, level_documents(), "em"),
+        sample("listed", lambda folder: cosem(folder, False), read_cosem, level_documents(), "em"),
+        sample("ngff", ngff, read_ngff, level_documents(), "em"),
+        sample("funkelab", funkelab, read_funkelab, single_documents("funkelab", "raw"), "raw"),
+        sample("paintera", paintera, read_paintera, level_documents("labels"), "labels"),
+        sample("fiji", fiji, read_fiji, single_documents("fiji", "stack"), "stack"),
         sample("viewer", viewer, read_viewer, viewer_documents),
         sample("views", views, read_views, view_documents, sidecars=("views.xml", "views.settings.xml")),
+        sample("root-viewer", lambda folder: viewer(folder, True), read_viewer, size_in_root),
     ]

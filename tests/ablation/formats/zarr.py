@@ -98,7 +98,7 @@ def group_documents(folder, version):
 def dataset_documents(folder, version):
     """Values, coordinates and the group of a dataset of xarray. What arrays say by themselves is changed in samples of one array."""
     file, table = (".zarray", ARRAY2) if version == 2 else ("zarr.json", ARRAY3)
-    documents = [Metadata(folder / "temp" / file, f"member{version}", only=("shape", "zarr_format", "node_type", "fill_value"), traits=table)]
+    documents = [Metadata(folder / "temp" / file, f"member{version}", only=("shape", "zarr_format", "node_type"), traits=table)]
     documents += [attributes(folder / "temp", version, "", CF), *group_documents(folder, version)]
     for axis in ("x", "y", "time"):
         if (folder / axis).is_dir():
@@ -198,7 +198,7 @@ def write_partly(version):
     """Chunks that were never written hold the fill value."""
     def write(folder):
         array = zarr.create_array(folder, shape=(5, 6, 7), chunks=(3, 4, 4), dtype="int16", zarr_format=version, fill_value=17, **named(version))
-        array[:3, :4] = numbers((3, 4, 7), "int16")
+        array[:3, :4] = numbers((3, 4, 7), "int16") - 60
     return write
 
 
@@ -287,7 +287,8 @@ def samples(_):
         zip_sample(),
         xarray_sample("limits", 3, lambda: dataset(temperatures(False)[0], {"dtype": "int16", "scale_factor": 0.5, "add_offset": 3.0},
                                                    times=False, **missing), documents=few("valid_min", "valid_max", "actual_range")),
-        xarray_sample("fill2", 2, lambda: dataset(temperatures(), packed()), documents=lambda *_: []),
+        xarray_sample("fill2", 2, lambda: dataset(temperatures(), packed()),
+                      documents=lambda folder, _: [Metadata(folder / "temp" / ".zarray", "member2", only=("fill_value",), traits=ARRAY2)]),
         xarray_sample("unsigned", 2, unsigned, documents=few("_Unsigned")),
         xarray_sample("packed-coordinates", 3, packed_coordinates,
                       documents=lambda folder, version: [attributes(folder / "x", version, "coordinate-x-", COORDINATE,
