@@ -95,9 +95,13 @@ class Hdf5Document(Document):
             text = dataset.shape == () and h5py.check_string_dtype(dataset.dtype)
             value = dataset.asstr()[()] if text else None
             yield Node(here, value, (lambda new: self.replace(each, str(new), None)) if text else None, remove, **said)
-        elif dataset.size <= MOST_NUMBERS and dataset.ndim <= 2:
+        elif dataset.size <= MOST_NUMBERS:
+            shape = dataset.shape
             again = Change("another type and byte order", lambda: self.replace(each, self.file[each][()], other_type(dataset.dtype)), same=True)
-            yield Node(here, dataset[()], lambda new: self.replace(each, fitting(new, dataset.dtype), dataset.dtype), remove, more=[again], **said)
+            def change(new):
+                fits = len(shape) > 1 and np.size(new) == np.prod(shape)
+                self.replace(each, fitting(new, dataset.dtype).reshape(shape) if fits else fitting(new, dataset.dtype), dataset.dtype)
+            yield Node(here, dataset[()].ravel() if len(shape) > 1 else dataset[()], change, remove, more=[again], **said)
         else:
             yield Node(here, None, None, remove, more=self._again(each, dataset), **said)
 

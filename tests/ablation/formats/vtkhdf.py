@@ -81,7 +81,7 @@ def read_steps(path):
         reader.Update()
         data = reader.GetOutputDataObject(0)
         copy = data.NewInstance()
-        copy.CompositeShallowCopy(data) if data.IsA("vtkDataObjectTree") else copy.DeepCopy(data)
+        copy.DeepCopy(data)
         yield copy
 
 
@@ -185,10 +185,10 @@ def read_mesh(path):
     return Answer(fields=fields, affine=affine)
 
 
-def sample(name, make, read, options=""):
+def sample(name, make, read, options="", document=None):
     file = f"{name}.vtkhdf"
     return Sample(name, file + options, lambda folder: make(folder / file),
-                  lambda folder: [Hdf5Document(folder / file, name, MEANINGS, numbered=r"^\d+$", types=("<f8", ">f4"))],
+                  lambda folder: [Hdf5Document(folder / file, document or name, MEANINGS, numbered=r"^\d+$", types=("<f8", ">f4"))],
                   apart(lambda folder: read(folder / file)))
 
 
@@ -201,9 +201,9 @@ def samples(_):
         sample("image-cells", lambda path: write(path, vtk_image("rho", of_cells=True, direction=turned), CompressionLevel=4, ChunkSize=3), image("rho")),
         sample("image-series", series, image("velocity", 3)),
         sample("grid", grid, cells("T"), f"?dataset=T,lattice={LATTICE}"),
-        sample("grid-cells", grid, cells("material"), f"?dataset=material,lattice={LATTICE}"),
+        sample("grid-cells", grid, cells("material"), f"?dataset=material,lattice={LATTICE}", "grid"),
         sample("parts", parts, cells("p"), f"?dataset=p,lattice={LATTICE}"),
-        sample("parts-moved", parts, cells("rho", 2), f"?dataset=rho,time=2,lattice={LATTICE}"),
+        sample("parts-moved", parts, cells("rho", 2), f"?dataset=rho,time=2,lattice={LATTICE}", "parts"),
         sample("collection", collection, cells("T"), f"?lattice={LATTICE}"),
         sample("amr", mesh, read_mesh, "?dataset=rho"),
         sample("amr-series", lambda path: mesh(path, steps=True), read_mesh, "?dataset=rho"),
