@@ -15,11 +15,13 @@ from hdf5_documents import Hdf5Document, Meanings
 MEANINGS = Meanings(
     kinds={"NeXus_version": "comment", "nexusformat_version": "comment", "HDF5_Version": "comment", "h5py_version": "comment", "file_name": "comment",
            "file_time": "date", "creator": "comment", "start_time": "date", "h5_version": "comment", "experiment_identifier": "identifier",
-           "description": "comment", "implements": "comment"},
-    roles={"scaling_factor": "scale", "offset": "offset", "element_size_um": "spacing", "resolution": "spacing", "voxel_size": "spacing",
+           "description": "comment", "implements": "comment", "creator_version": "comment", "definition": "comment", "file_format": "comment",
+           "display_mode": "comment"},
+    roles={"scaling_factor": "scale", "offset": "offset", "intensity_scaling_factor": "scale", "intensity_offset": "offset",
+           "depth_scaling_factor": "spacing", "element_size_um": "spacing", "resolution": "spacing", "voxel_size": "spacing",
            "units": "unit"},
-    names={"signal": ("dataset",), "default": ("dataset",), "NX_class": ("dataset",), "axes": ("axis",), "NAME": ("scale",), "units": ("coordinates",), "unit": ("spacing",)},
-    words={"units": ("mm", "um", "nm", "m", "degrees"), "NX_class": ("NXdata", "NXentry", "NXcollection"), "CLASS": ("DIMENSION_SCALE", "IMAGE"),
+    names={"signal": ("dataset",), "default": ("dataset",), "NX_class": ("dataset",), "axes": ("axis",), "NAME": ("scale",), "DIMENSION_LABELS": ("labels of dimensions", "axes"), "units": ("coordinates",), "unit": ("spacing",)},
+    words={"units": ("mm", "um", "nm", "m", ["um", "nm", "nm"]), "NX_class": ("NXdata", "NXentry", "NXcollection"), "CLASS": ("DIMENSION_SCALE", "IMAGE"),
            "interpretation": ("image", "spectrum", "rgba-image"), "key": ("x", "y", "z", "t", "c")})
 METRES = {"m": 1, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 
@@ -67,8 +69,8 @@ def ilastik(path):
     with h5py.File(path, "w") as file:
         made = file.create_dataset("exported_data", data=samples_of((3, 5, 6, 7, 2), "f4"), chunks=(1, 5, 6, 7, 2), compression="lzf")
         made.attrs["axistags"] = json.dumps({"axes": [
-            {"key": key, "typeFlags": flag, "resolution": step, "description": "", **({"unit": unit} if unit else {})}
-            for key, flag, step, unit in (("t", 8, 0, ""), ("z", 2, 3, "um"), ("y", 2, 1.5, "um"), ("x", 2, 1.5, "um"), ("c", 1, 0, ""))]})
+            {"key": key, "typeFlags": flag, "resolution": step, "description": ""}
+            for key, flag, step in (("t", 8, 0), ("z", 2, 3), ("y", 2, 1.5), ("x", 2, 1.5), ("c", 1, 0))]})
         made.attrs["drange"] = np.array([0.0, 120.0])
         made.attrs["display_mode"] = "grayscale"
 
@@ -122,7 +124,8 @@ def by_nexusformat(path):
     axes = [nexus.NXfield(values, name=name, units="mm", long_name=f"{name} (mm)") for name, values in
             (("z", 1.0 + 2 * np.arange(5)), ("y", 0.5 * np.arange(6)), ("x", 0.25 * np.arange(7)))]
     data = nexus.NXdata(nexus.NXfield(samples_of((5, 6, 7), "i4"), name="counts", units="counts", long_name="Counts"), axes, title="scan")
-    entry = nexus.NXentry(data, start_time="2020-01-01T00:00:00", sample=nexus.NXsample(name="crystal"))
+    detector = nexus.NXdetector(raw=nexus.NXfield(samples_of((5, 6, 7), "i2")))
+    entry = nexus.NXentry(data, start_time="2020-01-01T00:00:00", sample=nexus.NXsample(name="crystal"), instrument=nexus.NXinstrument(detector=detector))
     root = nexus.NXroot(entry)
     root.attrs["default"] = "entry"
     entry.attrs["default"] = "data"
@@ -132,17 +135,19 @@ def by_nexusformat(path):
 def by_silx(path):
     """With all that the definition of NXdata has beside: indices, errors, factors, other signals."""
     with h5py.File(path, "w") as file:
-        file.attrs.update({"NX_class": "NXroot", "default": "scan", "creator": "silx", "file_time": "2020-01-01T00:00:00"})
-        file.create_group("scan").attrs.update({"NX_class": "NXentry", "default": "plot"})
-        file["scan/definition"] = "NXtomoproc"
-        plot = file.create_group("scan/plot")
+        file.attrs.update({"NX_class": "NXroot", "default": "entry", "creator": "silx", "file_time": "2020-01-01T00:00:00"})
+        file.create_group("entry").attrs.update({"NX_class": "NXentry", "default": "data"})
+        file["entry/definition"] = "NXtomoproc"
+        plot = file.create_group("entry/data")
         plot.attrs.update({"NX_class": "NXdata", "signal": "intensity", "axes": ["time", "depth", "row", "col"], "auxiliary_signals": ["other"],
                            "time_indices": 0, "depth_indices": 1, "row_indices": 2, "col_indices": 3})
         plot["intensity"] = samples_of((3, 5, 6, 7), "i2")
         plot["intensity"].attrs.update({"units": "counts", "long_name": "intensity", "interpretation": "image"})
         plot["intensity_errors"] = np.ones((3, 5, 6, 7), "f4")
         plot["other"] = np.ones((3, 5, 6, 7), "f4")
-        plot["scaling_factor"], plot["offset"] = 0.5, 10.0
+        for name, value in {"scaling_factor": 0.5, "offset": 10.0, "intensity_scaling_factor": 0.5, "intensity_offset": 10.0,
+                            "depth_scaling_factor": 2.0, "depth_offset": 1.0}.items():
+            plot[name] = value
         plot["title"] = "a scan"
         for name, values, unit in (("time", 2.0 * np.arange(3), "s"), ("depth", 3.0 * np.arange(5), "um"), ("row", 2.0 * np.arange(6), "um"),
                                    ("col", 5 + 1.0 * np.arange(7), "um")):
@@ -219,10 +224,10 @@ def read_nexus(path, group, letters):
         return Answer(fields=fields(found.signal[()], letters), places=converted(axes[-3:])[::-1])
 
 
-def sample(name, write, read=None, options="", more=()):
+def sample(name, write, read=None, options="", more=(), document=None):
     file = f"{name}.h5"
     return Sample(name, file + options, lambda folder: write(folder / file),
-                  lambda folder: [Hdf5Document(folder / file, name, MEANINGS, numbered=r"^\d+$"), *(make(folder / file) for make in more)],
+                  lambda folder: [Hdf5Document(folder / file, document or name, MEANINGS, numbered=r"^\d+$"), *(make(folder / file) for make in more)],
                   apart(lambda folder: read(folder / file)) if read else None)
 
 
@@ -236,6 +241,6 @@ def samples(_):
         sample("scales", scales, read_scales),
         sample("mask", mask, lambda path: read_plain(path, "mask")),
         sample("kinds", kinds, lambda path: read_plain(path, "tissue")),
-        sample("nexusformat", by_nexusformat, lambda path: read_nexus(path, "entry/data", "zyx")),
-        sample("silx", by_silx, lambda path: read_nexus(path, "scan/plot", "tzyx")),
+        sample("nexusformat", by_nexusformat, lambda path: read_nexus(path, "entry/data", "zyx"), document="nexus"),
+        sample("silx", by_silx, lambda path: read_nexus(path, "entry/data", "tzyx"), document="nexus"),
     ]
