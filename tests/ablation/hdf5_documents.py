@@ -92,9 +92,10 @@ class Hdf5Document(Document):
             if len(dataset.dtype.names) == 2 and dataset.dtype[0].kind == "S":
                 yield from self._rows(here, each)
         elif dataset.dtype.kind not in "iuf":
-            text = dataset.shape == () and h5py.check_string_dtype(dataset.dtype)
-            value = dataset.asstr()[()] if text else None
-            yield Node(here, value, (lambda new: self.replace(each, str(new), None)) if text else None, remove, **said)
+            text = dataset.shape in ((), (1,)) and h5py.check_string_dtype(dataset.dtype)
+            value = np.ravel(dataset.asstr()[()])[0] if text else None
+            one = dataset.shape == ()
+            yield Node(here, value, (lambda new: self.replace(each, str(new) if one else [str(new)], None)) if text else None, remove, **said)
         elif dataset.size <= MOST_NUMBERS:
             shape = dataset.shape
             again = Change("another type and byte order", lambda: self.replace(each, self.file[each][()], other_type(dataset.dtype)), same=True)
@@ -159,7 +160,7 @@ class Hdf5Document(Document):
             return None
         where, kind = attrs.get_id(key), attrs.get_id(key).dtype
         node = Node(f"{here}/@{key}", None, None, lambda: self._attrs(each).__delitem__(key), **self.meanings.of(key))
-        if kind == np.dtype("S1") and where.shape and where.shape[0] > 1:
+        if kind == np.dtype("S1") and where.shape:
             self.letters = True
             node.value = b"".join(attrs[key].tolist()).decode()
             node.set = lambda new: self._attrs(each).create(key, np.frombuffer(str(new).encode() or b"\0", "S1"))
@@ -245,7 +246,7 @@ class NetcdfDocument(Document):
     def nodes(self):
         nodes = [self._attribute(f"{self.name}/@{key}", self.attributes, key) for key in self.attributes]
         for key in self.dimensions:
-            nodes.append(Node(f"{self.name}/dimensions/{key}", None, None, None, more=[
+            nodes.append(Node(f"{self.name}/dimensions/{key}", None, None, None, names=("axes",), more=[
                 Change("another name", lambda k=key: self._rename(k, "other_" + k)), Change("unlimited", lambda k=key: self._unlimited(k), same=True)]))
         for key, variable in self.variables.items():
             nodes += self._nodes_of(key, variable)
@@ -254,6 +255,7 @@ class NetcdfDocument(Document):
     def _nodes_of(self, key, variable):
         here = f"{self.name}/{key}"
         said = self.meanings.of(key)
+        said["names"] += ("dataset",)
         remove = lambda: self.variables.__delitem__(key)
         if variable.dtype is str or variable.dtype.kind not in "iuf" or not variable.dimensions:
             yield Node(here, None, None, remove, **said)

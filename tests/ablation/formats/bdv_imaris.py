@@ -11,13 +11,12 @@ from apart import apart
 from documents import XmlDocument
 from hdf5_documents import Hdf5Document, Meanings
 
+REMARKS = ("Version", "ImarisVersion", "OriginalFormat", "Filename", "OriginalFormatFileIOVersion", "ThumbnailMode", "ThumbnailSize", "Imaris", "Log",
+           "Entries", "LensPower", "NumericalAperture", "ResampleDimensionX", "LSMEmissionWavelength", "LSMExcitationWavelength")
 MEANINGS = Meanings(
-    kinds={"RecordingDate": "date", "Version": "comment", "ImarisVersion": "comment", "OriginalFormat": "comment", "Filename": "comment",
-           "OriginalFormatFileIOVersion": "comment", "ThumbnailMode": "comment", "ThumbnailSize": "comment", "Manufactor": "comment",
-           "ManufactorType": "comment"},
-    roles={**{f"Ext{end}{axis}": "affine" for end in ("Min", "Max") for axis in range(3)}, "Unit": "unit", "resolutions": "spacing"},
+    kinds={"RecordingDate": "date", **{name: "comment" for name in REMARKS}}, roles={"resolutions": "spacing"},
     words={"ColorMode": ("BaseColor", "TableColor"), "Unit": ("um", "nm", "mm", "m"), "dataType": ("uint16", "int16", "uint8")},
-    names={"Data": ("dataset",)})
+    names={"Data": ("dataset",), "cells": ("level", "setup"), "TimePoint *": ("channel",)})
 TEXTS = {"size": ("0.5 0.5 2.0",), "unit": ("nm", "um", "mm", "px"), "color": ("-65536",), "active": ("false",)}
 
 
@@ -30,8 +29,9 @@ class Xml(XmlDocument):
             words = node.path.split("/")
             element = words[-2] if words[-1] == "text" else words[-1]
             node.words, node.names = TEXTS.get(element, ()), (element, "XML")
-            node.role = {"size": "spacing", "unit": "unit", "affine": "affine"}.get(element, "")
-            node.kind = "comment" if element in ("Name", "info") else ""
+            node.role = {"size": "spacing", "affine": "affine"}.get(element, "") if words[-1] == "text" else ""
+            remark = element in ("Name", "info") or "generatedBy" in words or "camera" in words or words[1] == "@version"
+            node.kind = "comment" if remark else ""
         return nodes
 
 
@@ -103,7 +103,7 @@ def read_bdv(path):
     editor = npy2bdv.BdvEditor(str(path))
     times, channels = editor.get_attribute_count()[0], editor.get_attribute_count()[2]
     fields = {(t, c): editor.read_view(time=t, channel=c).astype("u2").T.astype(float) for t in range(times) for c in range(channels)}
-    size, _ = editor.get_view_property("voxel_size")
+    size = editor.get_view_property("voxel_size")
     editor.finalize()
     return Answer(fields=fields, affine=np.diag([*size, 1.0]))
 
@@ -111,7 +111,13 @@ def read_bdv(path):
 def read_cells(path):
     with h5py.File(path) as file:
         times = sorted(name for name in file if name.startswith("t"))
-        return Answer(fields={(t, 0): file[f"{name}/s00/0/cells"][()].T.astype(float) for t, name in enumerate(times)}, affine=np.eye(4))
+        fields = {(t, 0): file[f"{name}/s00/0/cells"][()].T.astype(float) for t, name in enumerate(times)}
+        if len({field.shape for field in fields.values()}) > 1:
+            raise ValueError("times differ in size")
+        factor = file["s00/resolutions"][0]
+        affine = np.diag([*factor, 1.0])
+        affine[:3, 3] = 0.5 * (factor - 1)
+        return Answer(fields=fields, affine=affine)
 
 
 def letters(target, **attributes):
@@ -159,7 +165,7 @@ def imaris_level(group, size, data):
 def read_imaris(path):
     reader = ims(str(path), resolution_decimal_places=None, squeeze_output=False)
     times, channels = reader.shape[:2]
-    fields = {(t, c): np.asarray(reader[0, t, c])[0, 0].T.astype(float) for t in range(times) for c in range(channels)}
+    fields = {(t, c): np.asarray(reader[0, t:t + 1, c:c + 1, :, :, :])[0, 0].T.astype(float) for t in range(times) for c in range(channels)}
     low = [reader.read_numerical_dataset_attr(f"ExtMin{axis}") for axis in range(3)]
     affine = np.diag([*reader.resolution[::-1], 1.0])
     affine[:3, 3] = np.array(low) + 0.5 * np.diag(affine)[:3]
@@ -168,21 +174,21 @@ def read_imaris(path):
 
 def bdv_sample(name, write, read, documents, sidecars=()):
     return Sample(name, f"{name}.h5", write,
-                  lambda folder: [Hdf5Document(folder / f"{name}.h5", name, MEANINGS, types=("<i2", "<i4")), *documents(folder)],
+                  lambda folder: [Hdf5Document(folder / f"{name}.h5", "bdv", MEANINGS, types=()), *documents(folder)],
                   apart(lambda folder: read(folder / f"{name}.h5")), sidecars)
 
 
 def imaris_sample(name, types=("<f4",), **options):
     file = f"{name}.ims"
     return Sample(name, file, lambda folder: imaris(folder / file, **options),
-                  lambda folder: [Hdf5Document(folder / file, name, MEANINGS, numbered=r"(?<=[a-zA-Z] )\d+$", types=types)],
+                  lambda folder: [Hdf5Document(folder / file, "imaris", MEANINGS, numbered=r"(?<=[a-zA-Z] )\d+$", types=types)],
                   apart(lambda folder: read_imaris(folder / file)))
 
 
 def samples(_):
     return [
         bdv_sample("bdv", bdv, read_bdv, lambda folder: [Xml(folder / "bdv.xml", "bdv-xml")], ("bdv.xml",)),
-        bdv_sample("stitched", stitched, read_bdv, lambda folder: [Xml(folder / "stitched.xml", "stitched-xml"),
+        bdv_sample("stitched", stitched, read_bdv, lambda folder: [Xml(folder / "stitched.xml", "bdv-xml"),
                                                                   Xml(folder / "stitched.settings.xml", "settings-xml")],
                    ("stitched.xml", "stitched.settings.xml")),
         bdv_sample("typed", typed, read_cells, lambda folder: []),

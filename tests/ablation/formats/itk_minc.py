@@ -11,15 +11,19 @@ from vtk.util.numpy_support import numpy_to_vtk
 from ablation import Answer, Sample
 from apart import apart
 from hdf5_documents import Hdf5Document, Meanings, NetcdfDocument
+from vtk_answers import image_answer
 
+REMARKS = ("ITKVersion", "HDFVersion", "minc_version", "comments", "version", "full_name", "ITK_FileNotes", "Modality", "RescaleSlope", "MetaData",
+           "patient orientation", "info", "patient", "study", "acquisition", "sex", "modality", "repetition_time", "echo_time")
 MEANINGS = Meanings(
-    kinds={"ITKVersion": "comment", "HDFVersion": "comment", "ident": "identifier", "minc_version": "comment", "comments": "comment",
-           "version": "comment", "full_name": "comment", "start_time": "date", "ITK_FileNotes": "comment"},
+    kinds={"ident": "identifier", "vartype": "identifier", "start_time": "date", **{name: "comment" for name in REMARKS}},
     roles={"Spacing": "spacing", "Origin": "affine", "Directions": "affine", "step": "spacing", "start": "affine", "direction_cosines": "affine",
-           "image-min": "scale", "image-max": "scale", "valid_range": "scale", "units": "unit"},
-    names={"Directions": ("direction",), "Origin": ("origin",), "dimorder": ("dimorder", "axes")},
+           "image-max": "scale", "units": "unit"},
+    names={"Directions": ("direction",), "Origin": ("origin",), "dimorder": ("dimorder", "axes"), "direction_cosines": ("axes", "directions"),
+           "spacing": ("evenly spaced",), **{f"{letter}space": ("axes",) for letter in "xyz"}},
     words={"units": ("mm", "m", "um"), "signtype": ("signed__", "unsigned"), "spacing": ("regular__", "irregular"), "alignment": ("start_", "end___"),
-           "spacetype": ("native____", "talairach_"), "complete": ("true_", "false"), "class": ("label__", "real___")})
+           "spacetype": ("native____", "talairach_"), "complete": ("true_", "false"), "class": ("label__", "real___"),
+           "VoxelType": ("FLOAT", "UCHAR")})
 
 
 def turned():
@@ -49,10 +53,12 @@ def read_itk(path):
     components, sides = made.GetNumberOfComponentsPerPixel(), made.GetDimension()
     data = data if components > 1 else data[..., None]
     data = data if sides == 4 else data[None]
+    with h5py.File(path) as file:
+        timed = sides == 4 and file["ITKImage/0/Spacing"][3] > 0
     affine = np.eye(4)
     affine[:3, :3] = np.array(made.GetDirection()).reshape(sides, sides)[:3, :3] @ np.diag(made.GetSpacing()[:3])
     affine[:3, 3] = made.GetOrigin()[:3]
-    times = {"times": [len(data), made.GetSpacing()[3], ""]} if sides == 4 else {}
+    times = {"times": [len(data), made.GetSpacing()[3], ""]} if timed else {}
     return Answer(fields={(t, c): data[t, ..., c].T for t in range(len(data)) for c in range(components)},
                   affine=np.diag([-1.0, -1, 1, 1]) @ affine, facts=times)
 
@@ -129,27 +135,61 @@ def by_vtk(path):
     writer.Write()
 
 
+def read_by_vtk(path):
+    reader = vtk.vtkMINCImageReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    answer = image_answer([reader.GetOutput()], reader.GetOutput().GetPointData().GetScalars().GetName())
+    matrix = reader.GetDirectionCosines()
+    answer.affine = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)]) @ answer.affine
+    return answer
+
+
 def read_minc(path):
-    """Voxels in the order of the file; nibabel's affine is for that order."""
+    """Voxels in the order of the file; nibabel's affine is for that order. libminc takes the smaller number of valid_range first, nibabel
+    does not."""
     made = nibabel.load(path)
+    if nibabel_turns(path):
+        raise ValueError("valid_range falls")
     data = made.get_fdata()
     data = data if data.ndim == 4 else data[None]
     return Answer(fields={(t, 0): volume for t, volume in enumerate(data)}, affine=made.affine)
 
 
-def sample(name, file, write, read, document):
-    return Sample(name, file, lambda folder: write(folder / file), lambda folder: [document(folder / file, name, MEANINGS)],
+def nibabel_turns(path):
+    if not h5py.is_hdf5(path):
+        with netCDF4.Dataset(path) as file:
+            limits = getattr(file["image"], "valid_range", [0, 1])
+    else:
+        with h5py.File(path) as file:
+            limits = file["minc-2.0/image/0/image"].attrs.get("valid_range", [0, 1])
+    return limits[0] > limits[1]
+
+
+def hdf5(path, name, types=()):
+    return Hdf5Document(path, name, MEANINGS, r"^\d+$", types)
+
+
+def netcdf(path, name, types=()):
+    return NetcdfDocument(path, name, MEANINGS, types)
+
+
+def sample(name, file, write, read, document, types=()):
+    """Types of samples are changed in ITK's files only: in MINC, floats are values and whole numbers are scaled. None for a document: the
+    sample alone is compared."""
+    kind = name.split("-")[0]
+    return Sample(name, file, lambda folder: write(folder / file), lambda folder: [document(folder / file, kind, types)] if document else [],
                   apart(lambda folder: read(folder / file)))
 
 
 def samples(_):
     written = lambda data, **options: lambda path: SimpleITK.WriteImage(image(data, **options), str(path))
     return [
-        sample("itk", "a.h5", written(voxels((5, 6, 7), "i2")), read_itk, Hdf5Document),
-        sample("itk-vectors", "a.h5", written(voxels((5, 6, 7, 3), "f4"), vector=True), read_itk, Hdf5Document),
-        sample("itk-times", "a.hdf5", written(voxels((3, 5, 6, 7), "u1")), read_itk, Hdf5Document),
-        sample("minc2", "a.mnc", written(voxels((5, 6, 7), "u1")), read_minc, Hdf5Document),
-        sample("minc2-scanner", "a.mnc", scanner, read_minc, Hdf5Document),
-        sample("minc1", "a.mnc", bytes_of_minc1, read_minc, NetcdfDocument),
-        sample("minc1-vtk", "a.mnc", by_vtk, read_minc, NetcdfDocument),
+        sample("itk", "a.h5", written(voxels((5, 6, 7), "i2")), read_itk, hdf5, ("<f8", "<i4")),
+        sample("itk-vectors", "a.h5", written(voxels((5, 6, 7, 3), "f4"), vector=True), read_itk, hdf5, ("<f8", "<i4")),
+        sample("itk-times", "a.hdf5", written(voxels((3, 5, 6, 7), "u1")), read_itk, hdf5, ("<f8", "<i4")),
+        sample("minc2", "a.mnc", written(voxels((5, 6, 7), "u1")), read_minc, hdf5),
+        sample("minc2-scanner", "a.mnc", scanner, read_minc, hdf5),
+        sample("minc1", "a.mnc", bytes_of_minc1, read_minc, netcdf),
+        sample("minc1-vtk", "a.mnc", by_vtk, read_by_vtk, None),
     ]

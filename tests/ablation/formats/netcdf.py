@@ -231,7 +231,7 @@ def read(path, variable):
 
 def sample(name, write, variable, *, document=NetcdfDocument, options=""):
     file = f"{name}.nc"
-    return Sample(name, file + options, lambda folder: write(folder / file), lambda folder: [document(folder / file, name, MEANINGS)],
+    return Sample(name, file + options, lambda folder: write(folder / file), lambda folder: [document(folder / file, name, MEANINGS)] if document else [],
                   apart(lambda folder: read(folder / file, variable)))
 
 
@@ -242,7 +242,7 @@ def samples(_):
         sample("projected", projected, "wind"),
         sample("rotated", rotated, "reflectivity", options="?dataset=reflectivity"),
         sample("microscope", microscope, "counts"),
-        sample("unwritten", unwritten, "density"),
+        sample("unwritten", unwritten, "density", document=None),
         sample("flags", flags, "cloud_type"),
         sample("inside", ocean, "thetao", document=Hdf5Document, options="?dataset=thetao"),
     ]
