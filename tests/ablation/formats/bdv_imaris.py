@@ -7,10 +7,10 @@ import numpy as np
 from imaris_ims_file_reader.ims import ims
 
 from ablation import Answer, Sample
-from apart import apart
 from documents import XmlDocument
 from hdf5_documents import Hdf5Document, Meanings
 
+FOREIGN_READER_CRASHES = True
 REMARKS = ("Version", "ImarisVersion", "OriginalFormat", "Filename", "OriginalFormatFileIOVersion", "ThumbnailMode", "ThumbnailSize", "Imaris", "Log",
            "Entries", "LensPower", "NumericalAperture", "ResampleDimensionX", "LSMEmissionWavelength", "LSMExcitationWavelength")
 MEANINGS = Meanings(
@@ -175,14 +175,14 @@ def read_imaris(path):
 def bdv_sample(name, write, read, documents, sidecars=()):
     return Sample(name, f"{name}.h5", write,
                   lambda folder: [Hdf5Document(folder / f"{name}.h5", "bdv", MEANINGS, types=()), *documents(folder)],
-                  apart(lambda folder: read(folder / f"{name}.h5")), sidecars)
+                  lambda folder: read(folder / f"{name}.h5"), sidecars)
 
 
 def imaris_sample(name, types=("<f4",), **options):
     file = f"{name}.ims"
     return Sample(name, file, lambda folder: imaris(folder / file, **options),
                   lambda folder: [Hdf5Document(folder / file, "imaris", MEANINGS, numbered=r"(?<=[a-zA-Z] )\d+$", types=types)],
-                  apart(lambda folder: read_imaris(folder / file)))
+                  lambda folder: read_imaris(folder / file))
 
 
 def samples(_):

@@ -9,10 +9,10 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 
 from ablation import Answer, Sample
-from apart import apart
 from hdf5_documents import Hdf5Document, Meanings, NetcdfDocument
 from vtk_answers import image_answer
 
+FOREIGN_READER_CRASHES = True
 REMARKS = ("ITKVersion", "HDFVersion", "minc_version", "comments", "version", "full_name", "ITK_FileNotes", "Modality", "RescaleSlope", "MetaData",
            "patient orientation", "info", "patient", "study", "acquisition", "sex", "modality", "repetition_time", "echo_time")
 MEANINGS = Meanings(
@@ -179,7 +179,7 @@ def sample(name, file, write, read, document, types=()):
     sample alone is compared."""
     kind = name.split("-")[0]
     return Sample(name, file, lambda folder: write(folder / file), lambda folder: [document(folder / file, kind, types)] if document else [],
-                  apart(lambda folder: read(folder / file)))
+                  lambda folder: read(folder / file))
 
 
 def samples(_):
