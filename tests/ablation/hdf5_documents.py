@@ -128,7 +128,7 @@ class Hdf5Document(Document):
             def remove(number=number):
                 self.replace(each, np.delete(self.file[each][()], number), None)
             yield Node(f"{here}/{row[0].decode().strip()}", row[1] if not isinstance(row[1], bytes) else row[1].decode().strip(),
-                       change, remove)
+                       change, remove, **self.meanings.of(row[0].decode().strip()))
 
     def replace(self, each, data, dtype, **options):
         """Another dataset with the same attributes and scales."""

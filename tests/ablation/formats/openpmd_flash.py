@@ -8,13 +8,15 @@ from ablation import Answer, Sample
 from hdf5_documents import Hdf5Document, Meanings
 
 FOREIGN_READER_CRASHES = True
+REMARKS = ("openPMD", "openPMDextension", "softwareDependencies", "sim info", "fieldSmoothing", "minimum", "maximum", "run_comment", "nstep", "usegravity",
+           "xl_boundary_type", "redshift", "corners", "lrefine_max", "splitnumblocks")
 MEANINGS = Meanings(
-    kinds={"openPMD": "comment", "softwareDependencies": "comment", "sim info": "comment", "file creation time": "date", "build date": "date",
-           "filenames": "identifier"},
+    kinds={"filenames": "identifier", **{name: "comment" for name in REMARKS}},
     roles={"gridSpacing": "spacing", "gridGlobalOffset": "affine", "gridUnitSI": "unit", "position": "offset", "unitSI": "scale", "bounding box": "affine"},
     names={"meshesPath": ("meshes", "mesh"), "basePath": ("data",), "bounding box": ("block", "bounding box"), "refine level": ("level",),
-           "axisLabels": ("axes",), "shape": ("mesh",), "E": ("mesh",), "rho": ("mesh",), "meshes": ("mesh", "data")},
-    words={"geometry": ("cartesian", "thetaMode", "cylindrical", "other"), "dataOrder": ("C", "F"), "axisLabels": (["x", "y", "z"], ["y", "x", "z"]),
+           "axisLabels": ("axes",), "shape": ("mesh",), "E": ("mesh",), "rho": ("mesh",), "meshes": ("mesh", "data"), "openPMD": ("dataset",),
+           "gridSpacing": ("step along",), "gridUnitSI": ("step along",)},
+    words={"geometry": ("cartesian", "thetaMode", "cylindrical", "spherical"), "dataOrder": ("C", "F"), "axisLabels": (["x", "y", "z"], ["y", "x", "z"]),
            "iterationEncoding": ("fileBased", "groupBased", "variableBased")})
 
 
@@ -29,7 +31,7 @@ def laser(path):
     series.set_software("PIConGPU", "0.6.0")
     for number in range(3):
         iteration = series.iterations[100 * number]
-        iteration.time, iteration.dt, iteration.time_unit_SI = 2.0 * number, 0.02, 0.5
+        iteration.time, iteration.dt, iteration.time_unit_SI = 3 + 2.0 * number, 0.02, 0.5
         field = iteration.meshes["E"]
         grid(field, {openpmd_api.Unit_Dimension.L: 1, openpmd_api.Unit_Dimension.M: 1, openpmd_api.Unit_Dimension.I: -1,
                      openpmd_api.Unit_Dimension.T: -3})
@@ -74,34 +76,46 @@ def fortran(path):
                            "fieldSmoothing": np.bytes_("none")})
 
 
-def read_openpmd(path, name):
-    """Components with samples are channels; places in metres."""
+def stored(path, name):
+    """Iterations, and components with samples, of the first of them: openPMD-api leaves out what lacks an attribute."""
+    with h5py.File(path) as file:
+        iterations = [key for key in file["data"] if key.isdigit()]
+        mesh = next(file[f"data/{iterations[0]}/{group}/{name}"] for group in ("meshes", "fields") if group in file[f"data/{iterations[0]}"])
+        return len(iterations), 1 if isinstance(mesh, h5py.Dataset) else sum(isinstance(each, h5py.Dataset) for each in mesh.values())
+
+
+def place_of(mesh, component):
+    """The order of the axes x, y, z in the file, and the affine, in metres."""
+    labels, spacing, start = list(mesh.axis_labels), np.array(mesh.grid_spacing), np.array(mesh.grid_global_offset)
+    if mesh.geometry != openpmd_api.Geometry.cartesian or sorted(labels) != ["x", "y", "z"]:
+        raise ValueError("has no axes x, y and z")
+    shift = np.array(component.position) if len(component.position) == 3 else np.zeros(3)
+    order = [labels.index(letter) for letter in "xyz"]
+    affine = np.diag([*(mesh.grid_unit_SI * spacing[order]), 1.0])
+    affine[:3, 3] = mesh.grid_unit_SI * (start + shift * spacing)[order]
+    return [2 - i for i in order] if str(mesh.data_order).endswith("F") else order, affine
+
+
+def read_openpmd(path, name, channel=0):
+    """One component with samples; only times that lie where the first one lies."""
     series = openpmd_api.Series(str(path), openpmd_api.Access.read_only)
-    fields, affine, seconds = {}, None, []
+    fields, seconds, first = {}, [], None
     for number, index in enumerate(series.iterations):
         iteration = series.iterations[index]
         seconds.append(iteration.time * iteration.time_unit_SI)
         mesh = iteration.meshes[name]
-        if mesh.geometry != openpmd_api.Geometry.cartesian:
-            raise ValueError("is not cartesian")
-        labels, spacing, start = list(mesh.axis_labels), np.array(mesh.grid_spacing), np.array(mesh.grid_global_offset)
-        if sorted(labels) != ["x", "y", "z"]:
-            raise ValueError("no labels")
         components = [mesh[key] for key in sorted(mesh) if not mesh[key].constant]
-        for channel, component in enumerate(components):
-            values = component.load_chunk()
-            series.flush()
-            shift = np.array(component.position) if len(component.position) == 3 else np.zeros(3)
-            order = [labels.index(letter) for letter in "xyz"]
-            axes = [2 - i for i in order] if str(mesh.data_order).endswith("F") else order
+        if number == 0 and (len(series.iterations), len(components)) != stored(path, name):
+            raise ValueError("openPMD-api leaves something out")
+        axes, affine = place_of(mesh, components[channel])
+        first = affine if first is None else first
+        values = components[channel].load_chunk()
+        series.flush()
+        if np.array_equal(first, affine) and (number == 0 or values.transpose(axes).shape == fields[0, channel].shape):
             fields[number, channel] = values.transpose(axes).astype(float)
-            if number == channel == 0:
-                affine = np.diag([*(mesh.grid_unit_SI * spacing[order]), 1.0])
-                affine[:3, 3] = mesh.grid_unit_SI * (start + shift * spacing)[order]
     steps = np.diff(seconds)
     even = len(steps) and steps[0] > 0 and np.allclose(steps, steps[0])
-    first = {key: values for key, values in fields.items() if key[1] == 0}  # other components lie elsewhere
-    return Answer(fields=first, affine=affine, facts={"times": [len(seconds), float(seconds[-1] - seconds[0]) / len(steps), "s"] if even
+    return Answer(fields=fields, affine=first, facts={"times": [len(seconds), float(seconds[-1] - seconds[0]) / len(steps), "s"] if even
                                                       else [len(seconds), None, ""]})
 
 
@@ -176,6 +190,7 @@ def sample(name, write, read, options="", numbered=r"^\d+$", file=None, document
 def samples(_):
     return [
         sample("laser", laser, lambda path: read_openpmd(path, "E"), "?dataset=E", document="openpmd"),
+        sample("laser-y", laser, lambda path: read_openpmd(path, "E", 1), "?dataset=E,channel=1", document="openpmd"),
         sample("density", laser, lambda path: read_openpmd(path, "rho"), "?dataset=rho", document="openpmd"),
         sample("fortran", fortran, lambda path: read_openpmd(path, "rho"), file="data42.h5"),
         sample("flash", flash, lambda path: read_flash(path, "dens"), "?dataset=dens", file="run_hdf5_plt_cnt_0042"),

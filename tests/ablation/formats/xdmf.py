@@ -1,5 +1,6 @@
 """XDMF as VTK's writer, meshio and programs with a text of their own write it, over HDF5, binary files and XML; read by VTK."""
 import h5py
+import lxml.etree
 import meshio
 import numpy as np
 import vtk
@@ -19,6 +20,12 @@ WORDS = {"NumberType": ("Float", "Int", "UInt", "Char"), "DataType": ("Float", "
          "Version": ("2.0", "3.0"), "Function": ("JOIN($0, $1)",)}
 
 
+NAMES = {"Domain": ("grids",), "Attribute": ("array",), "Grid": ("array", "references"), "TopologyType": ("axes", "cells", "GeometryType"),
+         "Dimensions": ("numbers", "is of", "bytes", "components"), "Center": ("array", "points", "cells"), "Name": ("array",),
+         "Precision": ("type", "bytes", "cells with a volume"), "NumberType": ("type",), "DataType": ("type", "cells with a volume"), "Seek": ("bytes",),
+         "include": ("Topology",)}
+
+
 class Xdmf(XmlDocument):
     """With the words of XDMF's attributes."""
 
@@ -26,10 +33,15 @@ class Xdmf(XmlDocument):
         nodes = super().nodes()
         for node in nodes:
             words = node.path.split("/")
-            node.words = WORDS.get(words[-1].lstrip("@"), ())
-            node.names = (words[-2],) if words[-1].startswith("@") or words[-1] == "text" else ()
+            last = words[-1].lstrip("@")
+            node.words = WORDS.get(last, ()) if "Geometry" not in words or last not in ("NumberType", "DataType") else ()
+            node.names = (*NAMES.get(last, ()), *((words[-2],) if words[-1].startswith("@") or last == "text" else ()))
+            node.kind = "comment" if last == "Version" or "Information" in words or words[-2:] == ["Grid", "@Name"] else ""
             if "Geometry" in words:
-                node.role, node.names = "affine", (*node.names, "Geometry", "origin", "spacing", "coordinates")
+                node.role = "affine" if last == "text" else ""
+                node.names = (*node.names, "Geometry", "origin", "spacing", "coordinates", "voxels between", "points reach")
+            if "Topology" in words:
+                node.names = (*node.names, "cell", "items")
         return nodes
 
 
@@ -92,7 +104,7 @@ def by_vtk(folder):
 def cells_of_image(folder):
     """Values of cells; a vector; information that other programs leave; big endian in a binary file."""
     inside = (even(folder, dimensions="6 7 8") + '<Time Value="1.5"/><Information Name="author" Value="somebody"/>'
-              + attribute("u", hdf(folder, "u", voxels((5, 6, 7, 3))), "Vector", "Cell") + attribute("p", binary(folder, "p.raw", voxels((5, 6, 7), "f8")), center="Cell"))
+              + attribute("u", hdf(folder, "u", voxels((5, 6, 7, 3))), "Vector", "Cell") + attribute("p", binary(folder, "p.raw", voxels((5, 6, 7))), center="Cell"))
     save(folder, "cells.xmf", inside)
 
 
@@ -143,8 +155,22 @@ def steps(folder):
             writer.write_data(0.5 * number, point_data={"T": voxels(len(points), "f8", number)})
 
 
+def check_known(text):
+    """VTK knows no whole numbers of one or two bytes by Precision, none of eight without a sign, and no other precision than 4 if it is left
+    out; it takes every Time for one of a series."""
+    for item in lxml.etree.fromstring(text).iter("DataItem"):
+        kind, precision = item.get("NumberType") or item.get("DataType") or "", item.get("Precision")
+        if (kind in ("Int", "UInt") and precision in ("1", "2")) or (kind == "UInt" and precision == "8"):
+            raise ValueError("VTK has no such type")
+        if precision is None and item.get("Format") == "Binary":
+            raise ValueError("has no precision")
+    if b"<Time " in text and text.count(b"<Time ") > 1 and (b'"Temporal"' not in text or b'"Collection"' not in text):
+        raise ValueError("is no series")
+
+
 def read_times(path):
     """What VTK makes of each time."""
+    check_known(path.read_bytes())
     reader = vtk.vtkXdmfReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
@@ -160,6 +186,8 @@ def read_times(path):
 
 def read_images(path, name, components=1):
     read = list(read_times(path))
+    if len(read) not in (1, 3):
+        raise ValueError("a time is missing, or there twice")
     images = [image for _, image in read]
     if any(not image.IsA("vtkImageData") for image in images):
         images = [image_of(image) for image in images]
@@ -200,7 +228,8 @@ def read_pieces(path):
     size = np.max([begin + image.fields[0, 0].shape for begin, image in zip(begins, images)], axis=0)
     values = np.full(size, np.nan)
     for begin, image in zip(begins, images):
-        values[tuple(slice(a, a + n) for a, n in zip(begin, image.fields[0, 0].shape))] = image.fields[0, 0]
+        place = tuple(slice(a, a + n) for a, n in zip(begin, image.fields[0, 0].shape))
+        values[place] = np.where(np.isnan(values[place]), image.fields[0, 0], values[place])  # what they share is the first one's
     affine = np.diag([*spacing, 1.0])
     affine[:3, 3] = low
     return Answer(fields={(0, 0): values}, affine=affine)
@@ -208,7 +237,10 @@ def read_pieces(path):
 
 def read_steps(path):
     """The first of two grids: VTK gives the other one, which has nothing but the mesh, values of the first time."""
-    return grid_answer([data.GetBlock(0) for _, data in read_times(path)], "T", LATTICE)
+    found = [data.GetBlock(0) for _, data in read_times(path)]
+    if len(found) != 3:
+        raise ValueError("a time is missing, or there twice")
+    return grid_answer(found, "T", LATTICE)
 
 
 def sample(name, write, read, file, options="", document="xdmf"):
