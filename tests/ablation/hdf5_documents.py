@@ -137,6 +137,8 @@ class Hdf5Document(Document):
                  if any(scale == old for scale in dimension.values())]
         scales = [[scale.name for scale in dimension.values()] for dimension in old.dims] if old.ndim else []
         plain = [(key, old.attrs[key], old.attrs.get_id(key).dtype) for key in old.attrs if key not in ("DIMENSION_LIST", "REFERENCE_LIST")]
+        for name, axis in users:  # else the lists of their scales keep what is no longer there
+            self.file[name].dims[axis].detach_scale(old)
         del self.file[each]
         new = self.file.create_dataset(each, data=data, dtype=dtype, **options)
         for key, value, kind in plain:
@@ -262,14 +264,15 @@ class NetcdfDocument(Document):
         elif variable.data.size <= MOST_NUMBERS:
             def change(new):
                 variable.data = fitting(new, variable.dtype).reshape(variable.data.shape)
-            yield Node(here, variable.data, change, remove, more=[Change("another type", lambda: self._retype(variable, "f4" if variable.dtype.kind == "i" else "f8"), same=True)], **said)
+            yield Node(here, variable.data.ravel(), change, remove, more=[Change("another type", lambda: self._retype(variable, "f4" if variable.dtype.kind == "i" else "f8"), same=True)], **said)
         else:
             yield Node(here, None, None, remove, more=self._again(variable), **said)
         for name in variable.attributes:
             yield self._attribute(f"{here}/@{name}", variable.attributes, name)
 
     def _again(self, variable):
-        changes = [Change(f"samples are {t}", lambda t=t: self._retype(variable, t), same=True) for t in self.types if np.dtype(t) != variable.dtype]
+        types = () if "_Unsigned" in variable.attributes else self.types  # which is for bytes alone
+        changes = [Change(f"samples are {t}", lambda t=t: self._retype(variable, t), same=True) for t in types if np.dtype(t) != variable.dtype]
         if self.model == "NETCDF4":
             other = "little" if variable.options.get("endian") == "big" else "big"
             changes.insert(0, Change("the other byte order", lambda: variable.options.update(endian=other), same=True))

@@ -11,12 +11,15 @@ from ablation import Answer, Sample
 from hdf5_documents import Hdf5Document, Meanings, NetcdfDocument
 
 FOREIGN_READER_CRASHES = True
+REMARKS = ("Conventions", "standard_name_vocabulary", "frequency", "keywords", "summary", "contact", "project", "step", "unit_long", "geospatial_lat_min",
+           "geospatial_vertical_positive", "cell_methods", "cell_measures", "_NCProperties")
 MEANINGS = Meanings(
-    kinds={"Conventions": "comment", "standard_name_vocabulary": "comment", "frequency": "comment", "tracking_id": "identifier",
-           "creation_date": "date", "keywords": "comment", "summary": "comment", "contact": "comment", "project": "comment"},
+    kinds={"tracking_id": "identifier", "creation_date": "date", "_Netcdf4Dimid": "identifier", "_Netcdf4Coordinates": "identifier",
+           **{name: "comment" for name in REMARKS}},
     roles={"scale_factor": "scale", "add_offset": "offset", "_FillValue": "fill", "missing_value": "fill", "units": "unit"},
-    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",),
-           "_NCProperties": ("netCDF",), "thetao": ("dataset",), "units": ("coordinates",)},
+    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",),
+           "_FillValue": ("as missing_value says",), "positive": ("run down", "running down"), **{f"{name}_bnds": ("bounds",) for name in
+                                                                                             ("depth", "lat", "lon")}},
     words={"units": ("km", "m", "mm", "feet"), "positive": ("up", "down"), "axis": ("X", "Y", "Z", "T"), "_Unsigned": ("true", "false"),
            "calendar": ("360_day", "noleap"), "standard_name": ("longitude", "latitude", "time", "depth", "projection_x_coordinate")})
 METRES = {"m": 1, "metres": 1, "meters": 1, "km": 1e3, "kilometers": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9,
@@ -149,6 +152,18 @@ def unwritten(path):
         file.createVariable("density", "f4", ("z", "y", "x"), endian="big")[:4] = floats((4, 6, 7))
 
 
+def ice(path):
+    """As NSIDC has its grids: lengths in kilometres beside depths in metres; axes that only `axis` tells, in another order."""
+    with netCDF4.Dataset(path, "w") as file:
+        for name, size in (("easting_km", 7), ("below", 5), ("northing_km", 6)):
+            file.createDimension(name, size)
+        coordinates(file, "easting_km", -25 + 25.0 * np.arange(7), units="km", axis="X")
+        coordinates(file, "below", 10.0 * np.arange(5), units="m", axis="Z")
+        coordinates(file, "northing_km", 12.5 * np.arange(6), units="km", axis="Y")
+        made = file.createVariable("ice", "f4", ("easting_km", "below", "northing_km"))
+        made[...] = floats((7, 5, 6))
+
+
 def flags(path):
     """A classification: what numbers mean is in attributes."""
     with netCDF4.Dataset(path, "w") as file:
@@ -168,8 +183,9 @@ def axes_of(data, dimensions):
                           ("z", data.cf.axes.get("Z", []) + data.cf.coordinates.get("vertical", [])),
                           ("time", data.cf.axes.get("T", []) + data.cf.coordinates.get("time", []))):
         for name in names:
-            if name in dimensions:
-                found.setdefault(name, letter)
+            if found.setdefault(name, letter) != letter:
+                raise ValueError(f"{name} is two axes")
+    found = {name: letter for name, letter in found.items() if name in dimensions}
     for name in dimensions:
         known = {"level": "z", "depth": "z", "height": "z", "lat": "y", "latitude": "y", "lon": "x", "longitude": "x", "rlat": "y", "rlon": "x"}
         letter = known.get(name, name)
@@ -194,7 +210,8 @@ def places_of(file, name, size):
     around = getattr(made, "bounds", None)
     if around in file.variables and file[around].shape == (size, 2):
         ends = np.ma.filled(file[around][...].astype(float), np.nan)
-        if np.allclose(ends[1:, 0], ends[:-1, 1]) and np.allclose(np.diff(ends), np.diff(ends)[0]):
+        steps, lengths = np.diff(ends.mean(1)), np.abs(np.diff(ends))
+        if steps[0] != 0 and np.allclose(steps, steps[0]) and np.allclose(lengths, abs(steps[0])):
             places = ends.mean(1)
     return places, unit
 
@@ -231,7 +248,7 @@ def read(path, variable):
 
 def sample(name, write, variable, *, document=NetcdfDocument, options=""):
     file = f"{name}.nc"
-    return Sample(name, file + options, lambda folder: write(folder / file), lambda folder: [document(folder / file, name, MEANINGS)] if document else [],
+    return Sample(name, file + options, lambda folder: write(folder / file), lambda folder: [document(folder / file, "inside" if name == "inside" else "cf", MEANINGS)] if document else [],
                   lambda folder: read(folder / file, variable))
 
 
@@ -243,6 +260,7 @@ def samples(_):
         sample("rotated", rotated, "reflectivity", options="?dataset=reflectivity"),
         sample("microscope", microscope, "counts"),
         sample("unwritten", unwritten, "density", document=None),
+        sample("ice", ice, "ice"),
         sample("flags", flags, "cloud_type"),
         sample("inside", ocean, "thetao", document=Hdf5Document, options="?dataset=thetao"),
     ]
