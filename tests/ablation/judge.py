@@ -81,6 +81,8 @@ def difference(observed, answer, random):
         name = f"t{time}c{channel}"
         if name not in observed.arrays:
             return f"time {time}, channel {channel} is not there"
+        if observed.arrays[name].size != np.prod(size):
+            continue  # another size than that of the first time and channel
         got = observed.arrays[name].reshape(size[::-1])
         voxels = np.unique(np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * (np.array(wanted.shape) - 1), axis=0)
         voxels = np.unique(np.r_[voxels, random.integers(0, wanted.shape, (PLACES - len(voxels), 3))], axis=0)
@@ -103,7 +105,8 @@ def judge(node, change, before, after, foreign, random):
     """The verdict of a change, and why. `foreign`: the foreign reader's answer to the changed file; None: it reads none, or refuses it."""
     if after.broken:
         return "crashed", after.broken
-    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes]
+    gone = [note for note in before.notes if note not in after.notes]
+    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes] + gone
     if after.error:
         return ("refused", "") if named(texts, node) else ("unnamed", after.error)
     wrong = difference(after, foreign, random) if foreign is not None else ""

@@ -179,9 +179,11 @@ class FormatRun:
     def sites(self):
         """For each path the samples that have it, all values, and the documents."""
         sites, values, documents = collections.defaultdict(list), collections.defaultdict(list), collections.defaultdict(set)
+        self.document_names = collections.defaultdict(dict)  # of each sample, by number: the first word of the paths in it
         for sample in self.samples:
             for number, document in enumerate(sample.documents(self.work(sample))):
                 for index, node in enumerate(document.nodes()):
+                    self.document_names[sample.name][number] = node.path.split("/")[0]
                     path = f"{self.name}/{node.path}"
                     if self.word not in path:
                         continue
@@ -292,11 +294,11 @@ class FormatRun:
 
     def room_for(self, sample, node, documents):
         """The number of a document that can say what it lacks; None: there is none."""
-        for number, document in enumerate(sample.documents(self.work(sample))):
-            if (sample.name, number) in documents[node.path] or node.path.split("/")[0] not in {n.path.split("/")[0] for n in document.nodes()}:
+        for number, name in self.document_names[sample.name].items():
+            if (sample.name, number) in documents[node.path] or node.path.split("/")[0] != name:
                 continue
             try:
-                document.add(node.path, node.value)
+                sample.documents(self.work(sample))[number].add(node.path, node.value)
                 return number
             except Exception:  # there is no place for it in this sample
                 continue
