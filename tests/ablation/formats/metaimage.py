@@ -8,6 +8,7 @@ from vtk.util import numpy_support
 
 from ablation import Answer, CannotWrite, Change, Sample
 from documents import LinesDocument
+from isolated import isolated
 
 KINDS = {"Comment": "comment", "Name": "comment", "ID": "identifier", "ParentID": "identifier", "AcquisitionDate": "date", "ITK_InputFilterName": "comment"}
 ROLES = {"ElementSpacing": "spacing", "ElementSize": "spacing", "Offset": "affine", "Position": "affine", "Origin": "affine", "TransformMatrix": "affine",
@@ -200,7 +201,8 @@ def read(path):
 
 
 def sample(name, write, file="a.mha", document="header", sidecars=()):
-    return Sample(name, file, write, lambda folder: [Header(folder / file, document)], lambda folder: read(folder / file), sidecars)
+    return Sample(name, file, write, lambda folder: [Header(folder / file, document)],
+                  lambda folder: isolated(read)(folder / file), sidecars)
 
 
 def samples(_):

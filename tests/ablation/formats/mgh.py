@@ -5,14 +5,14 @@ import nibabel
 import numpy as np
 from nibabel.freesurfer.mghformat import MGHImage
 
-from ablation import Answer, Change, Sample
+from ablation import Answer, CannotWrite, Change, Sample
 from documents import HeaderDocument
 
 HEADER = np.dtype([("version", ">i4"), ("dims", ">i4", 4), ("type", ">i4"), ("dof", ">i4"), ("goodRASFlag", ">i2"), ("delta", ">f4", 3),
                    ("Mdc", ">f4", 9), ("Pxyz_c", ">f4", 3)])
 FOOTER = np.dtype([("tr", ">f4"), ("flip_angle", ">f4"), ("te", ">f4"), ("ti", ">f4"), ("fov", ">f4")])
 NAMES = {"dims": ("size", "truncated", "voxels", "dimension"), "type": ("type", "truncated"), "version": ("MGH", "version"),
-         "delta": ("spacing", "voxel"), "Mdc": ("axes", "cosines", "ras", "direction"), "Pxyz_c": ("c_ras", "centre"), "goodRASFlag": ("ras_good_flag",)}
+         "delta": ("spacing", "voxel", "step"), "Mdc": ("axes", "cosines", "ras", "direction"), "Pxyz_c": ("c_ras", "centre"), "goodRASFlag": ("ras_good_flag",)}
 ROLES = {"delta": "spacing", "Mdc": "affine", "Pxyz_c": "affine"}
 TYPES = (np.uint8, np.int16, np.int32, np.float32)
 
@@ -45,6 +45,8 @@ class Part(HeaderDocument):
         return nodes
 
     def _encode(self, dtype):
+        if not self.header["goodRASFlag"][0]:
+            raise CannotWrite("nibabel writes axes")
         loaded = nibabel.load(self.path)
         nibabel.save(MGHImage(np.asarray(loaded.dataobj).astype(dtype), loaded.affine, loaded.header), self.path)
         image = nibabel.load(self.path)

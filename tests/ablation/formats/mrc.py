@@ -152,29 +152,29 @@ def read(path):
         for column, axis in enumerate(order):
             affine[:3, column] = np.eye(3)[axis - 1] * step
         if np.any(step <= 0) or not np.all(np.isfinite(affine)):
-            affine = None
+            raise ValueError("no lengths")
         return Answer(fields={(t, 0): volume.transpose(2, 1, 0).astype(float) for t, volume in enumerate(stored)}, affine=affine)
 
 
-def sample(name, write_file, file="a.mrc", document="header", documents=None):
-    return Sample(name, file, write_file, documents or (lambda folder: [Header(folder / file, document)]), lambda folder: read(folder / file))
+def sample(name, write_file, file="a.mrc", documents=None):
+    return Sample(name, file, write_file, documents or (lambda folder: [Header(folder / file, "header")]), lambda folder: read(folder / file))
 
 
 def samples(_):
     return [
         sample("floats", lambda folder: write(folder, values((7, 6, 5)), origin=(10, 20, 30))),
+        sample("imod-signed", lambda folder: imod(folder, 1)),
+        sample("imod-unsigned", lambda folder: imod(folder, 0)),
         sample("starts", lambda folder: write(folder, values((7, 6, 5), np.int16), start=(-3, 2, 4))),
         sample("words", lambda folder: write(folder, values((7, 6, 5), np.uint16), nversion=20141)),
         sample("halves", lambda folder: write(folder, values((7, 6, 5), np.float16))),
         sample("bytes", lambda folder: write(folder, values((7, 6, 5), np.int8, -100))),
         sample("big-endian", swapped),
-        sample("turned", turned, "a.mrc", "turned"),
-        sample("volumes", lambda folder: write(folder, values((3, 7, 6, 5), np.int16)), "a.mrc", "volumes"),
-        sample("images", lambda folder: write(folder, values((7, 6, 5), np.int16), "a.mrcs", ispg=0), "a.mrcs", "images"),
-        sample("symmetry", lambda folder: write(folder, values((7, 6, 5)), "a.ccp4", extended=b"X,Y,Z".ljust(80), ispg=1), "a.ccp4", "symmetry"),
-        sample("imod-signed", lambda folder: imod(folder, 1), document="imod"),
-        sample("imod-unsigned", lambda folder: imod(folder, 0), document="imod"),
-        sample("imod-origin", lambda folder: imod(folder, 4, np.int16), document="imod"),
-        sample("tilts", tilts, "a.st", "tilts"),
+        sample("turned", turned),
+        sample("volumes", lambda folder: write(folder, values((3, 7, 6, 5), np.int16))),
+        sample("images", lambda folder: write(folder, values((7, 6, 5), np.int16), "a.mrcs", ispg=0), "a.mrcs"),
+        sample("symmetry", lambda folder: write(folder, values((7, 6, 5)), "a.ccp4", extended=b"X,Y,Z".ljust(80), ispg=1), "a.ccp4"),
+        sample("imod-origin", lambda folder: imod(folder, 4, np.int16)),
+        sample("tilts", tilts, "a.st"),
         sample("packed", packed, "a.mrc.gz", documents=lambda folder: []),
     ]

@@ -6,14 +6,15 @@ import numpy as np
 import SimpleITK
 
 from ablation import Answer, CannotWrite, Change, Document, Node, Sample
+from isolated import isolated
 
-KINDS = {"content": "comment", "sample units": "comment"}
+KINDS = {"content": "comment"}
 ROLES = {"spacings": "spacing", "space directions": "affine", "space origin": "affine", "space": "affine", "space units": "unit", "units": "unit"}
 NAMES = {"sizes": ("size", "truncated", "bytes", "samples"), "dimension": ("dimension", "axes", "sizes"), "type": ("type", "bytes"),
-         "encoding": ("encoding", "gzip", "inflat", "bzip"), "space dimension": ("space",), "space": ("space",), "kinds": ("kind", "axis"),
-         "data file": ("file",), "datafile": ("file",), "byte skip": ("byteskip", "truncated", "bytes"), "line skip": ("lineskip", "truncated", "lines"),
+         "encoding": ("encoding", "gzip", "inflat", "bzip", "compressed", "truncated"), "space dimension": ("space",), "space": ("space",), "kinds": ("kind", "axis"),
+         "data file": ("file", "samples in"), "datafile": ("file",), "byte skip": ("byteskip", "truncated", "bytes"), "line skip": ("lineskip", "truncated", "lines"),
          "space directions": ("space directions", "axes", "axis"), "centers": ("centerings",)}
-WORDS = {"space": ("right-anterior-superior", "left-anterior-superior", "LPS", "RAS", "scanner-xyz", "3D-right-handed"),
+WORDS = {"space": ("right-anterior-superior", "left-anterior-superior", "RAS", "scanner-xyz", "3D-right-handed"),
          "endian": ("big", "little"), "encoding": ("raw", "gzip", "bzip2", "ascii", "hex", "zrl"), "type": ("uint8", "short", "unsigned short", "float", "double"),
          "kinds": ("domain domain domain", "space space space", "space space time", "list domain domain domain", "domain domain domain list",
                    "domain domain domain time", "vector domain domain domain"),
@@ -46,7 +47,7 @@ class Lines(Document):
         nodes = []
         if self.fields:
             nodes.append(Node(f"{self.name}/magic", self.lines[0], lambda new: self.lines.__setitem__(0, new), names=("NRRD",),
-                              words=("NRRD0001", "NRRD0003", "NRRD0009")))
+                              words=("NRRD0009",)))
         for number, line in enumerate(self.lines[1:], 1):
             parts = self._split(line)
             if parts is None or (parts[1] == ": ") != self.fields:
@@ -135,7 +136,7 @@ def with_lines(folder, lines, fields=True, name="a.nrrd"):
 
 def slicer(folder):
     write(folder, values((5, 6, 7)), placed(encoding="gzip", content="a head"))
-    with_lines(folder, ["measurement frame: (1,0,0) (0,1,0) (0,0,1)", 'space units: "mm" "mm" "mm"', "old min: 0", "old max: 4000", "sample units: HU"])
+    with_lines(folder, ["measurement frame: (1,0,0) (0,1,0) (0,0,1)", 'space units: "um" "um" "um"', "old min: 0", "old max: 4000", "sample units: HU"])
 
 
 def itk(folder):
@@ -255,8 +256,13 @@ def space_of(header, axes):
         affine[:3, :3] = rows.T
         affine[:3, 3] = np.array(header.get("space origin", np.zeros(3)), float)[:3]
         return np.diag([*(signs or (1, 1, 1)), 1]) @ affine
-    if "spacings" in header:
-        return np.diag([*np.abs(np.array(header["spacings"], float)[axes]), 1.0])
+    if "space" in header or "spacings" in header:  # axes along those of the space, as ITK takes it
+        signs = LPS.get(header["space"].lower()) if "space" in header else (1, 1, 1)
+        if signs is None:
+            return None
+        affine = np.diag([*(np.abs(np.array(header["spacings"], float)[axes]) if "spacings" in header else (1, 1, 1)), 1.0])
+        affine[:3, 3] = header.get("space origin", np.zeros(3)) if "space" in header else 0
+        return np.diag([*signs, 1]) @ affine
     return None
 
 
@@ -289,16 +295,16 @@ def read_by_itk(path):
 
 def sample(name, write_file, file="a.nrrd", document="header", sidecars=(), reader=read):
     return Sample(name, file, write_file, lambda folder: [Lines(folder / file, document), Lines(folder / file, f"{document}-keys", False)],
-                  lambda folder: reader(folder / file), sidecars)
+                  lambda folder: isolated(reader)(folder / file), sidecars)
 
 
 def samples(_):
     return [
-        sample("slicer", slicer), sample("itk", itk), sample("spacings", spaced), sample("axis-mins", axis_mins), sample("colours", colours),
-        sample("diffusion", diffusion), sample("times", times), sample("itk-times", itk_times),
-        sample("segmentation", segmentation, "a.seg.nrrd", "segments"), sample("layers", layers, "a.seg.nrrd", "layers"),
+        sample("slicer", slicer), sample("spacings", spaced), sample("colours", colours), sample("times", times), sample("itk-times", itk_times),
         sample("big-endian", big_endian), sample("unnamed-space", unnamed_space),
-        sample("detached", detached, "a.nhdr", "detached", ("a.raw",)), sample("skipped", skipped, "a.nhdr", "detached"),
-        sample("detached-gzip", lambda folder: detached(folder, "gzip"), "a.nhdr", "detached"),
-        sample("slices", listed, "a.nhdr", "detached", ("s003.raw",), read_by_itk),
+        sample("diffusion", diffusion), sample("axis-mins", axis_mins), sample("itk", itk),
+        sample("detached", detached, "a.nhdr", "header", ("a.raw",)), sample("skipped", skipped, "a.nhdr"),
+        sample("detached-gzip", lambda folder: detached(folder, "gzip"), "a.nhdr"),
+        sample("slices", listed, "a.nhdr", "header", ("s003.raw",), read_by_itk),
+        sample("segmentation", segmentation, "a.seg.nrrd"), sample("layers", layers, "a.seg.nrrd"),
     ]
