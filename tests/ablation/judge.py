@@ -100,13 +100,13 @@ def difference(observed, answer, random):
 
 
 def judge(node, change, before, after, foreign, random):
-    """The verdict of a change, and why. `foreign`: its answers before and after; None: it reads none; after None: it refuses the file."""
+    """The verdict of a change, and why. `foreign`: the foreign reader's answer to the changed file; None: it reads none, or refuses it."""
     if after.broken:
         return "crashed", after.broken
     texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes]
     if after.error:
         return ("refused", "") if named(texts, node) else ("unnamed", after.error)
-    wrong = difference(after, foreign[1], random) if foreign[1] is not None else ""
+    wrong = difference(after, foreign, random) if foreign is not None else ""
     told = bool(texts) and named(texts, node)
     if change.same:
         same = after.arrays.keys() == before.arrays.keys() and all(

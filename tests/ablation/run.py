@@ -20,9 +20,13 @@ import argparse
 import collections
 import importlib
 import itertools
+import os
 import pathlib
+import pickle
 import random
+import select
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -30,8 +34,9 @@ import time
 import numpy as np
 
 from ablation import CannotWrite, Change, Node, changes_of, same_value
+from control import run_control
 from judge import difference, judge
-from observer import Observer
+from observer import SECONDS, Observer
 
 HERE = pathlib.Path(__file__).resolve().parent
 FORMATS = sorted(path.stem for path in (HERE / "formats").glob("[a-z]*.py"))
@@ -44,11 +49,12 @@ MOST_SAMPLES = 12  # in which a change is tried until somebody notices it
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", required=True, help="observe_sources")
+    parser.add_argument("--program", required=True, help="observe_sources; of --control, those that it builds itself")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="default: the time")
     parser.add_argument("--format", action="append", choices=FORMATS, help="only these; may be repeated")
     parser.add_argument("--minutes", type=float, default=15, help="for each format (default 15)")
     parser.add_argument("--summary", action="store_true", help="the table alone")
+    parser.add_argument("--control", action="store_true", help="revert known mends of readers one by one, and look whether each is caught")
     parser.add_argument("--list", metavar="FILE", help="write each failure to this file, a line each, with tabs")
     return parser.parse_args()
 
@@ -71,6 +77,37 @@ def rows_of(format_name):
     return rows
 
 
+def in_child(read, work):
+    """What a reader answers that some files crash or hang, in a process of its own."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        try:
+            answer = pickle.dumps(read(work))
+        except Exception:  # it refuses the file
+            answer = b""
+        with os.fdopen(writing, "wb") as pipe:
+            pipe.write(answer)
+        os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        ready, _, _ = select.select([pipe], [], [], SECONDS)
+        answer = pipe.read() if ready else b""
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return pickle.loads(answer)
+
+
+def is_whole(answer):
+    """Foreign readers answer to odd files with odd shapes."""
+    placed = answer.places is None or all([len(places) for places in answer.places] == list(field.shape) for field in answer.fields.values())
+    return placed and all(field.ndim == 3 and field.size > 0 for field in answer.fields.values())
+
+
 class Site:
     """A node of a sample: where it is found again in a fresh copy."""
 
@@ -79,8 +116,10 @@ class Site:
 
 
 class FormatRun:
-    def __init__(self, name, options, folder):
-        self.name, self.folder = name, folder
+    """`word`: only nodes with it in their path are changed."""
+
+    def __init__(self, name, options, folder, word=""):
+        self.name, self.folder, self.word = name, folder, word
         self.module = importlib.import_module(f"formats.{name}")
         self.random = random.Random(f"{options.seed} {name}")
         self.observer = Observer(options.program, folder)
@@ -110,10 +149,10 @@ class FormatRun:
         if sample.read is None:
             return None
         try:
-            answer = sample.read(work)
+            answer = in_child(sample.read, work) if getattr(self.module, "FOREIGN_READER_CRASHES", False) else sample.read(work)
         except Exception:  # whatever a library raises: it refuses the file
             return None
-        return answer if all(field.ndim == 3 and field.size > 0 for field in answer.fields.values()) else None
+        return answer if is_whole(answer) else None
 
     def make_samples(self):
         for sample in self.module.samples(self.folder):
@@ -134,6 +173,7 @@ class FormatRun:
                 self.fail("wrong", path, "the foreign reader refuses the sample itself")
             elif answer is not None and (said := difference(before, answer, self.places())):
                 self.fail("wrong", path, f"the sample itself: {said}")
+                self.answers[sample.name] = None  # said once, and not of each change
             self.samples.append(sample)
 
     def sites(self):
@@ -143,6 +183,8 @@ class FormatRun:
             for number, document in enumerate(sample.documents(self.work(sample))):
                 for index, node in enumerate(document.nodes()):
                     path = f"{self.name}/{node.path}"
+                    if self.word not in path:
+                        continue
                     if all(site.sample is not sample for site in sites[path]):
                         sites[path].append(Site(sample, number, index, node))
                     documents[node.path].add((sample.name, number))
@@ -174,7 +216,8 @@ class FormatRun:
         """`other`: what is compared instead of the sample as it was, of a pair: with one of both changes alone."""
         after = self.observer.observe(work, sample.source)
         before = other or self.before[sample.name]
-        return judge(node, change, before, after, (self.answers[sample.name], self.foreign(sample, work)), self.places())
+        answer = self.answers[sample.name] and self.foreign(sample, work)
+        return judge(node, change, before, after, answer, self.places())
 
     def count(self, path, node, change, sample, verdict, why):
         if verdict in ("ignored", "wrong") and self.harmless(path, node):
@@ -261,7 +304,7 @@ class FormatRun:
 
     def sidecars(self):
         for sample in self.samples:
-            for name in sample.sidecars:
+            for name in () if self.word else sample.sidecars:
                 node, change = Node(f"sidecar/{name}", None), Change("dropped", None)
                 self.nodes += 1
                 if self.late(f"{self.name}/{node.path}", change):
@@ -307,20 +350,34 @@ class FormatRun:
         self.pairs(sites)
         self.observer.close()
         for row in self.rows.values():
-            if not row.used:
+            if not row.used and not self.word:
                 self.fail("ignored", row.path, "its row of harmless.tsv is not needed")
+
+
+def run_format(name, options, word=""):
+    with tempfile.TemporaryDirectory(prefix="ablation") as folder:
+        run = FormatRun(name, options, pathlib.Path(folder), word)
+        run.run()
+    return run
+
+
+def failures_of(options):
+    def failures(program, name, word):
+        options.program = program
+        return set(run_format(name, options, word).failures)
+    return failures
 
 
 def main():
     options = arguments()
     sys.path.insert(0, str(HERE))
     print(f"seed {options.seed}", flush=True)
+    if options.control:
+        return 1 if run_control(failures_of(options)) else 0
     print(f"{'format':16} {'samples':>7} {'nodes':>6} {'changes':>7} " + " ".join(f"{v:>8}" for v in VERDICTS), flush=True)
     failed, listed = 0, []
     for name in options.format or FORMATS:
-        with tempfile.TemporaryDirectory(prefix="ablation") as folder:
-            run = FormatRun(name, options, pathlib.Path(folder))
-            run.run()
+        run = run_format(name, options)
         print(f"{name:16} {len(run.samples):7} {run.nodes:6} {run.changes - run.unwritable:7} " + " ".join(f"{run.counts[v]:8}" for v in VERDICTS), flush=True)
         for (verdict, path), texts in sorted(run.failures.items()):
             listed.append(f"{verdict}\t{path}\t{'; '.join(texts)}")

@@ -1,0 +1,162 @@
+"""Documents of files of meshes, lines and points: headers of PLY, keywords of OBJ, the JSON of GLB, tables, the end of FreeSurfer's surfaces."""
+import json
+import pathlib
+import struct
+
+from ablation import CannotWrite, Document, Node
+from documents import JsonDocument, LinesDocument
+
+
+class KeywordLines(Document):
+    """Lines that begin with a keyword, between two others. Lines with the same keyword (the first `words` words) are one node, which is
+    removed as a whole; the value is that of the first one."""
+
+    def __init__(self, path, name, end=None, words=1, separator=" "):
+        self.path, self.name, self.words, self.separator = pathlib.Path(path), name, words, separator
+        data = self.path.read_bytes()
+        at = data.index(end) if end else len(data)
+        self.tail = data[at:]
+        self.lines = data[:at].decode("latin-1").split("\n")
+
+    def _split(self, line):
+        words = line.strip().split(self.separator)
+        return "/".join(words[:self.words]), self.separator.join(words[self.words:])
+
+    def nodes(self):
+        nodes = {}
+        for number, line in enumerate(self.lines):
+            if not line.strip()[:1].isalpha():
+                continue
+            key, value = self._split(line)
+            if key not in nodes:
+                nodes[key] = Node(f"{self.name}/{key}", value, lambda new, n=number, k=key: self._set(n, k, new), lambda k=key: self._remove(k))
+        return list(nodes.values())
+
+    def _set(self, number, key, value):
+        self.lines[number] = self.separator.join([*key.split("/"), str(value)])
+
+    def _remove(self, key):
+        self.lines = [line for line in self.lines if not line.strip() or self._split(line)[0] != key]
+
+    def add(self, path, value):
+        if not isinstance(value, str):
+            raise CannotWrite(path)
+        self.lines.insert(1, self.separator.join([*path.split("/")[1:], value]))
+
+    def save(self):
+        self.path.write_bytes("\n".join(self.lines).encode("latin-1") + self.tail)
+
+
+class PlyHeader(Document):
+    """Lines of a PLY header: `property float x` of the element before is vertex/x, of the value `float`."""
+
+    def __init__(self, path):
+        self.path = pathlib.Path(path)
+        data = self.path.read_bytes()
+        at = data.index(b"end_header")
+        self.tail, self.lines = data[at:], data[:at].decode("latin-1").rstrip("\n").split("\n")
+
+    def nodes(self):
+        nodes, element = [], ""
+        for number, line in enumerate(self.lines[1:], 1):
+            words = line.split()
+            element = words[1] if words[0] == "element" else element
+            if words[0] == "property":
+                nodes.append(self._node(number, f"{element}/{words[-1]}", words[1:-1], lambda v, w=words: ["property", *v, w[-1]], ("propert", element)))
+                nodes.append(self._node(number, f"{element}/{words[-1]}/name", [words[-1]], lambda v, w=words: [*w[:-1], *v], ("propert", element)))
+            elif words[0] == "element":
+                nodes.append(self._node(number, f"{element}/count", [words[2]], lambda v, w=words: [*w[:2], *v], ("vertex", "face", "element")))
+            else:
+                nodes.append(self._node(number, "/".join(words[:1]), words[1:], lambda v, w=words: [w[0], *v]))
+        return nodes
+
+    def _node(self, number, path, value, line, names=()):
+        kind = "comment" if path in ("comment", "obj_info") and "SPACE" not in " ".join(value) else ""
+        path = "comment/space" if path == "comment" and not kind else path
+        return Node(f"ply/{path}", " ".join(value), lambda new: self.lines.__setitem__(number, " ".join(line(str(new).split()))),
+                    lambda: self.lines.__setitem__(number, None), names=names, kind=kind)
+
+    def add(self, path, value):
+        if not path.startswith("ply/comment"):
+            raise CannotWrite(path)
+        self.lines.insert(2, f"comment {value}")
+
+    def save(self):
+        self.path.write_bytes("\n".join(line for line in self.lines if line is not None).encode("latin-1") + b"\n" + self.tail)
+
+
+class GlbJson(JsonDocument):
+    """The JSON chunk of a binary glTF file."""
+
+    def __init__(self, path):
+        self.path, self.name = pathlib.Path(path), "glb"
+        data = self.path.read_bytes()
+        length = struct.unpack_from("<I", data, 12)[0]
+        self.root, self.tail = json.loads(data[20:20 + length]), data[20 + length:]
+
+    def save(self):
+        text = json.dumps(self.root).encode()
+        text += b" " * (-len(text) % 4)
+        body = struct.pack("<I4s", len(text), b"JSON") + text + self.tail
+        self.path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+
+
+class TableDocument(Document):
+    """The columns of a table, by the names of its header; lines before it that begin with `#` say the rest."""
+
+    def __init__(self, path, name, separator=",", header=None):
+        self.path, self.name, self.separator = pathlib.Path(path), name, separator
+        self.lines = self.path.read_text().splitlines()
+        self.at = next(i for i, line in enumerate(self.lines) if (line.startswith(header) if header else not line.startswith("#")))
+        self.prefix = header or ""
+        self.columns = [word.strip() for word in self.lines[self.at][len(self.prefix):].split(separator)]
+        self.rows = [line.split(separator) for line in self.lines[self.at + 1:]]
+
+    def nodes(self):
+        nodes = []
+        for number, line in enumerate(self.lines[:self.at]):
+            if "=" in line:
+                key, value = line.lstrip("# ").split("=", 1)
+                nodes.append(Node(f"{self.name}/{key.strip()}", value.strip(), lambda new, n=number, k=key: self.lines.__setitem__(n, f"# {k}= {new}"),
+                                  lambda n=number: self.lines.__setitem__(n, "#")))
+        for i, column in enumerate(self.columns):
+            nodes.append(Node(f"{self.name}/{column}/name", column, lambda new, i=i: self.columns.__setitem__(i, str(new)), lambda i=i: self._remove(i),
+                              names=("column",)))
+            nodes.append(Node(f"{self.name}/{column}/rows", " ".join(row[i] for row in self.rows), lambda new, i=i: self._set(i, new)))
+        return nodes
+
+    def _remove(self, column):
+        for row in (self.columns, *self.rows):
+            del row[column]
+
+    def _set(self, column, text):
+        for row, word in zip(self.rows, str(text).split() + [""] * len(self.rows)):
+            row[column] = word
+
+    def add(self, path, value):
+        _, column, what = path.split("/")
+        if what != "rows" or column in self.columns:
+            raise CannotWrite(path)
+        self.columns.append(column)
+        words = str(value).split()
+        for number, row in enumerate(self.rows):
+            row.append(words[number % len(words)])
+
+    def save(self):
+        lines = [*self.lines[:self.at], self.prefix + self.separator.join(self.columns), *(self.separator.join(row) for row in self.rows)]
+        self.path.write_text("\n".join(lines) + "\n")
+
+
+class SurfaceEnd(LinesDocument):
+    """The geometry of the volume at the end of a FreeSurfer surface: `cras = 1 2 3`, behind the triangles."""
+
+    def __init__(self, path):
+        super().__init__(path, "surface", "=")
+        data = self.path.read_bytes()
+        at = data.index(b"valid = ")
+        self.head, self.tail = data[:at], b""
+        self.lines = data[at:].decode("latin-1").split("\n")
+
+    def save(self):
+        super().save()
+        self.path.write_bytes(self.head + self.path.read_bytes())
