@@ -103,7 +103,8 @@ def judge(node, change, before, after, foreign, random):
     """The verdict of a change, and why. `foreign`: the foreign reader's answer to the changed file; None: it reads none, or refuses it."""
     if after.broken:
         return "crashed", after.broken
-    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes]
+    changed = [note for note in after.notes if note not in before.notes] + [note for note in before.notes if note not in after.notes]
+    texts = [after.error] if after.error else changed
     if after.error:
         return ("refused", "") if named(texts, node) else ("unnamed", after.error)
     wrong = difference(after, foreign, random) if foreign is not None else ""
