@@ -8,7 +8,8 @@ from vtk.util import numpy_support
 
 from ablation import Answer, CannotWrite, Change, Sample
 from documents import LinesDocument
-from isolated import isolated
+
+FOREIGN_READER_CRASHES = True  # ITK does, on some headers
 
 KINDS = {"Comment": "comment", "Name": "comment", "ID": "identifier", "ParentID": "identifier", "AcquisitionDate": "date", "ITK_InputFilterName": "comment"}
 ROLES = {"ElementSpacing": "spacing", "ElementSize": "spacing", "Offset": "affine", "Position": "affine", "Origin": "affine", "TransformMatrix": "affine",
@@ -202,7 +203,7 @@ def read(path):
 
 def sample(name, write, file="a.mha", document="header", sidecars=()):
     return Sample(name, file, write, lambda folder: [Header(folder / file, document)],
-                  lambda folder: isolated(read)(folder / file), sidecars)
+                  lambda folder: read(folder / file), sidecars)
 
 
 def samples(_):

@@ -6,7 +6,8 @@ import numpy as np
 import SimpleITK
 
 from ablation import Answer, CannotWrite, Change, Document, Node, Sample
-from isolated import isolated
+
+FOREIGN_READER_CRASHES = True  # ITK does, on some headers
 
 KINDS = {"content": "comment"}
 ROLES = {"spacings": "spacing", "space directions": "affine", "space origin": "affine", "space": "affine", "space units": "unit", "units": "unit"}
@@ -295,7 +296,7 @@ def read_by_itk(path):
 
 def sample(name, write_file, file="a.nrrd", document="header", sidecars=(), reader=read):
     return Sample(name, file, write_file, lambda folder: [Lines(folder / file, document), Lines(folder / file, f"{document}-keys", False)],
-                  lambda folder: isolated(reader)(folder / file), sidecars)
+                  lambda folder: reader(folder / file), sidecars)
 
 
 def samples(_):
