@@ -17,11 +17,14 @@ KINDS = {"DateTime": "date", "Software": "comment", "Artist": "comment", "HostCo
          "Copyright": "comment", "DocumentName": "comment", "PageName": "comment"}
 ROLES = {"XResolution": "spacing", "YResolution": "spacing", "ResolutionUnit": "unit", "ModelPixelScaleTag": "spacing", "GDAL_NODATA": "fill"}
 NAMES = {"ImageWidth": ("size", "pixels", "truncated"), "ImageLength": ("size", "pixels", "truncated", "rows", "strips"),
-         "BitsPerSample": ("bits", "type"), "SampleFormat": ("sample format", "type"), "SamplesPerPixel": ("samples", "components"),
+         "BitsPerSample": ("bits", "type"), "SampleFormat": ("sample format", "type", "format", "predictor"), "SamplesPerPixel": ("samples", "components"),
          "StripOffsets": ("strip", "truncated"), "StripByteCounts": ("strip", "truncated"), "TileOffsets": ("tile", "truncated"),
-         "TileByteCounts": ("tile", "truncated"), "Compression": ("compress",), "PhotometricInterpretation": ("photometric", "CMYK", "YCbCr", "lab"),
+         "TileByteCounts": ("tile", "truncated"), "Compression": ("compress", "decoding"), "PhotometricInterpretation": ("photometric", "0 as white", "colour", "samplesperpixel"),
          "NewSubfileType": ("reduced", "resolution"), "SubIFDs": ("level",), "RowsPerStrip": ("strip",), "TileWidth": ("tile",),
-         "TileLength": ("tile",), "ImageDescription": ("description",), "ExtraSamples": ("alpha", "components"), "ImageDepth": ("slices",)}
+         "TileLength": ("tile",), "ImageDescription": ("description",), "ExtraSamples": ("alpha", "components"), "ImageDepth": ("slices",),
+         "PlanarConfiguration": ("planes",), "ColorMap": ("colour map",)}
+ONE_OF_MANY = ("like the first",)  # how messages speak of a page that differs
+STRUCTURE = ("StripOffsets", "StripByteCounts", "TileOffsets", "TileByteCounts", "SubIFDs", "TileWidth", "TileLength")  # where samples lie
 
 
 class Ifd:
@@ -134,8 +137,11 @@ class TagsDocument(Document):
         value = list(value) if isinstance(value, tuple) else value
         if isinstance(value, (bytes, np.ndarray)) or not isinstance(value, (int, float, str, list)):
             value = None
+        if tag.name in STRUCTURE:
+            value = None
         node = Node(f"{self.name}/{tag.name}", value, None if value is None else lambda new, t=tag.code, k=kind: self._set(t, k, new),
-                    lambda t=tag.code: self._remove(t), NAMES.get(tag.name, ()), ROLES.get(tag.name, ""), KINDS.get(tag.name, ""))
+                    lambda t=tag.code: self._remove(t), NAMES.get(tag.name, ()) + (ONE_OF_MANY if self.page is not None else ()),
+                    ROLES.get(tag.name, ""), KINDS.get(tag.name, ""))
         if tag.name == "Compression" and self.page is None:
             node.more = [Change(name, lambda o=options: self._rewrite(**o), same=True) for name, options in (
                 ("Deflate in tiles", dict(compression="zlib", tile=(16, 16))), ("LZW, predictor", dict(compression="lzw", predictor=True)),
@@ -176,7 +182,7 @@ class TagsDocument(Document):
         tag = tifffile.TIFF.TAGS[path.split("/")[-1]] if path.split("/")[-1] in tifffile.TIFF.TAGS else None
         code = {"XResolution": 5, "YResolution": 5, "GDAL_NODATA": 2, "GDAL_METADATA": 2, "ModelPixelScaleTag": 12, "ModelTiepointTag": 12}
         name = path.split("/")[-1]
-        if tag is None or value is None:
+        if tag is None or value is None or name in STRUCTURE:
             raise CannotWrite(path)
         for ifd in self._ifds():
             if ifd.index(tag) is not None:
@@ -217,6 +223,8 @@ class OmeDocument(XmlDocument):
             last = node.path.split("/")[-1]
             if last in ("@ID", "@UUID") or node.path.endswith("UUID/text") or "Ref" in last:
                 node.kind = "identifier"
+            elif last in ("@Creator", "@Fluor") or node.path.endswith(("Image/@Name", "StageLabel/@Name", "Key/text", "Value/text")):
+                node.kind = "comment"
             node.kind = node.kind or next((kind for word, kind in OME_KINDS.items() if word in node.path.split("/")), "")
             node.names, node.role = OME_NAMES.get(last, ()), OME_ROLES.get(last, "")
             node.words = OME_WORDS.get(last, ())
@@ -248,7 +256,7 @@ class ImageJLines(LinesDocument):
              "order": ("zct", "xyzct", "default"), "cf": ("0", "1", "20", "21"), "hyperstack": ("true", "false")}
     ROLES = {"spacing": "spacing", "finterval": "spacing", "unit": "unit", "tunit": "unit", "c0": "offset", "c1": "scale"}
     NAMES = {"images": ("pages", "pictures"), "channels": ("pages", "channel"), "slices": ("pages", "slice"), "frames": ("pages", "time"),
-             "ImageJ": ("pages",), "cf": ("calibration", "function"), "c0": ("calibration",), "c1": ("calibration",)}
+             "ImageJ": ("pages",), "cf": ("calibration", "function"), "c0": ("calibrat",), "c1": ("calibrat",), "vunit": ("calibrated",)}
 
     def __init__(self, path, name="imagej"):
         self.path, self.name, self.separator = pathlib.Path(path), name, "="
@@ -271,6 +279,12 @@ class ShapedJson(JsonDocument):
 
     def __init__(self, path, name="shaped"):
         self.path, self.name, self.root = pathlib.Path(path), name, json.loads(description_of(path))
+
+    def nodes(self):
+        nodes = super().nodes()
+        for node in nodes:
+            node.names = ("tifffile",)
+        return nodes
 
     def save(self):
         set_description(self.path, json.dumps(self.root))

@@ -13,7 +13,7 @@ CT, MR, PET, NM = "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.4", "1.2
 ENHANCED_CT, ENHANCED_MR = "1.2.840.10008.5.1.4.1.1.2.1", "1.2.840.10008.5.1.4.1.1.4.1"
 ENHANCED_PET, DOSE, SEG = "1.2.840.10008.5.1.4.1.1.130", "1.2.840.10008.5.1.4.1.1.481.2", "1.2.840.10008.5.1.4.1.1.66.4"
 PARAMETRIC, LABELMAP = "1.2.840.10008.5.1.4.1.1.30", "1.2.840.10008.5.1.4.1.1.66.7"
-SLICES, ROWS, COLUMNS = 5, 6, 7
+SLICES, ROWS, COLUMNS = 4, 6, 7
 TURN = np.deg2rad(8)
 ALONG_ROW, ALONG_COLUMN = np.array([np.cos(TURN), np.sin(TURN), 0]), np.array([-np.sin(TURN), np.cos(TURN), 0])
 SLICE_GROUPS = (0x0020, 0x0028, 0x0054)
@@ -131,21 +131,21 @@ def mr_header(name, number):
 def write_echoes(folder):
     def make(k):
         ds = mr_header("echoes", k)
-        ds.EchoNumbers, ds.EchoTime = k // SLICES + 1, 5 + 10 * (k // SLICES)
-        set_plane(ds, k % SLICES)
+        ds.EchoNumbers, ds.EchoTime = k // 3 + 1, 5 + 10 * (k // 3)
+        set_plane(ds, k % 3)
         return ds
-    slices(folder, "echoes", 2 * SLICES, make, np.uint16, 1, 4000)
+    slices(folder, "echoes", 6, make, np.uint16, 1, 4000)
 
 
 def write_cine(folder):
     def make(k):
         ds = mr_header("cine", k)
-        ds.TriggerTime, ds.NominalInterval, ds.CardiacNumberOfImages, ds.HeartRate = 40 * (k // 3), 800, 3, 75
-        ds.TemporalPositionIdentifier, ds.NumberOfTemporalPositions, ds.TemporalResolution = k // 3 + 1, 3, 40
-        set_plane(ds, k % 3)
+        ds.TriggerTime, ds.NominalInterval, ds.CardiacNumberOfImages, ds.HeartRate = 40 * (k // 2), 800, 3, 75
+        ds.TemporalPositionIdentifier, ds.NumberOfTemporalPositions, ds.TemporalResolution = k // 2 + 1, 3, 40
+        set_plane(ds, k % 2)
         ds.SmallestImagePixelValue, ds.LargestImagePixelValue = 0, 4000
         return ds
-    slices(folder, "cine", 9, make, np.uint16, 1, 4000)
+    slices(folder, "cine", 6, make, np.uint16, 1, 4000)
 
 
 def write_pet(folder):
@@ -171,13 +171,13 @@ def write_pet(folder):
 def write_dynamic_pet(folder):
     def make(k):
         ds = header(PET, "PT", "dynamic", k)
-        ds.SeriesType, ds.Units, ds.DecayCorrection, ds.NumberOfTimeSlices, ds.NumberOfSlices = ["DYNAMIC", "IMAGE"], "GML", "START", 3, 3
-        ds.ActualFrameDuration, ds.FrameReferenceTime, ds.ImageIndex, ds.SUVType = 60000, 30000 + 60000 * (k // 3), k + 1, "BW"
-        ds.DecayFactor = 1 + 0.1 * (k // 3)
-        set_plane(ds, k % 3)
-        ds.RescaleSlope, ds.RescaleIntercept = 0.5 + 0.25 * (k // 3), 0
+        ds.SeriesType, ds.Units, ds.DecayCorrection, ds.NumberOfTimeSlices, ds.NumberOfSlices = ["DYNAMIC", "IMAGE"], "GML", "START", 3, 2
+        ds.ActualFrameDuration, ds.FrameReferenceTime, ds.ImageIndex, ds.SUVType = 60000, 30000 + 60000 * (k // 2), k + 1, "BW"
+        ds.DecayFactor = 1 + 0.1 * (k // 2)
+        set_plane(ds, k % 2)
+        ds.RescaleSlope, ds.RescaleIntercept = 0.5 + 0.25 * (k // 2), 0
         return ds
-    slices(folder, "dynamic", 9, make, np.int16, 1, 4000)
+    slices(folder, "dynamic", 6, make, np.int16, 1, 4000)
 
 
 def multi_frame(sop_class, modality, name, stored, **pixels):
@@ -231,7 +231,7 @@ def write_enhanced_ct(folder):
         FrameAnatomySequence=Sequence([item(FrameLaterality="U", AnatomicRegionSequence=Sequence([code("T-D1100", "SRT", "Head")]))]),
         CTImageFrameTypeSequence=Sequence([item(FrameType=["ORIGINAL", "PRIMARY", "VOLUME", "NONE"], PixelPresentation="MONOCHROME",
                                                 VolumetricProperties="VOLUME", VolumeBasedCalculationTechnique="NONE")]))])
-    ds.PerFrameFunctionalGroupsSequence = Sequence([frame_group(k) for k in (2, 0, 1, 4, 3)])
+    ds.PerFrameFunctionalGroupsSequence = Sequence([frame_group(k) for k in (2, 0, 1, 3)])
     ds.save_as(folder / "a.dcm", enforce_file_format=True)
 
 

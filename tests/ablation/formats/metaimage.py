@@ -16,7 +16,7 @@ ROLES = {"ElementSpacing": "spacing", "ElementSize": "spacing", "Offset": "affin
          "Rotation": "affine", "CenterOfRotation": "affine", "DistanceUnits": "unit", "ElementToIntensityFunctionSlope": "scale",
          "ElementToIntensityFunctionOffset": "offset"}
 NAMES = {"DimSize": ("size", "bytes", "truncated", "samples"), "NDims": ("dimension", "DimSize"), "ElementType": ("type", "bytes", "truncated"),
-         "BinaryData": ("binary", "text"), "CompressedData": ("compress", "inflat", "zlib"), "CompressedDataSize": ("compress", "bytes"),
+         "BinaryData": ("binary", "text"), "CompressedData": ("compress", "inflat", "zlib", "truncated"), "CompressedDataSize": ("compress", "bytes"),
          "ElementNumberOfChannels": ("channels", "components", "bytes"), "HeaderSize": ("header", "bytes"), "ElementDataFile": ("file",),
          "ObjectType": ("ObjectType", "Image"), "TransformMatrix": ("matrix", "axes", "directions"), "ElementSpacing": ("spacing",)}
 WORDS = {"ElementType": ("MET_UCHAR", "MET_SHORT", "MET_USHORT", "MET_FLOAT", "MET_DOUBLE", "MET_LONG"), "BinaryDataByteOrderMSB": ("True", "False"),
@@ -50,8 +50,13 @@ class Header(LinesDocument):
                 node.more = [Change("axes exchanged", lambda n=node: self._exchange(n))]
         return nodes
 
+    def _image(self):
+        if any("AnatomicalOrientation = ?" in line or "DistanceUnits" in line for line in self.lines):
+            raise CannotWrite("ITK writes other axes, and no unit")
+        return SimpleITK.ReadImage(str(self.path))
+
     def _encode(self, kind):
-        image = SimpleITK.ReadImage(str(self.path))
+        image = self._image()
         if image.GetNumberOfComponentsPerPixel() > 1:
             raise CannotWrite("components")
         SimpleITK.WriteImage(SimpleITK.Cast(image, kind), str(self.path))
@@ -59,7 +64,7 @@ class Header(LinesDocument):
 
     def _compress(self):
         packed = "CompressedData = True" not in "\n".join(self.lines)
-        SimpleITK.WriteImage(SimpleITK.ReadImage(str(self.path)), str(self.path), useCompression=packed)
+        SimpleITK.WriteImage(self._image(), str(self.path), useCompression=packed)
         self.whole = True
 
     def _swap(self):
@@ -125,9 +130,9 @@ def packed(folder):
 def spelled(folder):
     """As other programs of MetaIO write it: comments, names, units, sizes of elements, intensities."""
     SimpleITK.WriteImage(image(np.uint8), str(folder / "a.mha"))
-    with_lines(folder / "a.mha", ["ElementMin = 1", "ElementMax = 119", "ElementSize = 1.5 2 2.5", "DistanceUnits = mm", "Modality = MET_MOD_MR",
+    with_lines(folder / "a.mha", ["ElementMin = 1", "ElementMax = 119", "ElementSize = 1.5 2 2.5", "DistanceUnits = um", "Modality = MET_MOD_MR",
                                   "ElementToIntensityFunctionSlope = 1", "ElementToIntensityFunctionOffset = 0"])
-    with_lines(folder / "a.mha", [], [("ObjectType", "Comment = made by a scanner\nObjectType = Image"),
+    with_lines(folder / "a.mha", [], [("CenterOfRotation", "CenterOfRotation = 1 2 3"), ("ObjectType", "Comment = made by a scanner\nObjectType = Image"),
                                       ("NDims", "ObjectSubType = Image\nName = head\nID = 1\nParentID = 0\nAcquisitionDate = 2024.01.02\nColor = 1 0 0 1\nNDims = 3")])
 
 
@@ -172,7 +177,7 @@ def listed(folder, line):
 
 def ultrasound(folder):
     """As PLUS writes sequences: a key for each frame."""
-    SimpleITK.WriteImage(image(np.uint8, False), str(folder / "a.mha"))
+    SimpleITK.WriteImage(image(np.int16, False), str(folder / "a.mha"))
     with_lines(folder / "a.mha", ["UltrasoundImageOrientation = MFA", "UltrasoundImageType = BRIGHTNESS", "ElementByteOrderMSB = False",
                                   "Seq_Frame0000_ImageStatus = OK", "Seq_Frame0000_Timestamp = 1.5",
                                   "Seq_Frame0000_ProbeToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "Kinds = domain domain list"])
@@ -201,21 +206,21 @@ def read(path):
     return Answer(fields=fields, affine=affine if scene else np.diag([-1, -1, 1, 1]) @ affine)
 
 
-def sample(name, write, file="a.mha", document="header", sidecars=()):
-    return Sample(name, file, write, lambda folder: [Header(folder / file, document)],
+def sample(name, write, file="a.mha", sidecars=()):
+    return Sample(name, file, write, lambda folder: [Header(folder / file, "header")],
                   lambda folder: read(folder / file), sidecars)
 
 
 def samples(_):
     return [
-        sample("itk", itk), sample("packed", packed), sample("spelled", spelled), sample("sized", sized, document="old"),
-        sample("by-vtk", by_vtk, "a.mhd", "vtk", ("a.raw",)),
+        sample("itk", itk), sample("packed", packed), sample("spelled", spelled), sample("sized", sized),
+        sample("by-vtk", by_vtk, "a.mhd", ("a.raw",)),
         sample("floats", lambda folder: SimpleITK.WriteImage(image(np.float64), str(folder / "a.mha"))),
         sample("vectors", lambda folder: SimpleITK.WriteImage(image(np.float32, components=3), str(folder / "a.mha"))),
         sample("times", times), sample("ultrasound", ultrasound),
-        sample("detached", detached, "a.mhd", "detached", ("a.raw",)),
-        sample("front", lambda folder: detached(folder, ["HeaderSize = 24"], b"\1" * 24), "a.mhd", "detached"),
-        sample("from-the-end", lambda folder: detached(folder, ["HeaderSize = -1"], b"\1" * 24), "a.mhd", "detached"),
-        sample("pattern", lambda folder: listed(folder, "ElementDataFile = s%03d.raw 0 6 1"), "a.mhd", "pattern", ("s003.raw",)),
-        sample("list", lambda folder: listed(folder, "ElementDataFile = LIST\n" + "\n".join(f"s{k:03d}.raw" for k in range(7))), "a.mhd", "list"),
+        sample("detached", detached, "a.mhd", ("a.raw",)),
+        sample("front", lambda folder: detached(folder, ["HeaderSize = 24"], b"\1" * 24), "a.mhd"),
+        sample("from-the-end", lambda folder: detached(folder, ["HeaderSize = -1"], b"\1" * 24), "a.mhd"),
+        sample("pattern", lambda folder: listed(folder, "ElementDataFile = s%03d.raw 0 6 1"), "a.mhd", ("s003.raw",)),
+        sample("list", lambda folder: listed(folder, "ElementDataFile = LIST\n" + "\n".join(f"s{k:03d}.raw" for k in range(7))), "a.mhd"),
     ]

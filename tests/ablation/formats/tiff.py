@@ -90,8 +90,8 @@ def imagej_floats(folder):
 
 def ome(folder, shape, axes, dtype=np.uint16, subifds=0, name="a.ome.tif", **metadata):
     stored = values(shape, dtype)
-    given = {"axes": axes, "PhysicalSizeX": 0.25, "PhysicalSizeXUnit": "µm", "PhysicalSizeY": 0.5, "PhysicalSizeYUnit": "µm",
-             "PhysicalSizeZ": 1500, "PhysicalSizeZUnit": "nm", **metadata}
+    given = {"axes": axes, "PhysicalSizeX": 250, "PhysicalSizeXUnit": "nm", "PhysicalSizeY": 0.0005, "PhysicalSizeYUnit": "mm",
+             "PhysicalSizeZ": 1500, "PhysicalSizeZUnit": "nm", "UUID": "urn:uuid:11111111-2222-3333-4444-555555555555", **metadata}
     with tifffile.TiffWriter(folder / name, ome=True, bigtiff=subifds > 0) as writer:
         options = dict(photometric="minisblack", resolution=(40000, 20000), resolutionunit="CENTIMETER")
         writer.write(stored, subifds=subifds, metadata=given, **options)
@@ -100,8 +100,8 @@ def ome(folder, shape, axes, dtype=np.uint16, subifds=0, name="a.ome.tif", **met
 
 
 def ome_hyperstack(folder):
-    ome(folder, (3, 2, 5, 6, 7), "TCZYX", Channel={"Name": ["DAPI", "GFP"], "Color": [-16776961, 16711935]}, TimeIncrement=0.5,
-        TimeIncrementUnit="s", SignificantBits=12, Name="embryo", Description="an embryo", AcquisitionDate="2024-01-02T10:11:12",
+    ome(folder, (3, 2, 5, 6, 7), "TCZYX", Channel={"Name": ["DAPI", "GFP"], "Color": [-16776961, 16711935]}, TimeIncrement=500,
+        TimeIncrementUnit="ms", SignificantBits=12, Name="embryo", Description="an embryo", AcquisitionDate="2024-01-02T10:11:12",
         Plane={"DeltaT": [0.1 * i for i in range(30)], "DeltaTUnit": ["s"] * 30, "ExposureTime": [0.05] * 30,
                "PositionX": [10.0] * 30, "PositionXUnit": ["µm"] * 30, "PositionY": [20.0] * 30, "PositionYUnit": ["µm"] * 30,
                "PositionZ": [1.5 * (i % 5) for i in range(30)], "PositionZUnit": ["µm"] * 30})
@@ -268,38 +268,38 @@ def samples(_):
         return lambda folder: [TagsDocument(folder / "a.tif", name)]
 
     def jpeg(folder):
-        return [ImageJLines(folder / "a.tif"), TagsDocument(folder / "a.tif", "imagej-tags", hidden=(270, 50838, 50839))] + (
+        return [ImageJLines(folder / "a.tif"), TagsDocument(folder / "a.tif", "tags", hidden=(270, 50838, 50839))] + (
             [ImageJBlock(folder / "a.tif")] if 50839 in tifffile.TiffFile(folder / "a.tif").pages[0].tags else [])
 
     def ome_documents(folder):
-        return [OmeDocument(folder / "a.ome.tif"), TagsDocument(folder / "a.ome.tif", "ome-tags")]
+        return [OmeDocument(folder / "a.ome.tif"), TagsDocument(folder / "a.ome.tif", "tags")]
 
     def several(folder):
-        return [OmeDocument(folder / "a_c0.ome.tif", "ome-files"), OmeDocument(folder / "a_c1.ome.tif", "ome-second-file"),
-                TagsDocument(folder / "a_c1.ome.tif", "ome-files-tags")]
+        return [OmeDocument(folder / "a_c0.ome.tif"),
+                TagsDocument(folder / "a_c1.ome.tif", "page-tags")]
     return [
         sample("plain", scanned, pages_of, read_pages),
-        sample("strips", lambda folder: plain(folder, np.int16, byteorder=">", rowsperstrip=2), pages_of, read_pages),
+        sample("rgb", rgb, pages_of, read_pages),
         sample("tiles", lambda folder: plain(folder, np.float32, tile=(16, 16), compression="zlib", predictor=True), pages_of, read_pages),
-        sample("lzw", lambda folder: plain(folder, np.uint16, compression="lzw", bigtiff=True), pages_of, read_pages),
+        sample("hyperstack", hyperstack, jpeg, read_imagej),
+        sample("ome", ome_hyperstack, ome_documents, read_ome, "a.ome.tif"),
+        sample("ome-rgb", lambda folder: ome_rgb(folder), ome_documents, read_ome, "a.ome.tif"),
+        sample("geo", geo, tags("tags"), read_pages),
+        sample("shaped", lambda folder: shaped(folder, (5, 6, 7), "ZYX"), lambda f: [ShapedJson(f / "a.tif"), *tags("tags")(f)], read_shaped),
+        sample("calibrated", calibrated, jpeg, read_imagej),
+        sample("bio-formats", bio_formats, several, read_ome, "a_c0.ome.tif", ("a_c1.ome.tif",)),
         sample("white", lambda folder: plain(folder, photometric="miniswhite"), pages_of, read_pages),
         sample("palette", palette, pages_of, read_pages),
-        sample("rgb", rgb, pages_of, read_pages),
+        sample("strips", lambda folder: plain(folder, np.int16, byteorder=">", rowsperstrip=2), pages_of, read_pages),
+        sample("lzw", lambda folder: plain(folder, np.uint16, compression="lzw", bigtiff=True), pages_of, read_pages),
         sample("rgb-planes", lambda folder: rgb(folder, "separate"), pages_of, read_pages),
         sample("halves", lambda folder: plain(folder, np.float16), pages_of, read_pages),
-        sample("geo", geo, tags("geo-tags"), read_pages),
         sample("reduced", reduced_pages, lambda folder: [TagsDocument(folder / "a.tif", "reduced-tags", 1)], read_pages),
-        sample("shaped", lambda folder: shaped(folder, (5, 6, 7), "ZYX"), lambda f: [ShapedJson(f / "a.tif"), *tags("shaped-tags")(f)], read_shaped),
         sample("shaped-times", lambda folder: shaped(folder, (3, 2, 5, 6, 7), "TCZYX", np.uint16), lambda f: [ShapedJson(f / "a.tif")], read_shaped),
-        sample("hyperstack", hyperstack, jpeg, read_imagej),
-        sample("calibrated", calibrated, jpeg, read_imagej),
         sample("imagej-times", imagej_floats, jpeg, read_imagej),
         sample("imagej-rgb", lambda folder: imagej(folder, (5, 6, 7, 3), np.uint8, axes="ZYXS", spacing=3.0, unit="nm"), jpeg, read_imagej),
-        sample("ome", ome_hyperstack, ome_documents, read_ome, "a.ome.tif"),
         sample("ome-levels", lambda folder: ome(folder, (5, 64, 48), "ZYX", subifds=2), ome_documents, read_ome, "a.ome.tif"),
-        sample("ome-rgb", lambda folder: ome_rgb(folder), ome_documents, read_ome, "a.ome.tif"),
-        sample("bio-formats", bio_formats, several, read_ome, "a_c0.ome.tif", ("a_c1.ome.tif",)),
-        Sample("companion", "a.companion.ome", companion, lambda folder: [OmeDocument(folder / "a.companion.ome", "companion", xml=True),
+        Sample("companion", "a.companion.ome", companion, lambda folder: [OmeDocument(folder / "a.companion.ome", xml=True),
                                                                        OmeDocument(folder / "a_c0.tif", "binary-only")], None, ("a_c1.tif",)),
     ]
 
@@ -307,4 +307,5 @@ def samples(_):
 def ome_rgb(folder):
     with tifffile.TiffWriter(folder / "a.ome.tif", ome=True) as writer:
         writer.write(values((5, 6, 7, 3), np.uint8), photometric="rgb", metadata={"axes": "ZYXS", "PhysicalSizeX": 0.25, "PhysicalSizeY": 0.5,
-                                                                                 "PhysicalSizeZ": 1.5})
+                                                                                 "PhysicalSizeZ": 1.5,
+                                                                                 "UUID": "urn:uuid:11111111-2222-3333-4444-555555555556"})
