@@ -129,6 +129,7 @@ class FormatRun:
         self.failures = collections.defaultdict(list)  # (verdict, path) -> texts
         self.samples, self.before, self.answers = [], {}, {}
         self.noticed = collections.defaultdict(list)  # (path, sample) -> names of changes that somebody noticed
+        self.names = {}  # (sample, number of a document) -> the first words of its paths
         self.nodes = self.changes = self.unwritable = 0
 
     def places(self):
@@ -179,11 +180,11 @@ class FormatRun:
     def sites(self):
         """For each path the samples that have it, all values, and the documents."""
         sites, values, documents = collections.defaultdict(list), collections.defaultdict(list), collections.defaultdict(set)
-        self.document_names = collections.defaultdict(dict)  # of each sample, by number: the first word of the paths in it
         for sample in self.samples:
             for number, document in enumerate(sample.documents(self.work(sample))):
-                for index, node in enumerate(document.nodes()):
-                    self.document_names[sample.name][number] = node.path.split("/")[0]
+                nodes = document.nodes()
+                self.names[sample.name, number] = {node.path.split("/")[0] for node in nodes}
+                for index, node in enumerate(nodes):
                     path = f"{self.name}/{node.path}"
                     if self.word not in path:
                         continue
@@ -294,11 +295,14 @@ class FormatRun:
 
     def room_for(self, sample, node, documents):
         """The number of a document that can say what it lacks; None: there is none."""
-        for number, name in self.document_names[sample.name].items():
-            if (sample.name, number) in documents[node.path] or node.path.split("/")[0] != name:
-                continue
+        of_sample = [number for name, number in self.names if name == sample.name]
+        rooms = [n for n in of_sample if node.path.split("/")[0] in self.names[sample.name, n] and (sample.name, n) not in documents[node.path]]
+        if not rooms:
+            return None
+        opened = sample.documents(self.work(sample))
+        for number in rooms:
             try:
-                sample.documents(self.work(sample))[number].add(node.path, node.value)
+                opened[number].add(node.path, node.value)
                 return number
             except Exception:  # there is no place for it in this sample
                 continue
