@@ -104,7 +104,7 @@ TEST(RightsTest, ShapesAreReadInWhateverWordsTheyAreAskedFor) {
 
 // A new option that names data must be told by DatasetsOf: this finds those whose text may be any name.
 TEST(RightsTest, NoOptionNamesADatasetUnseen) {
-  const std::set<std::string> no_dataset = {"channel", "time", "title", "color-bar"};
+  const std::set<std::string> no_dataset = {"channel", "labels-shown", "time", "title", "color-bar"};
   for (const bool slices : {false, true}) {
     for (const Json& option : slices ? SliceFields() : RenderFields()) {
       const auto name = option["name"].get<std::string>();
