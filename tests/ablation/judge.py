@@ -118,4 +118,7 @@ def judge(node, change, before, after, foreign, random):
         return "told", ""
     if wrong:
         return "wrong", wrong
-    return ("unnamed", " / ".join(texts)) if after.same_data(before) else ("used", "")
+    if not after.same_data(before):
+        return "used", ""
+    gone = [note for note in before.notes if note not in after.notes]
+    return ("told", "") if named(gone, node) else ("unnamed", " / ".join(texts))
