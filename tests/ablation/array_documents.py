@@ -20,7 +20,7 @@ class Metadata(JsonDocument):
 
     inside: the members that lead to the part. without: members of the part that another document has. whole: paths below the name that
     are a node without nodes in it. only: the last words of nodes that there are. traits: by the path below the name, or by its last word,
-    what a Node has besides (names, role, kind, words, more).
+    what a Node has besides (names, role, kind, words, more), and `default`: what the definition says if the node is missing.
     """
 
     def __init__(self, path, name, inside=(), without=(), whole=(), only=(), traits=None):
@@ -41,7 +41,10 @@ class Metadata(JsonDocument):
             inner = [whole for whole in self.whole if below.startswith(whole + "/")]
             if below.split("/")[0] in self.without or inner or (self.only and below.split("/")[-1] not in self.only):
                 continue
-            for key, value in self._traits(below).items():
+            traits = dict(self._traits(below))
+            if "default" in traits and traits.pop("default") == node.value:
+                node.remove = None  # nothing else would be said without it
+            for key, value in traits.items():
                 setattr(node, key, value(self, node) if callable(value) else value)
             if below in self.whole:
                 node.set = None

@@ -53,16 +53,21 @@ def changes(*listed):
 
 
 TRAITS = {"dataType": {"more": changes(again("samples are int32", "int32"), again("samples are float64", "float64")), "names": PACKED},
-          "compression": {"more": changes(again("packed by blosc", compression={"type": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1}),
+          "compression": {"more": changes(again("packed by blosc", compression={"type": "blosc", "cname": "lz4", "clevel": 5,
+                                                                                "shuffle": 1}),
                                           again("packed by xz", compression={"type": "xz"}),
                                           again("not packed", compression={"type": "raw"}))},
           "compression/type": {"words": ("raw", "zstd", "lz4"), "names": PACKED}, "dimensions": {"names": ("axes", "size", *PACKED)},
-          "blockSize": {"names": PACKED}, "compression/useZlib": {"names": PACKED},
+          "blockSize": {"names": PACKED}, "compression/useZlib": {"names": PACKED, "default": False},
           "unit": {"role": "unit", "words": UNITS}, "units": {"role": "unit"}, "pixelUnit": {"role": "unit", "words": UNITS},
           "scale": {"role": "spacing"}, "translate": {"role": "offset"}, "resolution": {"role": "spacing"}, "offset": {"role": "offset"},
-          "affineTransform": {"role": "affine"}, "name": COMMENT, "pixelWidth": {"role": "spacing"}, "numChannels": {"names": ("channels",)},
-          "numFrames": {"names": ("axes",)}, "numSlices": {"names": ("slices", "channels")}, "n5": {}, "@type": IDENTIFIER, "description": COMMENT,
-          "path": {"names": ("must be a dataset", "a part of it is empty")}, "axes": {"names": ("scale",)},
+          "affineTransform": {"role": "affine"}, "name": COMMENT, "pixelWidth": {"role": "spacing"},
+          "numChannels": {"names": ("channels",)},
+          "numFrames": {"names": ("axes",)}, "numSlices": {"names": ("slices", "channels")}, "n5": {}, "@type": IDENTIFIER,
+          "description": COMMENT,
+          "path": {"names": ("must be a dataset", "a part of it is empty")}, "axes": {"names": ("scale",), "default": ["x", "y", "z"]},
+          "transform/axes": {"names": ("scale",), "default": ["z", "y", "x"]},
+          "multiscales/*/datasets/*/transform/axes": {"names": ("scale",), "default": ["z", "y", "x"]},
           "multiscales/*/axes/*": {"names": ("scale",)}}
 
 
@@ -87,7 +92,7 @@ def along(axes, numbers_of, missing):
 
 
 def cosem(folder, own=True):
-    """Levels with `transform`, and what older programs read instead (https://github.com/janelia-cosem/schemas). `own`: in the levels, too."""
+    """Levels with `transform`, and what older programs read instead (https://github.com/janelia-cosem/schemas). `own`: in levels, too."""
     data = numbers((8, 6, 4), "uint8")
     listed = []
     for level, factor in enumerate((1, 2)):
@@ -153,7 +158,8 @@ def ngff(folder):
     steps = [[{"type": "scale", "scale": [size * factor for size in VOXEL]},
               {"type": "translation", "translation": [size * (factor - 1) / 2 for size in VOXEL]}] for factor in (1, 2)]
     tell(folder, n5="2.5.1")
-    tell(folder / "em", multiscales=[{"name": "em", "version": "0.4", "axes": [{"name": a, "type": "space", "unit": "micrometer"} for a in "zyx"],
+    tell(folder / "em", multiscales=[{"name": "em", "version": "0.4", "axes": [{"name": a, "type": "space",
+                                                                                "unit": "micrometer"} for a in "zyx"],
                                       "datasets": [{"path": f"s{i}", "coordinateTransformations": step} for i, step in enumerate(steps)]}])
 
 
@@ -172,7 +178,8 @@ def read_ngff(folder):
 
 def single(folder):
     """As TensorStore and neuroglancer have it: units and resolution of each axis."""
-    metadata = {"dataType": "uint16", "dimensions": [7, 6, 5], "blockSize": [4, 6, 3], "compression": {"type": "blosc", "cname": "zstd", "clevel": 5, "shuffle": 1},
+    metadata = {"dataType": "uint16", "dimensions": [7, 6, 5], "blockSize": [4, 6, 3],
+                "compression": {"type": "blosc", "cname": "zstd", "clevel": 5, "shuffle": 1},
                 "axes": ["x", "y", "z"], "units": ["nm", "nm", "nm"], "resolution": [4.0, 8.0, 40.0], "downsamplingFactors": [1, 1, 1]}
     opened(folder / "raw", metadata=metadata, create=True).write(numbers((7, 6, 5), "uint16")).result()
     tell(folder, n5="2.5.1")
@@ -195,7 +202,8 @@ def funkelab(folder):
 
 def read_funkelab(folder):
     attributes = said(folder / "raw")
-    return answer(opened(folder / "raw").read().result(), list("xyz"), affine=affine(attributes["resolution"], attributes.get("offset", [0] * 3)))
+    return answer(opened(folder / "raw").read().result(), list("xyz"), affine=affine(attributes["resolution"],
+                                                                                     attributes.get("offset", [0] * 3)))
 
 
 def paintera(folder):
@@ -209,13 +217,15 @@ def paintera(folder):
 
 def read_paintera(folder):
     attributes = said(folder / "labels")
-    return answer(opened(folder / "labels" / "s0").read().result(), list("xyz"), affine=affine(attributes["resolution"], attributes.get("offset", [0] * 3)))
+    return answer(opened(folder / "labels" / "s0").read().result(), list("xyz"),
+                  affine=affine(attributes["resolution"], attributes.get("offset", [0] * 3)))
 
 
 def viewer(folder, in_root=False):
     """Channels as n5-viewer reads them (its page, Usage): each says how large its voxels are, or all in the attributes of the root."""
     size = {"pixelResolution": {"unit": "um", "dimensions": [0.25, 0.5, 2.0]}}
-    tell(folder, n5="2.5.1", name="some data", scales=[[1, 1, 1], [2, 2, 2]], affineTransform=[[1, 0, 0, 8], [0, 1.25, 0, 4], [0, 0, 0.85, 2]],
+    tell(folder, n5="2.5.1", name="some data", scales=[[1, 1, 1], [2, 2, 2]], affineTransform=[[1, 0, 0, 8], [0, 1.25, 0, 4],
+                                                                                               [0, 0, 0.85, 2]],
          **(size if in_root else {}))
     for channel in range(2):
         data = numbers((8, 6, 4), "uint16", channel)
@@ -234,8 +244,10 @@ def read_viewer(folder):
 
 def fiji(folder):
     """A hyperstack with ImageJ's own attributes, as Fiji's plugin N5 writes it with the metadata type `ImageJ`."""
-    write(folder / "stack", numbers((7, 6, 2, 5, 3), "uint16"), {"type": "xz", "preset": 6}, [4, 6, 1, 3, 1], name="stack", fps=0.4, frameInterval=2.5,
-          pixelWidth=0.25, pixelHeight=0.5, pixelDepth=2.0, pixelUnit="um", xOrigin=4.0, yOrigin=2.0, zOrigin=1.0, numChannels=2, numSlices=5,
+    write(folder / "stack", numbers((7, 6, 2, 5, 3), "uint16"), {"type": "xz", "preset": 6}, [4, 6, 1, 3, 1], name="stack", fps=0.4,
+          frameInterval=2.5,
+          pixelWidth=0.25, pixelHeight=0.5, pixelDepth=2.0, pixelUnit="um", xOrigin=4.0, yOrigin=2.0, zOrigin=1.0, numChannels=2,
+          numSlices=5,
           numFrames=3, type=1, imageProperties={"Info": "a microscope"})
     tell(folder, n5="2.5.1")
 
@@ -247,24 +259,28 @@ def read_fiji(folder):
     data = opened(folder / "stack").read().result()
     if list(data.shape[2:]) != counts:
         raise ValueError("not a stack of so many planes")
-    return answer(data, list("xyczt"), affine=affine(sizes, [-attributes.get(f"{axis}Origin", 0) * size for axis, size in zip("xyz", sizes)]))
+    return answer(data, list("xyczt"), affine=affine(sizes, [-attributes.get(f"{axis}Origin", 0) * size for axis,
+                                                             size in zip("xyz", sizes)]))
 
 
 SETUP = ("<ViewSetup><id>{0}</id><name>view {0}</name><size>8 6 4</size><voxelSize><unit>um</unit><size>0.25 0.5 2.0</size></voxelSize>"
          "<attributes><illumination>0</illumination><channel>{0}</channel><tile>0</tile><angle>0</angle></attributes></ViewSetup>")
 REGISTRATION = ('<ViewRegistration timepoint="{0}" setup="{1}"><ViewTransform type="affine"><Name>Translation</Name>'
                 '<affine>1.0 0.0 0.0 40.0 0.0 1.0 0.0 20.0 0.0 0.0 1.0 10.0</affine></ViewTransform>'
-                '<ViewTransform type="affine"><Name>calibration</Name><affine>1.0 0.0 0.0 0.0 0.0 2.0 0.0 0.0 0.0 0.0 8.0 0.0</affine></ViewTransform>'
-                "</ViewRegistration>")
+                '<ViewTransform type="affine"><Name>calibration</Name><affine>1.0 0.0 0.0 0.0 0.0 2.0 0.0 0.0 0.0 0.0 8.0 0.0</affine>'
+                "</ViewTransform></ViewRegistration>")
 DATASET = ('<SpimData version="0.2"><BasePath type="relative">.</BasePath><SequenceDescription><ImageLoader format="bdv.n5" version="1.0">'
-           '<n5 type="relative">views.n5</n5></ImageLoader><ViewSetups>{}<Attributes name="channel"><Channel><id>0</id><name>488</name></Channel>'
-           '<Channel><id>1</id><name>561</name></Channel></Attributes><Attributes name="tile"><Tile><id>0</id><name>first</name>'
-           '<location>0.0 0.0 0.0</location></Tile></Attributes></ViewSetups><Timepoints type="range"><first>0</first><last>1</last></Timepoints>'
-           "<MissingViews/></SequenceDescription><ViewRegistrations>{}</ViewRegistrations><ViewInterestPoints/><BoundingBoxes/></SpimData>")
-SETTINGS = ("<Settings><ViewerState><Sources>{}</Sources><SourceGroups><SourceGroup><active>true</active><name>group 1</name><id>0</id></SourceGroup>"
-            "</SourceGroups><DisplayMode>ss</DisplayMode><Interpolation>nearestneighbor</Interpolation><CurrentSource>0</CurrentSource>"
-            "<CurrentGroup>0</CurrentGroup><CurrentTimePoint>1</CurrentTimePoint></ViewerState><SetupAssignments><ConverterSetups>{}</ConverterSetups>"
-            "<MinMaxGroups><MinMaxGroup><id>0</id><fullRangeMin>-2.147483648E9</fullRangeMin><fullRangeMax>2.147483647E9</fullRangeMax>"
+           '<n5 type="relative">views.n5</n5></ImageLoader><ViewSetups>{}<Attributes name="channel"><Channel><id>0</id><name>488</name>'
+           '</Channel><Channel><id>1</id><name>561</name></Channel></Attributes><Attributes name="tile"><Tile><id>0</id><name>first</name>'
+           '<location>0.0 0.0 0.0</location></Tile></Attributes></ViewSetups><Timepoints type="range"><first>0</first><last>1</last>'
+           "</Timepoints><MissingViews/></SequenceDescription><ViewRegistrations>{}</ViewRegistrations>"
+           "<ViewInterestPoints/><BoundingBoxes/></SpimData>")
+SETTINGS = ("<Settings><ViewerState><Sources>{}</Sources><SourceGroups><SourceGroup><active>true</active><name>group 1</name><id>0</id>"
+            "</SourceGroup></SourceGroups><DisplayMode>ss</DisplayMode><Interpolation>nearestneighbor</Interpolation>"
+            "<CurrentSource>0</CurrentSource>"
+            "<CurrentGroup>0</CurrentGroup><CurrentTimePoint>1</CurrentTimePoint></ViewerState><SetupAssignments><ConverterSetups>{}"
+            "</ConverterSetups><MinMaxGroups><MinMaxGroup><id>0</id><fullRangeMin>-2.147483648E9</fullRangeMin>"
+            "<fullRangeMax>2.147483647E9</fullRangeMax>"
             "<rangeMin>0.0</rangeMin><rangeMax>65535.0</rangeMax><currentMin>10.0</currentMin><currentMax>110.0</currentMax></MinMaxGroup>"
             "</MinMaxGroups></SetupAssignments><ManualSourceTransforms><SourceTransform type=\"affine\">"
             "<affine>1.0 0.0 0.0 0.0 0.0 1.0 0.0 0.0 0.0 0.0 1.0 0.0</affine></SourceTransform></ManualSourceTransforms></Settings>")
@@ -284,8 +300,8 @@ def views(folder):
     setups = "".join(SETUP.format(i) for i in range(2))
     registrations = "".join(REGISTRATION.format(t, s) for t in range(2) for s in range(2))
     folder.with_suffix(".xml").write_text(DATASET.format(setups, registrations))
-    folder.with_suffix(".settings.xml").write_text(SETTINGS.format("<Source><active>true</active></Source><Source><active>false</active></Source>",
-                                                                   "".join(CONVERTER.format(i) for i in range(2))))
+    sources = "".join(f"<Source><active>{shown}</active></Source>" for shown in ("true", "false"))
+    folder.with_suffix(".settings.xml").write_text(SETTINGS.format(sources, "".join(CONVERTER.format(i) for i in range(2))))
 
 
 def read_views(folder):
@@ -322,7 +338,8 @@ def view_documents(folder):
 
 def sample(name, make, read, documents, array="", sidecars=()):
     folder = f"{name}.n5"
-    return Sample(name, folder + (f"?array={array}" if array else ""), lambda made: make(made / folder), lambda made: documents(made / folder),
+    return Sample(name, folder + (f"?array={array}" if array else ""), lambda made: make(made / folder),
+                  lambda made: documents(made / folder),
                   lambda made: read(made / folder), sidecars)
 
 
@@ -333,7 +350,8 @@ def level_documents(group="em"):
 
 
 def single_documents(name, path):
-    return lambda folder: [array_document(folder / path), place_document(folder / path, name), Metadata(folder / "attributes.json", "root", traits=TRAITS)]
+    return lambda folder: [array_document(folder / path), place_document(folder / path, name),
+                           Metadata(folder / "attributes.json", "root", traits=TRAITS)]
 
 
 def viewer_documents(folder):

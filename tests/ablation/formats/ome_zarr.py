@@ -39,21 +39,24 @@ def one_changed(index, value):
 
 
 # Messages may name the list that a number is in, what has as many entries, or the array that lacks an axis.
-LENGTHS, AXIS, GROUP = ("coordinateTransformations", "scale", "translation", "axes"), ("axes", "axis", "scale"), ("a group", "arrays", "no Zarr array")
+LENGTHS, AXIS = ("coordinateTransformations", "scale", "translation", "axes"), ("axes", "axis", "scale")
+GROUP = ("a group", "arrays", "no Zarr array")
 IMAGE = {"scale": {"role": "spacing", "more": one_changed(0, 7.0)}, "translation": {"role": "offset", "more": one_changed(0, 7.0)},
          "unit": {"role": "unit", "words": ("nanometer", "inch", "parsec")}, "version": {"words": ("0.5", "0.9")},
          "type": {"words": ("translation", "sequence"), "names": LENGTHS}, "path": {"names": GROUP}, "multiscales": {"names": GROUP},
          "axes": {"names": AXIS}, "axes/*": {"names": AXIS}, "multiscales/*/axes/*": {"names": AXIS},
          "multiscales/*/coordinateSystems": {"names": AXIS}, "multiscales/*/coordinateSystems/*": {"names": AXIS},
          "multiscales/*/coordinateSystems/*/axes": {"names": AXIS}, "multiscales/*/coordinateSystems/*/axes/*": {"names": AXIS},
-         "multiscales/*/name": {"kind": "comment"}, "multiscales/*/metadata": {"kind": "comment"}, "multiscales/*/type": {"kind": "comment"},
+         "multiscales/*/name": {"kind": "comment"}, "multiscales/*/metadata": {"kind": "comment"},
+         "multiscales/*/type": {"kind": "comment"},
          "multiscales/*/@type": {"kind": "identifier"}, "multiscales/*/axes/*/type": {"words": ("space", "channel", "time"), "names": AXIS},
          "multiscales/*/axes/*/name": {"words": ("x", "u"), "names": AXIS},
          "multiscales/*/datasets/*/coordinateTransformations": {"names": LENGTHS},
          "multiscales/*/datasets/*/coordinateTransformations/*": {"names": LENGTHS},
          "multiscales/*/datasets/*/coordinateTransformations/*/name": {"kind": "comment"},
-         "omero/rdefs/model": {"words": ("greyscale",)}, "omero/id": {"kind": "identifier"}, "omero/name": {"kind": "comment"}, "omero/version": {},
-         "omero/channels/*/color": {"words": ("FF0000", "#ff8800")}, "omero/channels/*/inverted": {},
+         "omero/rdefs/model": {"words": ("greyscale",)}, "omero/id": {"kind": "identifier"}, "omero/name": {"kind": "comment"},
+         "omero/version": {},
+         "omero/channels/*/color": {"words": ("FF0000", "#ff8800")}, "omero/channels/*/inverted": {}, "active": {"default": True},
          "properties/*/area (pixels)": {"kind": "comment"}}
 SIZE = ("axes", "channels", "times", "bytes", "chunk")
 WHOLE = ("multiscales/*/metadata",)
@@ -160,7 +163,8 @@ def placed(folder, fmt, axes="tczyx"):
 def by_ngff_zarr(path, version, units=None, orientation=False):
     """As ngff-zarr writes it, a level that its Gaussian filter made and all its metadata."""
     image = ngff_zarr.to_ngff_image(numbers((5, 6, 7), "int16"), dims=list("zyx"), scale={a: SCALE[a] for a in "zyx"},
-                                    translation={a: SHIFT[a] for a in "zyx"}, axes_units=units or {a: UNITS[a] for a in "zyx"}, name="brain")
+                                    translation={a: SHIFT[a] for a in "zyx"}, axes_units=units or {a: UNITS[a] for a in "zyx"},
+                                    name="brain")
     if orientation:
         image = ngff_zarr.NgffImage(**{**image.__dict__, "axes_orientations": ngff_zarr.LPS})
     with contextlib.redirect_stdout(io.StringIO()):
@@ -183,8 +187,8 @@ def bioformats2raw(folder, _):
     for image in ("0", "1"):
         by_ome_zarr(folder / image, ome_format.FormatV04(), "zyx", "uint8" if image == "0" else "uint16")
     tell(folder / "OME", 2, {"series": ["0", "1"]})
-    image = ('<Image ID="Image:{0}" Name="{0}"><Pixels ID="Pixels:{0}" DimensionOrder="XYZCT" Type="uint8" SizeX="7" SizeY="6" SizeZ="5" SizeC="1" '
-             'SizeT="1" PhysicalSizeX="0.25" PhysicalSizeY="0.5" PhysicalSizeZ="2.5"><MetadataOnly/></Pixels></Image>')
+    image = ('<Image ID="Image:{0}" Name="{0}"><Pixels ID="Pixels:{0}" DimensionOrder="XYZCT" Type="uint8" SizeX="7" SizeY="6" SizeZ="5" '
+             'SizeC="1" SizeT="1" PhysicalSizeX="0.25" PhysicalSizeY="0.5" PhysicalSizeZ="2.5"><MetadataOnly/></Pixels></Image>')
     (folder / "OME" / "METADATA.ome.xml").write_text('<OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06">'
                                                      + "".join(image.format(i) for i in range(2)) + "</OME>")
 
@@ -203,7 +207,9 @@ def old(folder, version):
     """Of 0.3, as bioformats2raw 0.3 wrote it: axes are names, and nothing says how large voxels are. ome-zarr-py writes it no longer."""
     group = zarr.open_group(folder, mode="w", zarr_format=2)
     for level in range(2):
-        group.create_array(str(level), shape=(1, 2, 6 >> level, 8 >> level, 8 >> level), dtype="uint16", chunk_key_encoding={"name": "v2", "separator": "/"})[...] = numbers((1, 2, 6 >> level, 8 >> level, 8 >> level), "uint16")
+        shape = (1, 2, 6 >> level, 8 >> level, 8 >> level)
+        keys = {"name": "v2", "separator": "/"}
+        group.create_array(str(level), shape=shape, dtype="uint16", chunk_key_encoding=keys)[...] = numbers(shape, "uint16")
     group.attrs["multiscales"] = [{"version": version, "axes": list("tczyx"), "datasets": [{"path": "0"}, {"path": "1"}]}]
 
 
@@ -214,7 +220,8 @@ def further_systems(folder, _):
     said = json.loads(path.read_text())
     image = said["attributes"]["ome"]["multiscales"][0]
     image["coordinateSystems"].append({"name": "stage", "axes": [{"name": a, "type": "space", "unit": "millimeter"} for a in "zyx"]})
-    image["coordinateTransformations"] = [{"type": "scale", "scale": [0.001] * 3, "input": {"name": "intrinsic"}, "output": {"name": "stage"}}]
+    image["coordinateTransformations"] = [{"type": "scale", "scale": [0.001] * 3, "input": {"name": "intrinsic"},
+                                           "output": {"name": "stage"}}]
     path.write_text(json.dumps(said))
 
 
@@ -236,14 +243,16 @@ def label_documents(version):
 
 
 def raw_documents(folder):
-    return [Metadata(folder / ".zattrs", "layout", traits={"bioformats2raw.layout": {"names": GROUP}}), Metadata(folder / "OME" / ".zattrs", "series")]
+    return [Metadata(folder / ".zattrs", "layout", traits={"bioformats2raw.layout": {"names": GROUP}}),
+            Metadata(folder / "OME" / ".zattrs", "series")]
 
 
 def plate_documents(folder):
     naming = {"name": {"kind": "comment"}, "path": {"names": GROUP}, "wells": {"names": GROUP}, "plate/wells/*": {"names": GROUP},
               "well": {"names": GROUP}, "images": {"names": GROUP}, "well/images/*": {"names": GROUP}, "plate": {"names": GROUP}}
     parts = ("plate/acquisitions", "plate/columns", "plate/rows")
-    return [Metadata(folder / ".zattrs", "plate", traits=naming, whole=parts), Metadata(folder / "A" / "1" / ".zattrs", "well", traits=naming)]
+    return [Metadata(folder / ".zattrs", "plate", traits=naming, whole=parts), Metadata(folder / "A" / "1" / ".zattrs", "well",
+                                                                                        traits=naming)]
 
 
 def samples(_):

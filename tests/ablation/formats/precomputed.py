@@ -1,4 +1,4 @@
-"""Neuroglancer's precomputed volumes by CloudVolume and TensorStore, with what Igneous, neuroglancer and neuroglancer-scripts put beside."""
+"""Neuroglancer's precomputed volumes by CloudVolume and TensorStore, with what Igneous and neuroglancer-scripts put beside them."""
 import json
 import shutil
 
@@ -10,7 +10,8 @@ from ablation import Change, Sample
 from array_documents import Metadata, affine, answer, numbers
 
 OFFSET, RESOLUTION = (10, 20, -3), (4.0, 8.0, 40.0)
-SHARDING = {"@type": "neuroglancer_uint64_sharded_v1", "preshift_bits": 0, "hash": "murmurhash3_x86_128", "minishard_bits": 1, "shard_bits": 1,
+SHARDING = {"@type": "neuroglancer_uint64_sharded_v1", "preshift_bits": 0, "hash": "murmurhash3_x86_128", "minishard_bits": 1,
+            "shard_bits": 1,
             "minishard_index_encoding": "gzip", "data_encoding": "gzip"}
 TYPES = ("int16", "float32")
 ENCODINGS = ("raw", "jpeg", "compressed_segmentation", "png", "compresso")
@@ -51,7 +52,8 @@ def hidden(folder):
 
 
 def write_cloudvolume(folder, data, kind, encoding, **more):
-    info = CloudVolume.create_new_info(num_channels=1, layer_type=kind, data_type=str(data.dtype), encoding=encoding, resolution=list(RESOLUTION),
+    info = CloudVolume.create_new_info(num_channels=1, layer_type=kind, data_type=str(data.dtype), encoding=encoding,
+                                       resolution=list(RESOLUTION),
                                        voxel_offset=list(OFFSET), volume_size=list(data.shape), chunk_size=[4, 4, 4], **more)
     volume = CloudVolume(f"file://{folder}", info=info, compress=True, progress=False)
     volume.commit_info()
@@ -62,11 +64,13 @@ def write_cloudvolume(folder, data, kind, encoding, **more):
 
 def segments(folder):
     """A segmentation as Igneous leaves it: meshes, skeletons, and properties of segments beside."""
-    write_cloudvolume(folder, numbers((7, 6, 5), "uint64", most=4), "segmentation", "compressed_segmentation", mesh="mesh", skeletons="skeletons")
+    write_cloudvolume(folder, numbers((7, 6, 5), "uint64", most=4), "segmentation", "compressed_segmentation", mesh="mesh",
+                      skeletons="skeletons")
     info = json.loads((folder / "info").read_text())
     info |= {"segment_properties": "properties"}
     (folder / "info").write_text(json.dumps(info))
-    for name, said in (("properties", PROPERTIES), ("mesh", {"@type": "neuroglancer_legacy_mesh"}), ("skeletons", {"@type": "neuroglancer_skeletons"})):
+    for name, said in (("properties", PROPERTIES), ("mesh", {"@type": "neuroglancer_legacy_mesh"}),
+                       ("skeletons", {"@type": "neuroglancer_skeletons"})):
         (folder / name).mkdir()
         (folder / name / "info").write_text(json.dumps(said))
 
@@ -90,7 +94,7 @@ def read(folder):
 
 
 def read_cloudvolume(folder):
-    """As CloudVolume has it, which names its files otherwise (`.gz`). What TensorStore refuses and blocks of other sizes end its process."""
+    """As CloudVolume has it, whose files end in `.gz`. What TensorStore refuses and blocks of other sizes end its process."""
     opened(folder)
     if json.loads((folder / "info").read_text())["scales"][0].get("compressed_segmentation_block_size", [8] * 3) != [8] * 3:
         raise ValueError("blocks of other sizes than those that were written")
@@ -120,12 +124,14 @@ def changes(*listed):
 
 # Messages about a chunk that does not fit name its size, or how it is packed.
 CHUNK = ("bytes", "chunk", "damaged", "shard", "packed")
-INFO = {"data_type": {"words": TYPES, "names": CHUNK, "more": changes(again("samples are float32", "float32"), again("in shards", sharding=SHARDING))},
+INFO = {"data_type": {"words": TYPES, "names": CHUNK, "more": changes(again("samples are float32", "float32"),
+                                                                      again("in shards", sharding=SHARDING))},
         "num_channels": {"names": ("channel", *CHUNK)}, "encoding": {"words": ENCODINGS, "names": CHUNK}, "size": {"names": CHUNK},
         "chunk_sizes/*": {"names": ("chunk_sizes", *CHUNK)}, "scales/*/chunk_sizes/*": {"names": ("chunk_sizes", *CHUNK)},
         "resolution": {"role": "spacing"}, "voxel_offset": {"role": "offset", "names": CHUNK},
         "compressed_segmentation_block_size": {"names": CHUNK}, "type": {"words": ("image", "segmentation")},
-        "@type": {"words": ("neuroglancer_skeletons",), "names": ("type",)}, "hash": {"words": ("identity",), "names": CHUNK}, "preshift_bits": {"names": CHUNK},
+        "@type": {"words": ("neuroglancer_skeletons",), "names": ("type",)}, "hash": {"words": ("identity",), "names": CHUNK},
+        "preshift_bits": {"names": CHUNK},
         "minishard_bits": {"names": CHUNK}, "shard_bits": {"names": CHUNK}, "minishard_index_encoding": {"words": ("raw",), "names": CHUNK},
         "data_encoding": {"words": ("raw",), "names": CHUNK}, "scales": {"names": ("scales",)}, "scales/*": {"names": ("scales",)},
         "description": {"kind": "comment"}, "owners": {"kind": "comment"}}

@@ -10,14 +10,15 @@ from zarr.codecs import BytesCodec, GzipCodec
 from zarr.storage import ZipStore
 
 from ablation import Change, Sample
-from array_documents import Metadata, answer, kinds_of, numbers
+from array_documents import Metadata, affine, answer, kinds_of, numbers
 
 NAMES = ("time", "z", "y", "x")
 UNITS = ("m", "km", "mm", "degrees_north")
 COMMENT, IDENTIFIER = {"kind": "comment"}, {"kind": "identifier"}
 CF = {"scale_factor": {"role": "scale"}, "add_offset": {"role": "offset"}, "_FillValue": {"role": "fill", "names": ("none",)},
       "missing_value": {"role": "fill", "names": ("none",)}, "long_name": COMMENT, "comment": COMMENT, "history": COMMENT, "title": COMMENT,
-      "institution": COMMENT, "source": COMMENT, "references": COMMENT, "description": COMMENT, "Conventions": IDENTIFIER, "standard_name": IDENTIFIER, "_ARRAY_DIMENSIONS": {"names": ("axes",)}}
+      "institution": COMMENT, "source": COMMENT, "references": COMMENT, "description": COMMENT, "Conventions": IDENTIFIER,
+      "standard_name": IDENTIFIER, "_ARRAY_DIMENSIONS": {"names": ("axes",)}}
 COORDINATE = {**CF, "units": {"role": "unit", "names": ("coordinates",), "words": UNITS}, "bounds": {"names": ("coordinates",)},
               "axis": {"words": ("X", "Z")}, "standard_name": {}}
 VALUES = {"units": "K", "long_name": "air temperature", "standard_name": "air_temperature", "cell_methods": "time: mean",
@@ -56,21 +57,25 @@ CHUNK = ("bytes", "chunk", "damaged", "compressor", "codec")
 ARRAY2 = {"dtype": {**traits(again("samples are int32", dtype="<i4"), again("samples are float64", dtype="<f8"),
                              again("the other byte order", dtype=">i2")), "names": CHUNK},
           "order": traits(again("samples in Fortran's order", order="F")),
-          "compressor": {**traits(again("packed by zstd", compressors=numcodecs.Zstd()), again("not packed", compressors=None)), "names": CHUNK},
+          "compressor": {**traits(again("packed by zstd", compressors=numcodecs.Zstd()), again("not packed", compressors=None)),
+                         "names": CHUNK},
           "compressor/id": {"names": CHUNK, "words": ("zlib", "lz4", "zstd", "blosc")}, "shape": {"names": ("axes", *CHUNK)},
-          "chunks": {"names": CHUNK}, "fill_value": {"role": "fill"},
+          "chunks": {"names": CHUNK}, "fill_value": {"role": "fill"}, "dimension_separator": {"default": "."},
           **{f"filters/*/{word}": {"names": ("filters", *CHUNK)} for word in ("id", "dtype", "astype", "elementsize")},
-          "filters/*/dtype": {"words": ("<i4", ">f4"), "names": ("filters", *CHUNK)}, "filters": {"names": CHUNK}, "filters/*": {"names": CHUNK}}
+          "filters/*/dtype": {"words": ("<i4", ">f4"), "names": ("filters", *CHUNK)}, "filters": {"names": CHUNK},
+          "filters/*": {"names": CHUNK}}
 ARRAY3 = {"data_type": {**traits(again("samples are int32", dtype="int32"), again("samples are float64", dtype="float64"),
                                  again("the other byte order", serializer=BytesCodec(endian="big"))),
                         "names": CHUNK},
           "codecs": {**traits(again("packed by gzip", compressors=GzipCodec())), "names": CHUNK},
           "shape": {"names": ("axes", *CHUNK)}, "fill_value": {"role": "fill"}, "chunk_grid/configuration/chunk_shape": {"names": CHUNK},
-          "codecs/*/configuration/codecs/*/name": {"names": CHUNK}, "codecs/*": {"names": ("codecs", *CHUNK)}, "codecs/*/name": {"names": CHUNK}, "codecs/*/configuration/order": {"names": CHUNK},
+          "codecs/*/configuration/codecs/*/name": {"names": CHUNK}, "codecs/*": {"names": ("codecs", *CHUNK)},
+          "codecs/*/name": {"names": CHUNK}, "codecs/*/configuration/order": {"names": CHUNK},
           "codecs/*/configuration": {"names": ("codecs", *CHUNK)}, "codecs/*/configuration/endian": {"words": ("little", "big")},
           "codecs/*/configuration/index_location": {"words": ("start", "end"), "names": ("shard", *CHUNK)},
           "codecs/*/configuration/chunk_shape": {"names": ("shard", *CHUNK)}, "codecs/*/configuration/index_codecs": {"names": ("shard",)},
-          "chunk_key_encoding/name": {"words": ("v2", "default")}, "chunk_key_encoding/configuration/separator": {"words": (".", "/")},
+          "chunk_key_encoding/name": {"words": ("v2", "default")}, "chunk_key_encoding/configuration/separator": {"words": (".", "/"),
+                                                                                                                  "default": "/"},
           "dimension_names": {"names": ("axes",)}}
 
 
@@ -126,7 +131,7 @@ def dataset(values, packing=None, times=True, y_step=-0.5, uneven=False, bounds=
 
 
 def places(opened, axis, values):
-    """Coordinates of the indices along an axis: the centres of its cells, if they are stated and even; else its coordinates; else numbers."""
+    """Coordinates along an axis: the centres of its cells, if they are stated and even; else its coordinates; else numbers."""
     name = values.dims[axis]
     plain = np.arange(values.shape[axis], dtype=float)
     if name not in opened.variables or opened[name].dims != (name,) or opened[name].dtype.kind not in "iuf":
@@ -197,7 +202,8 @@ def named(version):
 def write_partly(version):
     """Chunks that were never written hold the fill value."""
     def write(folder):
-        array = zarr.create_array(folder, shape=(5, 6, 7), chunks=(3, 4, 4), dtype="int16", zarr_format=version, fill_value=17, **named(version))
+        array = zarr.create_array(folder, shape=(5, 6, 7), chunks=(3, 4, 4), dtype="int16", zarr_format=version, fill_value=17,
+                                  **named(version))
         array[:3, :4] = numbers((3, 4, 7), "int16") - 60
     return write
 
@@ -211,14 +217,16 @@ def write_tensorstore(folder):
                              "chunk_shape": [3, 3, 4, 1], "index_location": "start",
                              "codecs": [{"name": "transpose", "configuration": {"order": [3, 2, 1, 0]}},
                                         {"name": "bytes", "configuration": {"endian": "big"}},
-                                        {"name": "blosc", "configuration": {"cname": "zstd", "shuffle": "bitshuffle", "typesize": 2, "clevel": 5}}],
+                                        {"name": "blosc", "configuration": {"cname": "zstd", "shuffle": "bitshuffle", "typesize": 2,
+                                                                            "clevel": 5}}],
                              "index_codecs": [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}]}}]}}
     tensorstore.open(spec, create=True).result().write(values).result()
 
 
 def write_zip(path):
     with ZipStore(path, mode="w") as store:
-        array = zarr.create_array(store, name="density", shape=(5, 6, 7), dtype="float32", chunks=(5, 6, 7), dimension_names=["z", "y", "x"])
+        array = zarr.create_array(store, name="density", shape=(5, 6, 7), dtype="float32", chunks=(5, 6, 7),
+                                  dimension_names=["z", "y", "x"])
         array[...] = numbers((5, 6, 7), "float32")
 
 
@@ -236,6 +244,21 @@ def by_cf_axes(folder):
     opened = xarray.open_dataset(folder, engine="zarr", consolidated=False, decode_times=False)
     kinds = [opened[name].attrs["axis"].lower() for name in opened["temp"].dims]
     return answer(opened["temp"].values, kinds, places=[opened[opened["temp"].dims[kinds.index(kind)]].values for kind in "xyz"])
+
+
+def write_funlib(folder):
+    """As funlib.persistence (daisy, gunpowder) writes arrays: where they lie is in attributes of theirs, z first."""
+    write_plain("uint8", 2)(folder)
+    zarr.open_array(folder, mode="a").attrs.update({"offset": [400, 200, 100], "voxel_size": [40, 8, 4], "axis_names": ["z", "y", "x"],
+                                                    "units": ["nm", "nm", "nm"]})
+
+
+def read_funlib(folder):
+    """As the same attributes of HDF5 files are taken (docs/formats.md, HDF5)."""
+    array = zarr.open_array(folder, mode="r")
+    attributes = array.attrs
+    size, first = attributes.get("voxel_size", [1] * 3)[::-1], attributes.get("offset", [0] * 3)[::-1]
+    return answer(array[...], kinds_of(attributes.get("axis_names", [""] * 3)), affine=affine(size, first))
 
 
 def oddly_named():
@@ -280,11 +303,15 @@ def samples(_):
         array_sample("nameless", 3, write_plain("float32", 3)),
         array_sample("half", 2, write_plain(">f2", 2, compressors=numcodecs.Zlib(), order="F", **named(2))),
         array_sample("bool", 3, write_plain("bool", 3, **named(3))),
-        array_sample("filters", 2, write_plain("float32", 2, filters=[numcodecs.FixedScaleOffset(offset=10, scale=4, dtype="<f4", astype="<i2"),
+        array_sample("filters", 2, write_plain("float32", 2, filters=[numcodecs.FixedScaleOffset(offset=10, scale=4, dtype="<f4",
+                                                                                                 astype="<i2"),
                                                                       numcodecs.Delta(dtype="<i2"), numcodecs.Shuffle(2)],
                                                compressors=numcodecs.GZip(), **named(2))),
         array_sample("shards", 3, write_tensorstore),
         zip_sample(),
+        Sample("funlib", "funlib.zarr", lambda made: write_funlib(made / "funlib.zarr"),
+               lambda made: [Metadata(made / "funlib.zarr" / ".zattrs", "funlib", traits={"offset": {"role": "offset"}})],
+               lambda made: read_funlib(made / "funlib.zarr")),
         xarray_sample("limits", 3, lambda: dataset(temperatures(False)[0], {"dtype": "int16", "scale_factor": 0.5, "add_offset": 3.0},
                                                    times=False, **missing), documents=few("valid_min", "valid_max", "actual_range")),
         xarray_sample("fill2", 2, lambda: dataset(temperatures(), packed()),
