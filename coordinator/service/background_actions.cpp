@@ -330,8 +330,10 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
+  const auto far = std::ranges::find_if(action.arguments, [](const std::string& each) { return each.find("://") != std::string::npos; });
   return PostResult(
-      checks_.Of(0), "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
+      checks_.Of(OwnerOf(far == action.arguments.end() ? "" : *far)), "a file check", [action] { return Find(action.arguments); },
+      EndOf<DatasetsFound>(action.order));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
