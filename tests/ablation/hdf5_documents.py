@@ -203,7 +203,7 @@ class Hdf5Document(Document):
         if last.startswith("@"):
             attrs = self._attrs(here)
             attrs.create(last[1:], np.frombuffer(value.encode(), "S1")) if self.letters and isinstance(value, str) else attrs.__setitem__(last[1:], value)
-        elif isinstance(self.file[here or "/"], h5py.Group) and "*" not in last:
+        elif isinstance(self.file[here or "/"], h5py.Group) and "*" not in last and np.size(value) == 1:
             self.file[f"{here}/{last}"] = value
         else:
             raise CannotWrite(path)

@@ -105,8 +105,8 @@ def judge(node, change, before, after, foreign, random):
     """The verdict of a change, and why. `foreign`: the foreign reader's answer to the changed file; None: it reads none, or refuses it."""
     if after.broken:
         return "crashed", after.broken
+    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes]
     gone = [note for note in before.notes if note not in after.notes]
-    texts = [after.error] if after.error else [note for note in after.notes if note not in before.notes] + gone
     if after.error:
         return ("refused", "") if named(texts, node) else ("unnamed", after.error)
     wrong = difference(after, foreign, random) if foreign is not None else ""
@@ -121,4 +121,6 @@ def judge(node, change, before, after, foreign, random):
         return "told", ""
     if wrong:
         return "wrong", wrong
-    return ("unnamed", " / ".join(texts)) if after.same_data(before) else ("used", "")
+    if not after.same_data(before):
+        return "used", ""
+    return ("told", "") if named(gone, node) else ("unnamed", " / ".join(texts))
