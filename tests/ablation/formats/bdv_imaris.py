@@ -98,26 +98,41 @@ def typed(folder):
                 file.create_dataset(f"t{time:05}/s00/{level}/cells", data=voxels(shape, "u1", time), chunks=(3, 3, 4), compression="gzip")
 
 
+def check_setups(path):
+    """npy2bdv takes setups by their order in the XML file, not by their numbers."""
+    setups = list(lxml.etree.parse(str(path.with_suffix(".xml"))).iter("ViewSetup"))
+    with h5py.File(path) as file:
+        count = sum(name.startswith("s") for name in file)
+    if [setup.findtext("id") for setup in setups] != [str(i) for i in range(count)] or any(not setup.findtext("voxelSize/size") for setup in setups):
+        raise ValueError("setups are not in order")
+
+
 def read_bdv(path):
     """By npy2bdv, where the XML says the voxel size."""
+    check_setups(path)
     editor = npy2bdv.BdvEditor(str(path))
     times, channels = editor.get_attribute_count()[0], editor.get_attribute_count()[2]
     fields = {(t, c): editor.read_view(time=t, channel=c).astype("u2").T.astype(float) for t in range(times) for c in range(channels)}
     size = editor.get_view_property("voxel_size")
     editor.finalize()
-    return Answer(fields=fields, affine=np.diag([*size, 1.0]))
+    with h5py.File(path) as file:
+        return placed(fields, file["s00/resolutions"][0], size)
+
+
+def placed(fields, factor, size):
+    """A voxel of a level lies in the middle of those of the view that it takes together."""
+    if len({field.shape for field in fields.values()}) > 1:
+        raise ValueError("times or channels differ in size")
+    affine = np.diag([*(factor * size), 1.0])
+    affine[:3, 3] = 0.5 * (factor - 1) * size
+    return Answer(fields=fields, affine=affine)
 
 
 def read_cells(path):
     with h5py.File(path) as file:
         times = sorted(name for name in file if name.startswith("t"))
         fields = {(t, 0): file[f"{name}/s00/0/cells"][()].T.astype(float) for t, name in enumerate(times)}
-        if len({field.shape for field in fields.values()}) > 1:
-            raise ValueError("times differ in size")
-        factor = file["s00/resolutions"][0]
-        affine = np.diag([*factor, 1.0])
-        affine[:3, 3] = 0.5 * (factor - 1)
-        return Answer(fields=fields, affine=affine)
+        return placed(fields, file["s00/resolutions"][0], np.ones(3))
 
 
 def letters(target, **attributes):
