@@ -10,13 +10,14 @@ from vtk_answers import cubes_of_tetrahedra, grid_answer, grid_of, image_answer
 
 FOREIGN_READER_CRASHES = True
 MEANINGS = Meanings(
-    roles={"Spacing": "spacing", "Origin": "affine", "Direction": "affine"},
-    names={"WholeExtent": ("extent",), "Type": ("VTKHDF",), "Types": ("type", "cells"), "AMRBox": ("box",), "NumberOfPoints": ("Points", "cells"),
-           "NumberOfCells": ("cells",), "NumberOfConnectivityIds": ("Offsets", "Connectivity"), "Offsets": ("Offsets", "part"),
-           "Connectivity": ("point",), "VTKHDF": ("VTKHDF",), "vtkGhostType": ("cells",), "PointData": ("array",), "CellData": ("array",),
-           "Level0": ("level 0", "array"), "NSteps": ("Steps",), "Spacing": ("step along", "cells of level", "beyond level"), "rho": ("array",),
-           "velocity": ("array",), "NumberOfParts": ("cells",), "NumberOfAMRBox": ("level 0",)},
-    words={"Type": ("ImageData", "UnstructuredGrid", "OverlappingAMR", "PolyData"), "Attribute": ("Scalars", "Vectors")})
+    roles={"Spacing": "spacing", "Origin": "affine", "Direction": "affine"}, names={
+        "WholeExtent": ("extent",), "Type": ("VTKHDF",), "Types": ("type", "cells"), "AMRBox": ("box",), "NumberOfPoints": ("Points",
+                                                                                                                            "cells"),
+        "NumberOfCells": ("cells",), "NumberOfConnectivityIds": ("Offsets", "Connectivity"), "Offsets": ("Offsets", "part"),
+        "Connectivity": ("point",), "VTKHDF": ("VTKHDF",), "vtkGhostType": ("cells",), "PointData": ("array",), "CellData": ("array",),
+        "Level0": ("level 0", "array"), "NSteps": ("Steps",), "Spacing": ("step along", "cells of level", "beyond level"),
+        "rho": ("array",), "velocity": ("array",), "NumberOfParts": ("cells",), "NumberOfAMRBox": ("level 0",)
+    }, words={"Type": ("ImageData", "UnstructuredGrid", "OverlappingAMR", "PolyData"), "Attribute": ("Scalars", "Vectors")})
 LATTICE = 5
 
 
@@ -64,8 +65,8 @@ def begin(file, kind, **attributes):
 def series(path):
     """Steps of an image, with components, as the specification has them."""
     with h5py.File(path, "w") as file:
-        root = begin(file, "ImageData", WholeExtent=np.array([0, 6, 0, 5, 0, 4]), Origin=np.array([1.0, 2, 3]), Spacing=np.array([0.5, 1, 2]),
-                     Direction=np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]))
+        root = begin(file, "ImageData", WholeExtent=np.array([0, 6, 0, 5, 0, 4]), Origin=np.array([1.0, 2, 3]),
+                     Spacing=np.array([0.5, 1, 2]), Direction=np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]))
         root["PointData/velocity"] = voxels((3, 5, 6, 7, 3))
         root["PointData"].attrs["Vectors"] = np.bytes_("velocity")
         steps = root.create_group("Steps")
@@ -92,7 +93,10 @@ def read_steps(path):
 
 def grid(path):
     points, cells = cubes_of_tetrahedra((3, 2, 4))
-    write(path, grid_of(points, cells, [("T", voxels(len(points), "f8")), ("u", voxels((len(points), 3)))], [("material", np.arange(len(cells)) % 5)]))
+    write(
+        path,
+        grid_of(points, cells, [("T", voxels(len(points), "f8")), ("u", voxels((len(points), 3)))],
+                [("material", np.arange(len(cells)) % 5)]))
 
 
 def parts(path):
