@@ -99,8 +99,9 @@ def grid(path):
                 [("material", np.arange(len(cells)) % 5)]))
 
 
-def parts(path):
-    """As a parallel program writes it: two parts, ghost cells, three times of which two share the mesh."""
+def parts(path, constant=False):
+    """As a parallel program writes it: two parts, ghost cells, three times of which two share the mesh. `constant`: two times, whose parts
+    are as many as NumberOfParts, which is left out then, would say."""
     points, cells = cubes_of_tetrahedra((2, 2, 3))
     other = points + [points[:, 0].max() - points[:, 0].min(), 0, 0]
     count, corners = len(points), np.r_[cells.ravel(), cells.ravel()]
@@ -117,14 +118,16 @@ def parts(path):
         root["PointData/p"], root["CellData/rho"] = voxels(6 * count, "f8"), voxels(4 * len(cells), "f8")
         root["FieldData/run"] = np.array([42])
         steps = root.create_group("Steps")
-        steps.attrs["NSteps"] = 3
-        steps["Values"] = np.array([0.0, 0.5, 1.0])
-        for name, values in {"PartOffsets": [0, 0, 2], "NumberOfParts": [2, 2, 2], "PointOffsets": [0, 0, 2 * count],
-                             "PointDataOffsets/p": [0, 2 * count, 4 * count], "CellDataOffsets/rho": [0, 0, 2 * len(cells)],
-                             "CellDataOffsets/vtkGhostType": [0, 0, 2 * len(cells)], "FieldDataOffsets/run": [0, 0, 0]}.items():
-            steps[name] = np.array(values)
-        steps["CellOffsets"] = np.array([[0], [0], [2 * len(cells)]])
-        steps["ConnectivityIdOffsets"] = np.array([[0], [0], [2 * cells.size]])
+        times = [0, 2] if constant else [0, 1, 2]
+        steps.attrs["NSteps"] = len(times)
+        steps["Values"] = np.array([0.0, 0.5, 1.0])[times]
+        offsets = {"PartOffsets": [0, 0, 2], "NumberOfParts": [2, 2, 2], "PointOffsets": [0, 0, 2 * count],
+                   "PointDataOffsets/p": [0, 2 * count, 4 * count], "CellDataOffsets/rho": [0, 0, 2 * len(cells)],
+                   "CellDataOffsets/vtkGhostType": [0, 0, 2 * len(cells)], "FieldDataOffsets/run": [0, 0, 0],
+                   "CellOffsets": [[0], [0], [2 * len(cells)]], "ConnectivityIdOffsets": [[0], [0], [2 * cells.size]]}
+        for name, values in offsets.items():
+            if not constant or name != "NumberOfParts":
+                steps[name] = np.array(values)[times]
 
 
 def collection(path):
@@ -228,6 +231,7 @@ def samples(_):
         sample("grid", grid, cells("T"), f"?dataset=T,lattice={LATTICE}"),
         sample("grid-cells", grid, cells("material"), f"?dataset=material,lattice={LATTICE}", "grid"),
         sample("parts", parts, cells("p"), f"?dataset=p,lattice={LATTICE}"),
+        sample("parts-constant", lambda path: parts(path, constant=True), cells("rho"), f"?dataset=rho,lattice={LATTICE}", "parts"),
         sample("parts-moved", parts, cells("rho", 2), f"?dataset=rho,time=2,lattice={LATTICE}", "parts"),
         sample("collection", collection, blocks, f"?lattice={LATTICE}"),
         sample("amr", mesh, read_mesh, "?dataset=rho"),
