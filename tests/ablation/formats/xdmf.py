@@ -138,7 +138,7 @@ def times(folder):
         shape = even(folder) if number == 0 else ('<Topology Reference="XML">/Xdmf/Domain/Grid/Grid[1]/Topology</Topology>'
                                                   '<Geometry Reference="XML">/Xdmf/Domain/Grid/Grid[1]/Geometry</Geometry>')
         data = binary(folder, f"rho{number}.raw", voxels((5, 6, 7), "i4", number), "<", 0)
-        grids.append(f'<Grid Name="step{number}" GridType="Uniform"><Time Value="{0.25 * number}"/>{shape}{attribute("rho", data)}</Grid>')
+        grids.append(f'<Grid Name="step{number}" GridType="Uniform"><Time Value="{1 + 0.25 * number}"/>{shape}{attribute("rho", data)}</Grid>')
     save(folder, "times.xmf", "".join(grids), grid='Name="series" GridType="Collection" CollectionType="Temporal"')
 
 
@@ -165,7 +165,7 @@ def steps(folder):
     with meshio.xdmf.TimeSeriesWriter(folder / "steps.xdmf", data_format="XML") as writer:
         writer.write_points_cells(points, [("tetra", cells)])
         for number in range(3):
-            writer.write_data(0.5 * number, point_data={"T": voxels(len(points), "f8", number)})
+            writer.write_data(1 + 0.5 * number, point_data={"T": voxels(len(points), "f8", number)})
 
 
 def check_known(text):
