@@ -14,10 +14,10 @@ FOREIGN_READER_CRASHES = True
 REMARKS = ("Conventions", "standard_name_vocabulary", "frequency", "keywords", "summary", "contact", "project", "step", "unit_long",
            "geospatial_lat_min", "geospatial_vertical_positive", "cell_methods", "cell_measures", "_NCProperties")
 MEANINGS = Meanings(
-    kinds={"tracking_id": "identifier", "creation_date": "date", "_Netcdf4Dimid": "identifier", "_Netcdf4Coordinates": "identifier",
+    kinds={"tracking_id": "identifier", "creation_date": "date",
            **{name: "comment" for name in REMARKS}},
     roles={"scale_factor": "scale", "add_offset": "offset", "_FillValue": "fill", "missing_value": "fill", "units": "unit"},
-    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",),
+    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",), "axis": ("axes",),
            "_FillValue": ("as missing_value says",), "positive": ("run down", "running down"), **{f"{name}_bnds": ("bounds",) for name in
                                                                                              ("depth", "lat", "lon")}},
     words={"units": ("km", "m", "mm", "feet"), "positive": ("up", "down"), "axis": ("X", "Y", "Z", "T"), "_Unsigned": ("true", "false"),
@@ -272,6 +272,11 @@ def read(path, variable):
                       facts={"times": times_of(file, order[0], len(values))} if order[0] in file.variables else {})
 
 
+def inside(path, name, meanings):
+    """As HDF5 has it, but for what netCDF's library keeps for itself."""
+    return Hdf5Document(path, name, meanings, skip=(r"@_Netcdf4",))
+
+
 def sample(name, write, variable, *, document=NetcdfDocument, options=""):
     file = f"{name}.nc"
     return Sample(name, file + options, lambda folder: write(folder / file),
@@ -289,5 +294,5 @@ def samples(_):
         sample("unwritten", unwritten, "density", document=None),
         sample("ice", ice, "ice"),
         sample("flags", flags, "cloud_type"),
-        sample("inside", ocean, "thetao", document=Hdf5Document, options="?dataset=thetao"),
+        sample("inside", ocean, "thetao", document=inside, options="?dataset=thetao"),
     ]
