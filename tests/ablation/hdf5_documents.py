@@ -95,10 +95,12 @@ class Hdf5Document(Document):
             text = dataset.shape in ((), (1,)) and h5py.check_string_dtype(dataset.dtype)
             value = np.ravel(dataset.asstr()[()])[0] if text else None
             one = dataset.shape == ()
-            yield Node(here, value, (lambda new: self.replace(each, str(new) if one else [str(new)], None)) if text else None, remove, **said)
+            yield Node(here, value, (lambda new: self.replace(each,
+                                                              str(new) if one else [str(new)], None)) if text else None, remove, **said)
         elif dataset.size <= MOST_NUMBERS:
             shape = dataset.shape
-            again = Change("another type and byte order", lambda: self.replace(each, self.file[each][()], other_type(dataset.dtype)), same=True)
+            again = Change("another type and byte order", lambda: self.replace(each, self.file[each][()], other_type(dataset.dtype)),
+                           same=True)
             def change(new):
                 fits = len(shape) > 1 and np.size(new) == np.prod(shape)
                 self.replace(each, fitting(new, dataset.dtype).reshape(shape) if fits else fitting(new, dataset.dtype), dataset.dtype)
@@ -111,7 +113,8 @@ class Hdf5Document(Document):
         changes = [Change(f"samples are {np.dtype(t).str}", lambda t=t: self.replace(each, fitting(self.file[each][()], t), t), same=True)
                    for t in self.types if np.dtype(t) != dataset.dtype]
         packed = dict(chunks=tuple(min(side, 4) for side in dataset.shape), compression="gzip", shuffle=True)
-        changes.insert(1, Change("chunks, gzip and shuffle", lambda: self.replace(each, self.file[each][()], dataset.dtype, **packed), same=True))
+        changes.insert(
+            1, Change("chunks, gzip and shuffle", lambda: self.replace(each, self.file[each][()], dataset.dtype, **packed), same=True))
         if dataset.ndim > 1:
             swap = lambda: self.replace(each, np.ascontiguousarray(np.swapaxes(self.file[each][()], -1, -2)), dataset.dtype)
             changes.append(Change("axes exchanged", swap))
@@ -174,8 +177,10 @@ class Hdf5Document(Document):
         elif kind.kind in "iuf" and h5py.check_enum_dtype(kind) is None:
             node.value = attrs[key]
             node.set = lambda new: self._attrs(each).create(key, fitting(new, kind), shape=np.shape(new), dtype=kind)
-            node.more = [Change("another type and byte order",
-                                lambda: self._attrs(each).create(key, fitting(attrs[key], other_type(kind)), dtype=other_type(kind)), same=True)]
+            node.more = [
+                Change("another type and byte order",
+                       lambda: self._attrs(each).create(key, fitting(attrs[key], other_type(kind)), dtype=other_type(kind)), same=True)
+            ]
         return node
 
     def _attrs(self, each):
@@ -202,8 +207,9 @@ class Hdf5Document(Document):
         here = self.objects[parent]
         if last.startswith("@"):
             attrs = self._attrs(here)
-            attrs.create(last[1:], np.frombuffer(value.encode(), "S1")) if self.letters and isinstance(value, str) else attrs.__setitem__(last[1:], value)
-        elif isinstance(self.file[here or "/"], h5py.Group) and "*" not in last:
+            attrs.create(last[1:], np.frombuffer(value.encode(), "S1")) if self.letters and isinstance(value, str) else attrs.__setitem__(
+                last[1:], value)
+        elif isinstance(self.file[here or "/"], h5py.Group) and "*" not in last and np.size(value) == 1:
             self.file[f"{here}/{last}"] = value
         else:
             raise CannotWrite(path)
@@ -243,13 +249,19 @@ class NetcdfDocument(Document):
         order = variable.endian()
         if order in ("little", "big"):
             options["endian"] = order
-        return Variable(variable.dtype, list(variable.dimensions), variable[...], {key: variable.getncattr(key) for key in variable.ncattrs()}, options)
+        return Variable(variable.dtype, list(variable.dimensions), variable[...],
+                        {key: variable.getncattr(key)
+                         for key in variable.ncattrs()}, options)
 
     def nodes(self):
         nodes = [self._attribute(f"{self.name}/@{key}", self.attributes, key) for key in self.attributes]
         for key in self.dimensions:
-            nodes.append(Node(f"{self.name}/dimensions/{key}", None, None, None, names=("axes",), more=[
-                Change("another name", lambda k=key: self._rename(k, "other_" + k)), Change("unlimited", lambda k=key: self._unlimited(k), same=True)]))
+            nodes.append(
+                Node(
+                    f"{self.name}/dimensions/{key}", None, None, None, names=("axes",), more=[
+                        Change("another name", lambda k=key: self._rename(k, "other_" + k)),
+                        Change("unlimited", lambda k=key: self._unlimited(k), same=True)
+                    ]))
         for key, variable in self.variables.items():
             nodes += self._nodes_of(key, variable)
         return nodes
@@ -264,7 +276,11 @@ class NetcdfDocument(Document):
         elif variable.data.size <= MOST_NUMBERS:
             def change(new):
                 variable.data = fitting(new, variable.dtype).reshape(variable.data.shape)
-            yield Node(here, variable.data.ravel(), change, remove, more=[Change("another type", lambda: self._retype(variable, "f4" if variable.dtype.kind == "i" else "f8"), same=True)], **said)
+
+            yield Node(
+                here, variable.data.ravel(), change, remove,
+                more=[Change("another type", lambda: self._retype(variable, "f4"
+                                                                  if variable.dtype.kind == "i" else "f8"), same=True)], **said)
         else:
             yield Node(here, None, None, remove, more=self._again(variable), **said)
         for name in variable.attributes:
@@ -272,7 +288,9 @@ class NetcdfDocument(Document):
 
     def _again(self, variable):
         types = () if "_Unsigned" in variable.attributes else self.types  # which is for bytes alone
-        changes = [Change(f"samples are {t}", lambda t=t: self._retype(variable, t), same=True) for t in types if np.dtype(t) != variable.dtype]
+        changes = [
+            Change(f"samples are {t}", lambda t=t: self._retype(variable, t), same=True) for t in types if np.dtype(t) != variable.dtype
+        ]
         if self.model == "NETCDF4":
             other = "little" if variable.options.get("endian") == "big" else "big"
             changes.insert(0, Change("the other byte order", lambda: variable.options.update(endian=other), same=True))

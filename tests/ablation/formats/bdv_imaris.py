@@ -11,8 +11,9 @@ from documents import XmlDocument
 from hdf5_documents import Hdf5Document, Meanings
 
 FOREIGN_READER_CRASHES = True
-REMARKS = ("Version", "ImarisVersion", "OriginalFormat", "Filename", "OriginalFormatFileIOVersion", "ThumbnailMode", "ThumbnailSize", "Imaris", "Log",
-           "Entries", "LensPower", "NumericalAperture", "ResampleDimensionX", "LSMEmissionWavelength", "LSMExcitationWavelength")
+REMARKS = ("Version", "ImarisVersion", "OriginalFormat", "Filename", "OriginalFormatFileIOVersion", "ThumbnailMode", "ThumbnailSize",
+           "Imaris", "Log", "Entries", "LensPower", "NumericalAperture", "ResampleDimensionX", "LSMEmissionWavelength",
+           "LSMExcitationWavelength")
 MEANINGS = Meanings(
     kinds={"RecordingDate": "date", **{name: "comment" for name in REMARKS}}, roles={"resolutions": "spacing"},
     words={"ColorMode": ("BaseColor", "TableColor"), "Unit": ("um", "nm", "mm", "m"), "dataType": ("uint16", "int16", "uint8")},
@@ -40,8 +41,8 @@ def voxels(shape, dtype, seed=0):
 
 
 def write_bdv(folder, name, *, times=1, channels=1, subsampling=((1, 1, 1),), **view):
-    writer = npy2bdv.BdvWriter(str(folder / f"{name}.h5"), nchannels=channels, subsamp=subsampling, blockdim=((4, 4, 4),) * len(subsampling),
-                               overwrite=True)
+    writer = npy2bdv.BdvWriter(str(folder / f"{name}.h5"), nchannels=channels, subsamp=subsampling,
+                               blockdim=((4, 4, 4),) * len(subsampling), overwrite=True)
     writer.set_attribute_labels("channel", tuple(str(488 + 73 * c) for c in range(channels)))
     for time in range(times):
         for channel in range(channels):
@@ -75,8 +76,10 @@ def settings(path):
     root = lxml.etree.Element("Settings")
     state = lxml.etree.SubElement(root, "ViewerState")
     for active in ("true", "false"):
-        lxml.etree.SubElement(lxml.etree.SubElement(lxml.etree.SubElement(state, "Sources") if state.find("Sources") is None else state.find("Sources"),
-                                                    "Source"), "active").text = active
+        lxml.etree.SubElement(
+            lxml.etree.SubElement(
+                lxml.etree.SubElement(state, "Sources") if state.find("Sources") is None else state.find("Sources"), "Source"),
+            "active").text = active
     for name, text in (("Interpolation", "nearestneighbor"), ("DisplayMode", "fs"), ("CurrentSource", "0"), ("CurrentTimePoint", "0")):
         lxml.etree.SubElement(state, name).text = text
     setups = lxml.etree.SubElement(lxml.etree.SubElement(root, "SetupAssignments"), "ConverterSetups")
@@ -98,26 +101,42 @@ def typed(folder):
                 file.create_dataset(f"t{time:05}/s00/{level}/cells", data=voxels(shape, "u1", time), chunks=(3, 3, 4), compression="gzip")
 
 
+def check_setups(path):
+    """npy2bdv takes setups by their order in the XML file, not by their numbers."""
+    setups = list(lxml.etree.parse(str(path.with_suffix(".xml"))).iter("ViewSetup"))
+    with h5py.File(path) as file:
+        count = sum(name.startswith("s") for name in file)
+    if [setup.findtext("id") for setup in setups] != [str(i) for i in range(count)] or any(not setup.findtext("voxelSize/size")
+                                                                                           for setup in setups):
+        raise ValueError("setups are not in order")
+
+
 def read_bdv(path):
     """By npy2bdv, where the XML says the voxel size."""
+    check_setups(path)
     editor = npy2bdv.BdvEditor(str(path))
     times, channels = editor.get_attribute_count()[0], editor.get_attribute_count()[2]
     fields = {(t, c): editor.read_view(time=t, channel=c).astype("u2").T.astype(float) for t in range(times) for c in range(channels)}
     size = editor.get_view_property("voxel_size")
     editor.finalize()
-    return Answer(fields=fields, affine=np.diag([*size, 1.0]))
+    with h5py.File(path) as file:
+        return placed(fields, file["s00/resolutions"][0], size)
+
+
+def placed(fields, factor, size):
+    """A voxel of a level lies in the middle of those of the view that it takes together."""
+    if len({field.shape for field in fields.values()}) > 1:
+        raise ValueError("times or channels differ in size")
+    affine = np.diag([*(factor * size), 1.0])
+    affine[:3, 3] = 0.5 * (factor - 1) * size
+    return Answer(fields=fields, affine=affine)
 
 
 def read_cells(path):
     with h5py.File(path) as file:
         times = sorted(name for name in file if name.startswith("t"))
         fields = {(t, 0): file[f"{name}/s00/0/cells"][()].T.astype(float) for t, name in enumerate(times)}
-        if len({field.shape for field in fields.values()}) > 1:
-            raise ValueError("times differ in size")
-        factor = file["s00/resolutions"][0]
-        affine = np.diag([*factor, 1.0])
-        affine[:3, 3] = 0.5 * (factor - 1)
-        return Answer(fields=fields, affine=affine)
+        return placed(fields, file["s00/resolutions"][0], np.ones(3))
 
 
 def letters(target, **attributes):
@@ -127,8 +146,8 @@ def letters(target, **attributes):
 
 def imaris(path, *, channels=2, times=3, dtype="u2", levels=2, unit="um", table=False):
     with h5py.File(path, "w") as file:
-        letters(file, DataSetDirectoryName="DataSet", DataSetInfoDirectoryName="DataSetInfo", ImarisDataSet="ImarisDataSet", ImarisVersion="5.5.0",
-                ThumbnailDirectoryName="Thumbnail")
+        letters(file, DataSetDirectoryName="DataSet", DataSetInfoDirectoryName="DataSetInfo", ImarisDataSet="ImarisDataSet",
+                ImarisVersion="5.5.0", ThumbnailDirectoryName="Thumbnail")
         file.attrs["NumberOfDataSets"] = np.array([1], "u4")
         for level in range(levels):
             size = [5, 6, 7] if level == 0 else [5, 3, 4]
@@ -137,9 +156,10 @@ def imaris(path, *, channels=2, times=3, dtype="u2", levels=2, unit="um", table=
                     imaris_level(file.create_group(f"DataSet/ResolutionLevel {level}/TimePoint {time}/Channel {channel}"), size,
                                  voxels((6, 8, 8), dtype, 10 * time + channel))
         info = file.create_group("DataSetInfo")
-        letters(info.create_group("Image"), Description="(description not specified)", Name="a scan", Noc=channels, RecordingDate="2018-05-24 20:36:07.000",
-                Unit=unit, X=7, Y=6, Z=5, ExtMin0="-3.5", ExtMin1="10", ExtMin2="2", ExtMax0="3.5", ExtMax1="22", ExtMax2="17", LensPower="63x",
-                NumericalAperture="1.4", OriginalFormat="Bitplane: Imaris 5.5", ResampleDimensionX="true")
+        letters(info.create_group("Image"), Description="(description not specified)", Name="a scan", Noc=channels,
+                RecordingDate="2018-05-24 20:36:07.000", Unit=unit, X=7, Y=6, Z=5, ExtMin0="-3.5", ExtMin1="10", ExtMin2="2",
+                ExtMax0="3.5", ExtMax1="22", ExtMax2="17", LensPower="63x", NumericalAperture="1.4",
+                OriginalFormat="Bitplane: Imaris 5.5", ResampleDimensionX="true")
         letters(info.create_group("Imaris"), Version="7.0", ThumbnailMode="thumbnailMIP", ThumbnailSize="256")
         letters(info.create_group("Log"), Entries=0)
         stamps = {f"TimePoint{t + 1}": f"2018-05-24 20:36:{7 + 2 * t:02}.500" for t in range(times)}
@@ -147,7 +167,8 @@ def imaris(path, *, channels=2, times=3, dtype="u2", levels=2, unit="um", table=
         for channel in range(channels):
             letters(info.create_group(f"Channel {channel}"), Name=f"dye {channel}", Description="(description not specified)",
                     Color=f"1.000 {0.25 * channel:.3f} 0.000", ColorMode="TableColor" if table else "BaseColor", ColorOpacity="1.000",
-                    ColorRange=f"{5 + channel}.000 250.000", GammaCorrection="1.000", LSMEmissionWavelength="520", LSMExcitationWavelength="488")
+                    ColorRange=f"{5 + channel}.000 250.000", GammaCorrection="1.000", LSMEmissionWavelength="520",
+                    LSMExcitationWavelength="488")
             if table:
                 info[f"Channel {channel}"].create_dataset("ColorTable", data=np.linspace(0, 1, 768))
                 letters(info[f"Channel {channel}"], ColorTableLength=256)

@@ -13,16 +13,21 @@ from hdf5_documents import Hdf5Document, Meanings
 
 FOREIGN_READER_CRASHES = True
 MEANINGS = Meanings(
-    kinds={"NeXus_version": "comment", "nexusformat_version": "comment", "HDF5_Version": "comment", "h5py_version": "comment", "file_name": "comment",
-           "file_time": "date", "creator": "comment", "start_time": "date", "h5_version": "comment", "experiment_identifier": "identifier",
-           "description": "comment", "implements": "comment", "creator_version": "comment", "definition": "comment", "file_format": "comment",
-           "display_mode": "comment"},
-    roles={"scaling_factor": "scale", "offset": "offset", "intensity_scaling_factor": "scale", "intensity_offset": "offset",
-           "depth_scaling_factor": "spacing", "element_size_um": "spacing", "resolution": "spacing", "voxel_size": "spacing",
-           "units": "unit"},
-    names={"signal": ("dataset",), "default": ("dataset",), "NX_class": ("dataset",), "axes": ("axis",), "NAME": ("scale",), "DIMENSION_LABELS": ("labels of dimensions", "axes"), "units": ("coordinates",), "unit": ("spacing",)},
-    words={"units": ("mm", "um", "nm", "m", ["um", "nm", "nm"]), "NX_class": ("NXdata", "NXentry", "NXcollection"), "CLASS": ("DIMENSION_SCALE", "IMAGE"),
-           "interpretation": ("image", "spectrum", "rgba-image"), "key": ("x", "y", "z", "t", "c")})
+    kinds={
+        "NeXus_version": "comment", "nexusformat_version": "comment", "HDF5_Version": "comment", "h5py_version": "comment",
+        "file_name": "comment", "file_time": "date", "creator": "comment", "start_time": "date", "h5_version": "comment",
+        "experiment_identifier": "identifier", "description": "comment", "implements": "comment", "creator_version": "comment",
+        "definition": "comment", "file_format": "comment", "display_mode": "comment"
+    }, roles={
+        "scaling_factor": "scale", "offset": "offset", "intensity_scaling_factor": "scale", "intensity_offset": "offset",
+        "depth_scaling_factor": "spacing", "element_size_um": "spacing", "resolution": "spacing", "voxel_size": "spacing", "units": "unit"
+    }, names={
+        "signal": ("dataset",), "default": ("dataset",), "NX_class": ("dataset",), "axes": ("axis",), "NAME": ("scale",),
+        "DIMENSION_LABELS": ("labels of dimensions", "axes"), "units": ("coordinates",), "unit": ("spacing",)
+    }, words={
+        "units": ("mm", "um", "nm", "m", ["um", "nm", "nm"]), "NX_class": ("NXdata", "NXentry", "NXcollection"),
+        "CLASS": ("DIMENSION_SCALE", "IMAGE"), "interpretation": ("image", "spectrum", "rgba-image"), "key": ("x", "y", "z", "t", "c")
+    })
 METRES = {"m": 1, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 
 
@@ -90,8 +95,10 @@ def cremi(path):
 def voxel_size(path):
     with h5py.File(path, "w") as file:
         made = file.create_dataset("data", data=samples_of((5, 6, 7), ">i4"))
-        made.attrs.update({"voxel_size": np.array([3, 2, 1]), "unit": "um", "CLASS": "IMAGE", "IMAGE_SUBCLASS": "IMAGE_GRAYSCALE",
-                           "IMAGE_VERSION": "1.2", "IMAGE_MINMAXRANGE": np.array([1, 119]), "DISPLAY_ORIGIN": "LL", "IMAGE_WHITE_IS_ZERO": np.uint8(0)})
+        made.attrs.update({
+            "voxel_size": np.array([3, 2, 1]), "unit": "um", "CLASS": "IMAGE", "IMAGE_SUBCLASS": "IMAGE_GRAYSCALE",
+            "IMAGE_VERSION": "1.2", "IMAGE_MINMAXRANGE": np.array([1, 119]), "DISPLAY_ORIGIN": "LL", "IMAGE_WHITE_IS_ZERO": np.uint8(0)
+        })
 
 
 def scales(path):
@@ -125,7 +132,8 @@ def by_nexusformat(path):
             (("z", 1.0 + 2 * np.arange(5)), ("y", 0.5 * np.arange(6)), ("x", 0.25 * np.arange(7)))]
     data = nexus.NXdata(nexus.NXfield(samples_of((5, 6, 7), "i4"), name="counts", units="counts", long_name="Counts"), axes, title="scan")
     detector = nexus.NXdetector(raw=nexus.NXfield(samples_of((5, 6, 7), "i2")))
-    entry = nexus.NXentry(data, start_time="2020-01-01T00:00:00", sample=nexus.NXsample(name="crystal"), instrument=nexus.NXinstrument(detector=detector))
+    entry = nexus.NXentry(data, start_time="2020-01-01T00:00:00", sample=nexus.NXsample(name="crystal"),
+                          instrument=nexus.NXinstrument(detector=detector))
     root = nexus.NXroot(entry)
     root.attrs["default"] = "entry"
     entry.attrs["default"] = "data"
@@ -139,8 +147,10 @@ def by_silx(path):
         file.create_group("entry").attrs.update({"NX_class": "NXentry", "default": "data"})
         file["entry/definition"] = "NXtomoproc"
         plot = file.create_group("entry/data")
-        plot.attrs.update({"NX_class": "NXdata", "signal": "intensity", "axes": ["time", "depth", "row", "col"], "auxiliary_signals": ["other"],
-                           "time_indices": 0, "depth_indices": 1, "row_indices": 2, "col_indices": 3})
+        plot.attrs.update({
+            "NX_class": "NXdata", "signal": "intensity", "axes": ["time", "depth", "row", "col"], "auxiliary_signals": ["other"],
+            "time_indices": 0, "depth_indices": 1, "row_indices": 2, "col_indices": 3
+        })
         plot["intensity"] = samples_of((3, 5, 6, 7), "i2")
         plot["intensity"].attrs.update({"units": "counts", "long_name": "intensity", "interpretation": "image"})
         plot["intensity_errors"] = np.ones((3, 5, 6, 7), "f4")
@@ -149,8 +159,8 @@ def by_silx(path):
                             "depth_scaling_factor": 2.0, "depth_offset": 1.0}.items():
             plot[name] = value
         plot["title"] = "a scan"
-        for name, values, unit in (("time", 2.0 * np.arange(3), "s"), ("depth", 3.0 * np.arange(5), "um"), ("row", 2.0 * np.arange(6), "um"),
-                                   ("col", 5 + 1.0 * np.arange(7), "um")):
+        for name, values, unit in (("time", 2.0 * np.arange(3), "s"), ("depth", 3.0 * np.arange(5), "um"),
+                                   ("row", 2.0 * np.arange(6), "um"), ("col", 5 + 1.0 * np.arange(7), "um")):
             plot[name] = values
             plot[name].attrs.update({"units": unit, "long_name": name})
 
@@ -224,11 +234,12 @@ def read_nexus(path, group, letters):
         return Answer(fields=fields(found.signal[()], letters), places=converted(axes[-3:])[::-1])
 
 
-def sample(name, write, read=None, options="", more=(), document=None):
+def sample(name, write, read, options="", more=(), document=None):
     file = f"{name}.h5"
-    return Sample(name, file + options, lambda folder: write(folder / file),
-                  lambda folder: [Hdf5Document(folder / file, document or name, MEANINGS, numbered=r"^\d+$"), *(make(folder / file) for make in more)],
-                  lambda folder: read(folder / file) if read else None)
+    return Sample(
+        name, file + options, lambda folder: write(folder / file), lambda folder:
+        [Hdf5Document(folder / file, document or name, MEANINGS, numbered=r"^\d+$"), *(make(folder / file) for make in more)],
+        lambda folder: read(folder / file))
 
 
 def samples(_):

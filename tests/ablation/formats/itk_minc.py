@@ -13,17 +13,24 @@ from hdf5_documents import Hdf5Document, Meanings, NetcdfDocument
 from vtk_answers import image_answer
 
 FOREIGN_READER_CRASHES = True
-REMARKS = ("ITKVersion", "HDFVersion", "minc_version", "comments", "version", "full_name", "ITK_FileNotes", "Modality", "RescaleSlope", "MetaData",
-           "patient orientation", "info", "patient", "study", "acquisition", "sex", "modality", "repetition_time", "echo_time")
+REMARKS = ("ITKVersion", "HDFVersion", "minc_version", "comments", "version", "full_name", "ITK_FileNotes", "Modality", "RescaleSlope",
+           "MetaData", "patient orientation", "info", "patient", "study", "acquisition", "sex", "modality", "repetition_time",
+           "echo_time")
 MEANINGS = Meanings(
-    kinds={"ident": "identifier", "vartype": "identifier", "start_time": "date", **{name: "comment" for name in REMARKS}},
-    roles={"Spacing": "spacing", "Origin": "affine", "Directions": "affine", "step": "spacing", "start": "affine", "direction_cosines": "affine",
-           "image-max": "scale", "units": "unit"},
-    names={"Directions": ("direction",), "Origin": ("origin",), "dimorder": ("dimorder", "axes"), "direction_cosines": ("axes", "directions"),
-           "spacing": ("evenly spaced",), **{f"{letter}space": ("axes",) for letter in "xyz"}},
-    words={"units": ("mm", "m", "um"), "signtype": ("signed__", "unsigned"), "spacing": ("regular__", "irregular"), "alignment": ("start_", "end___"),
-           "spacetype": ("native____", "talairach_"), "complete": ("true_", "false"), "class": ("label__", "real___"),
-           "VoxelType": ("FLOAT", "UCHAR")})
+    kinds={"ident": "identifier", "vartype": "identifier", "start_time": "date", **{name: "comment"
+                                                                                    for name in REMARKS}}, roles={
+               "Spacing": "spacing", "Origin": "affine", "Directions": "affine", "step": "spacing", "start": "affine",
+               "direction_cosines": "affine", "image-max": "scale", "units": "unit"
+           },
+    names={
+        "Directions": ("direction",), "Origin": ("origin",), "dimorder": ("dimorder", "axes"),
+        "direction_cosines": ("axes", "directions"), "spacing": ("evenly spaced",), **{f"{letter}space": ("axes",)
+                                                                                       for letter in "xyz"}
+    }, words={
+        "units": ("mm", "m", "um"), "signtype": ("signed__", "unsigned"), "spacing": ("regular__", "irregular"),
+        "alignment": ("start_", "end___"), "spacetype": ("native____", "talairach_"), "complete": ("true_", "false"),
+        "class": ("label__", "real___"), "VoxelType": ("FLOAT", "UCHAR")
+    })
 
 
 def turned():
@@ -67,8 +74,8 @@ STANDARD = {"varid": "MINC standard variable", "vartype": "dimension____", "vers
 
 
 def dimension(name, size, start, step, cosines):
-    said = dict(STANDARD, comments="X increases from patient left to right", spacing="regular__", alignment="centre", units="mm", start=start,
-                step=step, spacetype="native____", length=np.int32(size))
+    said = dict(STANDARD, comments="X increases from patient left to right", spacing="regular__", alignment="centre", units="mm",
+                start=start, step=step, spacetype="native____", length=np.int32(size))
     return said | ({"direction_cosines": np.array(cosines)} if cosines is not None else {})
 
 
@@ -82,21 +89,28 @@ def scanner(path):
     """As dcm2mnc writes it: whole numbers, scaled slice by slice; times."""
     with h5py.File(path, "w") as file:
         root = file.create_group("minc-2.0")
-        root.attrs.update({key: np.bytes_(value) for key, value in (("ident", "somebody:scanner:1"), ("minc_version", "2.4.03"), ("history", "dcm2mnc"),
-                                                                    ("title", "t1"))})
-        for name, said in ({"time": {"units": "s", "start": 0.0, "step": 2.5, "spacing": "regular__", "length": np.int32(3), "comments": "none"}}
-                           | dimensions()).items():
+        root.attrs.update({
+            key: np.bytes_(value)
+            for key, value in (("ident", "somebody:scanner:1"), ("minc_version", "2.4.03"), ("history", "dcm2mnc"), ("title", "t1"))
+        })
+        for name, said in (
+            {"time": {"units": "s", "start": 0.0, "step": 2.5, "spacing": "regular__", "length": np.int32(3), "comments": "none"}}
+                | dimensions()).items():
             made = root.create_dataset(f"dimensions/{name}", data=np.int32(0))
             made.attrs.update({key: np.bytes_(value) if isinstance(value, str) else value for key, value in said.items()})
         made = root.create_dataset("image/0/image", data=voxels((3, 5, 6, 7), "i2"), chunks=(1, 5, 6, 7), compression="gzip")
-        made.attrs.update({"dimorder": np.bytes_("time,zspace,yspace,xspace"), "valid_range": np.array([2.0, 100.0]), "complete": np.bytes_("true_"),
-                           "varid": np.bytes_("MINC standard variable"), "vartype": np.bytes_("group________")})
+        made.attrs.update({
+            "dimorder": np.bytes_("time,zspace,yspace,xspace"), "valid_range": np.array([2.0, 100.0]), "complete": np.bytes_("true_"),
+            "varid": np.bytes_("MINC standard variable"), "vartype": np.bytes_("group________")
+        })
         for name, values in (("image-min", -10.0 - np.arange(15)), ("image-max", 500.0 + 3 * np.arange(15))):
             made = root.create_dataset(f"image/0/{name}", data=values.reshape(3, 5))
             made.attrs["dimorder"] = np.bytes_("time,zspace")
         info = root.create_group("info")
-        for group, values in {"patient": {"full_name": "nobody", "sex": "other_"}, "acquisition": {"repetition_time": 2.5, "echo_time": 0.03},
-                              "study": {"start_time": "2020", "modality": "MRI__"}}.items():
+        for group, values in {
+                "patient": {"full_name": "nobody", "sex": "other_"}, "acquisition": {"repetition_time": 2.5, "echo_time": 0.03},
+                "study": {"start_time": "2020", "modality": "MRI__"}
+        }.items():
             made = info.create_dataset(group, data=np.int32(0))
             made.attrs.update({key: np.bytes_(value) if isinstance(value, str) else value for key, value in values.items()})
 
@@ -111,9 +125,11 @@ def bytes_of_minc1(path):
             file.createVariable(name, "i4", ()).setncatts({key: value for key, value in said.items() if key != "length"})
         made = file.createVariable("image", "i1", ("zspace", "yspace", "xspace"))
         made.set_auto_maskandscale(False)
-        made.setncatts({"parent": "rootvariable", "varid": "MINC standard variable", "vartype": "group________", "version": "MINC Version    1.0",
-                        "complete": "true_", "signtype": "unsigned", "valid_range": np.array([0.0, 250.0]), "image-min": "--->image-min",
-                        "image-max": "--->image-max"})
+        made.setncatts({
+            "parent": "rootvariable", "varid": "MINC standard variable", "vartype": "group________", "version": "MINC Version    1.0",
+            "complete": "true_", "signtype": "unsigned", "valid_range": np.array([0.0, 250.0]), "image-min": "--->image-min",
+            "image-max": "--->image-max"
+        })
         made[...] = (voxels((5, 6, 7), "u1") * 2).view("i1")
         for name, low in (("image-min", -5.0), ("image-max", 100.0)):
             limits = file.createVariable(name, "f8", ("zspace",))
@@ -178,8 +194,8 @@ def sample(name, file, write, read, document, types=()):
     """Types of samples are changed in ITK's files only: in MINC, floats are values and whole numbers are scaled. None for a document: the
     sample alone is compared."""
     kind = name.split("-")[0]
-    return Sample(name, file, lambda folder: write(folder / file), lambda folder: [document(folder / file, kind, types)] if document else [],
-                  lambda folder: read(folder / file))
+    return Sample(name, file, lambda folder: write(folder / file), lambda folder: [document(folder / file, kind, types)]
+                  if document else [], lambda folder: read(folder / file))
 
 
 def samples(_):

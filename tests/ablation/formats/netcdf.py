@@ -11,19 +11,21 @@ from ablation import Answer, Sample
 from hdf5_documents import Hdf5Document, Meanings, NetcdfDocument
 
 FOREIGN_READER_CRASHES = True
-REMARKS = ("Conventions", "standard_name_vocabulary", "frequency", "keywords", "summary", "contact", "project", "step", "unit_long", "geospatial_lat_min",
-           "geospatial_vertical_positive", "cell_methods", "cell_measures", "_NCProperties")
+REMARKS = ("Conventions", "standard_name_vocabulary", "frequency", "keywords", "summary", "contact", "project", "step", "unit_long",
+           "geospatial_lat_min", "geospatial_vertical_positive", "cell_methods", "cell_measures", "_NCProperties")
 MEANINGS = Meanings(
-    kinds={"tracking_id": "identifier", "creation_date": "date", "_Netcdf4Dimid": "identifier", "_Netcdf4Coordinates": "identifier",
+    kinds={"tracking_id": "identifier", "creation_date": "date",
            **{name: "comment" for name in REMARKS}},
     roles={"scale_factor": "scale", "add_offset": "offset", "_FillValue": "fill", "missing_value": "fill", "units": "unit"},
-    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",),
+    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",), "axis": ("axes",),
            "_FillValue": ("as missing_value says",), "positive": ("run down", "running down"), **{f"{name}_bnds": ("bounds",) for name in
                                                                                              ("depth", "lat", "lon")}},
     words={"units": ("km", "m", "mm", "feet"), "positive": ("up", "down"), "axis": ("X", "Y", "Z", "T"), "_Unsigned": ("true", "false"),
            "calendar": ("360_day", "noleap"), "standard_name": ("longitude", "latitude", "time", "depth", "projection_x_coordinate")})
-METRES = {"m": 1, "metres": 1, "meters": 1, "km": 1e3, "kilometers": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9,
-          "feet": 0.3048}
+METRES = {
+    "m": 1, "metres": 1, "meters": 1, "km": 1e3, "kilometers": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9,
+    "feet": 0.3048
+}
 SECONDS = {"seconds": "s", "minutes": "min", "hours": "h", "days": "d"}
 AXES = ("time", "z", "y", "x")
 warnings.filterwarnings("ignore", module="xarray|netCDF4|cf_xarray")
@@ -48,33 +50,49 @@ def ocean(path, engine="netcdf4", file_format="NETCDF4"):
     values = packed((3, 5, 6, 7))
     values[:, 4, :2, :3] = -32767
     data = xarray.Dataset(
-        {"thetao": (("time", "depth", "latitude", "longitude"), values,
-                    {"standard_name": "sea_water_potential_temperature", "long_name": "Temperature", "units": "degrees_C", "cell_methods": "area: mean",
-                     "grid_mapping": "crs", "scale_factor": 0.005, "add_offset": 21.0, "_FillValue": np.int16(-32767), "missing_value": np.int16(-32767),
-                     "valid_min": np.int16(-199), "valid_max": np.int16(190), "coordinates": "mask2d", "ancillary_variables": "quality"}),
-         "mask2d": (("latitude", "longitude"), np.ones((6, 7)), {"standard_name": "sea_area_fraction"}),
-         "depth_bnds": (("depth", "nv"), bounds(depth)),
-         "crs": ((), np.int32(0), {"grid_mapping_name": "latitude_longitude", "semi_major_axis": 6371229.0, "inverse_flattening": 0.0,
-                                   "longitude_of_prime_meridian": 0.0})},
-        coords={"time": ("time", np.array([12.0, 36.0, 60.0]), {"standard_name": "time", "units": "hours since 1950-01-01 00:00:00",
-                                                               "calendar": "gregorian", "axis": "T", "long_name": "Time"}),
-                "depth": ("depth", depth, {"standard_name": "depth", "units": "m", "positive": "down", "axis": "Z", "bounds": "depth_bnds",
-                                           "unit_long": "Meters", "valid_min": 5.0, "valid_max": 45.0}),
-                "latitude": ("latitude", lat.astype("f4"), {"standard_name": "latitude", "units": "degrees_north", "axis": "Y", "step": 0.25}),
-                "longitude": ("longitude", lon.astype("f4"), {"standard_name": "longitude", "units": "degrees_east", "axis": "X", "step": 0.5})},
-        attrs={"Conventions": "CF-1.8", "title": "daily fields", "institution": "an institute", "source": "a model", "history": "made",
-               "references": "none", "comment": "none", "contact": "nobody", "geospatial_lat_min": 58.75, "geospatial_vertical_positive": "down"})
-    data.to_netcdf(path, engine=engine, format=file_format, encoding={key: {"_FillValue": None} for key in data.variables if key != "thetao"})
+        {
+            "thetao": (("time", "depth", "latitude", "longitude"), values, {
+                "standard_name": "sea_water_potential_temperature", "long_name": "Temperature", "units": "degrees_C",
+                "cell_methods": "area: mean", "grid_mapping": "crs", "scale_factor": 0.005, "add_offset": 21.0,
+                "_FillValue": np.int16(-32767), "missing_value": np.int16(-32767), "valid_min": np.int16(-199),
+                "valid_max": np.int16(190), "coordinates": "mask2d", "ancillary_variables": "quality"
+            }), "mask2d": (("latitude", "longitude"), np.ones((6, 7)), {"standard_name": "sea_area_fraction"}),
+            "depth_bnds": (("depth", "nv"), bounds(depth)), "crs": ((), np.int32(0), {
+                "grid_mapping_name": "latitude_longitude", "semi_major_axis": 6371229.0, "inverse_flattening": 0.0,
+                "longitude_of_prime_meridian": 0.0
+            })
+        }, coords={
+            "time": ("time", np.array([12.0, 36.0, 60.0]), {
+                "standard_name": "time", "units": "hours since 1950-01-01 00:00:00", "calendar": "gregorian", "axis": "T",
+                "long_name": "Time"
+            }), "depth": ("depth", depth, {
+                "standard_name": "depth", "units": "m", "positive": "down", "axis": "Z", "bounds": "depth_bnds", "unit_long": "Meters",
+                "valid_min": 5.0, "valid_max": 45.0
+            }),
+            "latitude": ("latitude", lat.astype("f4"), {"standard_name": "latitude", "units": "degrees_north", "axis": "Y",
+                                                        "step": 0.25}),
+            "longitude": ("longitude", lon.astype("f4"),
+                          {"standard_name": "longitude", "units": "degrees_east", "axis": "X", "step": 0.5})
+        }, attrs={
+            "Conventions": "CF-1.8", "title": "daily fields", "institution": "an institute", "source": "a model", "history": "made",
+            "references": "none", "comment": "none", "contact": "nobody", "geospatial_lat_min": 58.75,
+            "geospatial_vertical_positive": "down"
+        })
+    data.to_netcdf(path, engine=engine, format=file_format,
+                   encoding={key: {"_FillValue": None}
+                             for key in data.variables if key != "thetao"})
 
 
 def climate(path):
     """As climate models of CMIP write them: pressure levels, a calendar without leap years, an unlimited dimension."""
     plev = np.array([100000, 92500, 85000, 70000, 50000], "f8")
     with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as file:
-        file.setncatts({"Conventions": "CF-1.7", "frequency": "mon", "tracking_id": "hdl:21.14100/1", "creation_date": "2020-01-01T00:00:00Z"})
+        file.setncatts(
+            {"Conventions": "CF-1.7", "frequency": "mon", "tracking_id": "hdl:21.14100/1", "creation_date": "2020-01-01T00:00:00Z"})
         for name, size in (("time", None), ("plev", 5), ("lat", 6), ("lon", 7), ("bnds", 2)):
             file.createDimension(name, size)
-        coordinates(file, "time", 15.5 + 30 * np.arange(3), units="days since 1850-01-01", calendar="noleap", standard_name="time", axis="T")
+        coordinates(file, "time", 15.5 + 30 * np.arange(3), units="days since 1850-01-01", calendar="noleap", standard_name="time",
+                    axis="T")
         coordinates(file, "plev", plev, units="Pa", positive="down", standard_name="air_pressure", axis="Z")
         coordinates(file, "lat", -40 + 10.0 * np.arange(6), units="degrees_north", standard_name="latitude", axis="Y", bounds="lat_bnds")
         coordinates(file, "lon", 20.0 * np.arange(7), units="degrees_east", standard_name="longitude", axis="X", bounds="lon_bnds")
@@ -103,8 +121,10 @@ def projected(path):
         coordinates(file, "height", 100.0 + 50 * np.arange(5), units="m", positive="up", standard_name="height", axis="Z")
         coordinates(file, "y", 5000.0 * np.arange(6), units="m", standard_name="projection_y_coordinate", axis="Y")
         coordinates(file, "x", -3000.0 + 2500 * np.arange(7), "f4", units="m", standard_name="projection_x_coordinate", axis="X")
-        file.createVariable("lambert", "i4", ()).setncatts(
-            {"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 25.0, "false_easting": 0.0, "longitude_of_central_meridian": 265.0})
+        file.createVariable("lambert", "i4", ()).setncatts({
+            "grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 25.0, "false_easting": 0.0,
+            "longitude_of_central_meridian": 265.0
+        })
         made = file.createVariable("wind", "f8", ("height", "y", "x"))
         made.setncatts({"units": "m s-1", "grid_mapping": "lambert", "valid_range": np.array([271.0, 299.0])})
         made[...] = floats((5, 6, 7))
@@ -122,7 +142,9 @@ def rotated(path):
             made.units = f"degrees_{'north' if name == 'lat' else 'east'}"
             made[...] = floats((6, 7))
         made = file.createVariable("reflectivity", "i1", ("level", "rlat", "rlon"), fill_value=np.int8(-1), zlib=True)
-        made.setncatts({"_Unsigned": "true", "scale_factor": np.float32(0.5), "add_offset": np.float32(-33), "coordinates": "lat lon", "units": "dBZ"})
+        made.setncatts({
+            "_Unsigned": "true", "scale_factor": np.float32(0.5), "add_offset": np.float32(-33), "coordinates": "lat lon", "units": "dBZ"
+        })
         made.set_auto_maskandscale(False)
         values = np.random.default_rng(3).integers(0, 255, (5, 6, 7)).astype("u1")
         values[0, :2] = 255
@@ -170,8 +192,10 @@ def flags(path):
         for name, size in (("z", 5), ("y", 6), ("x", 7)):
             file.createDimension(name, size)
         made = file.createVariable("cloud_type", "i1", ("z", "y", "x"), fill_value=np.int8(-127))
-        made.setncatts({"flag_values": np.array([0, 1, 2, 3], "i1"), "flag_meanings": "clear liquid ice mixed", "standard_name": "cloud_type status_flag",
-                        "valid_range": np.array([0, 3], "i1")})
+        made.setncatts({
+            "flag_values": np.array([0, 1, 2, 3], "i1"), "flag_meanings": "clear liquid ice mixed",
+            "standard_name": "cloud_type status_flag", "valid_range": np.array([0, 3], "i1")
+        })
         made[...] = np.random.default_rng(4).integers(0, 4, (5, 6, 7)).astype("i1")
 
 
@@ -187,7 +211,9 @@ def axes_of(data, dimensions):
                 raise ValueError(f"{name} is two axes")
     found = {name: letter for name, letter in found.items() if name in dimensions}
     for name in dimensions:
-        known = {"level": "z", "depth": "z", "height": "z", "lat": "y", "latitude": "y", "lon": "x", "longitude": "x", "rlat": "y", "rlon": "x"}
+        known = {
+            "level": "z", "depth": "z", "height": "z", "lat": "y", "latitude": "y", "lon": "x", "longitude": "x", "rlat": "y", "rlon": "x"
+        }
         letter = known.get(name, name)
         if name not in found and letter in AXES:
             found[name] = letter
@@ -246,10 +272,16 @@ def read(path, variable):
                       facts={"times": times_of(file, order[0], len(values))} if order[0] in file.variables else {})
 
 
+def inside(path, name, meanings):
+    """As HDF5 has it, but for what netCDF's library keeps for itself."""
+    return Hdf5Document(path, name, meanings, skip=(r"@_Netcdf4",))
+
+
 def sample(name, write, variable, *, document=NetcdfDocument, options=""):
     file = f"{name}.nc"
-    return Sample(name, file + options, lambda folder: write(folder / file), lambda folder: [document(folder / file, "inside" if name == "inside" else "cf", MEANINGS)] if document else [],
-                  lambda folder: read(folder / file, variable))
+    return Sample(name, file + options, lambda folder: write(folder / file),
+                  lambda folder: [document(folder / file, "inside" if name == "inside" else "cf", MEANINGS)]
+                  if document else [], lambda folder: read(folder / file, variable))
 
 
 def samples(_):
@@ -262,5 +294,5 @@ def samples(_):
         sample("unwritten", unwritten, "density", document=None),
         sample("ice", ice, "ice"),
         sample("flags", flags, "cloud_type"),
-        sample("inside", ocean, "thetao", document=Hdf5Document, options="?dataset=thetao"),
+        sample("inside", ocean, "thetao", document=inside, options="?dataset=thetao"),
     ]

@@ -8,16 +8,21 @@ from ablation import Answer, Sample
 from hdf5_documents import Hdf5Document, Meanings
 
 FOREIGN_READER_CRASHES = True
-REMARKS = ("openPMD", "openPMDextension", "softwareDependencies", "sim info", "fieldSmoothing", "minimum", "maximum", "run_comment", "nstep", "usegravity",
-           "xl_boundary_type", "redshift", "corners", "lrefine_max", "splitnumblocks")
+REMARKS = ("openPMD", "openPMDextension", "softwareDependencies", "sim info", "fieldSmoothing", "minimum", "maximum", "run_comment",
+           "nstep", "usegravity", "xl_boundary_type", "redshift", "corners", "lrefine_max", "splitnumblocks")
 MEANINGS = Meanings(
-    kinds={"filenames": "identifier", **{name: "comment" for name in REMARKS}},
-    roles={"gridSpacing": "spacing", "gridGlobalOffset": "affine", "gridUnitSI": "unit", "position": "offset", "unitSI": "scale", "bounding box": "affine"},
-    names={"meshesPath": ("meshes", "mesh"), "basePath": ("data",), "bounding box": ("block", "bounding box"), "refine level": ("level",),
-           "axisLabels": ("axes",), "shape": ("mesh",), "E": ("mesh",), "rho": ("mesh",), "meshes": ("mesh", "data"), "openPMD": ("dataset",),
-           "gridSpacing": ("step along",), "gridUnitSI": ("step along",)},
-    words={"geometry": ("cartesian", "thetaMode", "cylindrical", "spherical"), "dataOrder": ("C", "F"), "axisLabels": (["x", "y", "z"], ["y", "x", "z"]),
-           "iterationEncoding": ("fileBased", "groupBased", "variableBased")})
+    kinds={"filenames": "identifier", **{name: "comment"
+                                         for name in REMARKS}}, roles={
+               "gridSpacing": "spacing", "gridGlobalOffset": "affine", "gridUnitSI": "unit", "position": "offset", "unitSI": "scale",
+               "bounding box": "affine"
+           }, names={
+               "meshesPath": ("meshes", "mesh"), "basePath": ("data",), "bounding box": ("block", "bounding box"),
+               "refine level": ("level",), "axisLabels": ("axes",), "shape": ("mesh",), "E": ("mesh",), "rho": ("mesh",),
+               "meshes": ("mesh", "data"), "openPMD": ("dataset",), "gridSpacing": ("step along",), "gridUnitSI": ("step along",)
+           }, words={
+               "geometry": ("cartesian", "thetaMode", "cylindrical", "spherical"), "dataOrder": ("C", "F"),
+               "axisLabels": (["x", "y", "z"], ["y", "x", "z"]), "iterationEncoding": ("fileBased", "groupBased", "variableBased")
+           })
 
 
 def voxels(shape, dtype="f4", seed=0):
@@ -64,8 +69,11 @@ def store(component, values):
 def fortran(path):
     """Of one iteration, with attributes in the order of Fortran."""
     with h5py.File(path, "w") as file:
-        file.attrs.update({key: np.bytes_(value) for key, value in (("openPMD", "1.1.0"), ("basePath", "/data/%T/"), ("meshesPath", "fields/"),
-                                                                    ("iterationEncoding", "fileBased"), ("iterationFormat", "data%T.h5"))})
+        file.attrs.update({
+            key: np.bytes_(value)
+            for key, value in (("openPMD", "1.1.0"), ("basePath", "/data/%T/"), ("meshesPath", "fields/"),
+                               ("iterationEncoding", "fileBased"), ("iterationFormat", "data%T.h5"))
+        })
         file.attrs["openPMDextension"] = np.uint32(1)
         iteration = file.create_group("data/42")
         iteration.attrs.update({"time": 1.0, "dt": 0.5, "timeUnitSI": 1e-15})
@@ -80,7 +88,8 @@ def stored(path, name):
     """Iterations, and components with samples, of the first of them: openPMD-api leaves out what lacks an attribute."""
     with h5py.File(path) as file:
         iterations = [key for key in file["data"] if key.isdigit()]
-        mesh = next(file[f"data/{iterations[0]}/{group}/{name}"] for group in ("meshes", "fields") if group in file[f"data/{iterations[0]}"])
+        mesh = next(file[f"data/{iterations[0]}/{group}/{name}"] for group in ("meshes", "fields")
+                    if group in file[f"data/{iterations[0]}"])
         return len(iterations), 1 if isinstance(mesh, h5py.Dataset) else sum(isinstance(each, h5py.Dataset) for each in mesh.values())
 
 
@@ -132,12 +141,14 @@ def flash(path):
         boxes, count = np.array(boxes), len(levels)
         file["bounding box"], file["refine level"], file["node type"] = boxes, np.array(levels, "i4"), np.array([2] + [1] * 8, "i4")
         file["coordinates"], file["block size"] = boxes.mean(2), boxes[:, :, 1] - boxes[:, :, 0]
-        file["gid"], file["processor number"], file["which child"] = -np.ones((count, 15), "i4"), np.zeros(count, "i4"), np.arange(count, dtype="i4") % 9
+        file["gid"], file["processor number"], file["which child"] = -np.ones(
+            (count, 15), "i4"), np.zeros(count, "i4"), np.arange(count, dtype="i4") % 9
         file["unknown names"] = np.array([[b"dens"], [b"temp"]])
         for number, name in enumerate(("dens", "temp")):
             made = file.create_dataset(name, data=voxels((count, 2, 4, 6), "f4" if number else "f8", number))
             made.attrs.update({"minimum": np.float64(1), "maximum": np.float64(91)})
-        table(file, "integer scalars", {"nxb": 6, "nyb": 4, "nzb": 2, "dimensionality": 3, "globalnumblocks": count, "nstep": 7, "splitnumblocks": count}, "<i4")
+        table(file, "integer scalars",
+              {"nxb": 6, "nyb": 4, "nzb": 2, "dimensionality": 3, "globalnumblocks": count, "nstep": 7, "splitnumblocks": count}, "<i4")
         table(file, "real scalars", {"time": 0.5, "dt": 0.01, "redshift": 0.0}, "<f8")
         table(file, "string scalars", {"xl_boundary_type": b"periodic"}, "S80")
         table(file, "logical scalars", {"corners": 0}, "<i4")
@@ -145,7 +156,9 @@ def flash(path):
         table(file, "real runtime parameters", {"xmin": -1.0, "xmax": 3.0, "ymin": 0.0, "ymax": 2.0, "zmin": 2.0, "zmax": 5.0}, "<f8")
         table(file, "string runtime parameters", {"geometry": b"cartesian", "pc_unitsbase": b"CGS", "run_comment": b"none"}, "S80")
         table(file, "logical runtime parameters", {"usegravity": 0}, "<i4")
-        info = np.zeros(1, np.dtype([("file format version", "<i4"), ("setup call", "S400"), ("file creation time", "S80"), ("flash version", "S80")]))
+        info = np.zeros(
+            1, np.dtype([("file format version", "<i4"), ("setup call", "S400"), ("file creation time", "S80"),
+                         ("flash version", "S80")]))
         info["file format version"], info["flash version"] = 9, b"FLASH 4.6"
         file["sim info"] = info
 
@@ -184,7 +197,7 @@ def sample(name, write, read, options="", numbered=r"^\d+$", file=None, document
     file = file or f"{name}.h5"
     return Sample(name, file + options, lambda folder: write(folder / file),
                   lambda folder: [Hdf5Document(folder / file, document or name, MEANINGS, numbered=numbered, types=("<f8", ">f4"))],
-                  lambda folder: read(folder / file) if read else None)
+                  lambda folder: read(folder / file))
 
 
 def samples(_):

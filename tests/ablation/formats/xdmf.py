@@ -12,18 +12,21 @@ from vtk_answers import cubes_of_tetrahedra, grid_answer, image_answer
 
 FOREIGN_READER_CRASHES = True
 LATTICE = 5
-WORDS = {"NumberType": ("Float", "Int", "UInt", "Char"), "DataType": ("Float", "Int", "UInt"), "Precision": ("1", "2", "4", "8"),
-         "Format": ("HDF", "XML", "Binary"), "Endian": ("Big", "Little", "Native"), "Center": ("Node", "Cell", "Grid", "Face"),
-         "AttributeType": ("Scalar", "Vector", "Tensor", "GlobalID"), "TopologyType": ("3DCoRectMesh", "3DRectMesh", "3DSMesh", "Tetrahedron"),
-         "GeometryType": ("ORIGIN_DXDYDZ", "VXVYVZ", "XYZ", "X_Y_Z"), "ItemType": ("Uniform", "HyperSlab", "Function"),
-         "CollectionType": ("Temporal", "Spatial"), "GridType": ("Uniform", "Collection", "Tree", "Subset"), "TimeType": ("Single", "HyperSlab", "List", "Range"),
-         "Version": ("2.0", "3.0"), "Function": ("JOIN($0, $1)",)}
+WORDS = {
+    "NumberType": ("Float", "Int", "UInt", "Char"), "DataType": ("Float", "Int", "UInt"), "Precision": ("1", "2", "4", "8"),
+    "Format": ("HDF", "XML", "Binary"), "Endian": ("Big", "Little", "Native"), "Center": ("Node", "Cell", "Grid", "Face"),
+    "AttributeType": ("Scalar", "Vector", "Tensor", "GlobalID"), "TopologyType": ("3DCoRectMesh", "3DRectMesh", "3DSMesh", "Tetrahedron"),
+    "GeometryType": ("ORIGIN_DXDYDZ", "VXVYVZ", "XYZ", "X_Y_Z"), "ItemType": ("Uniform", "HyperSlab", "Function"),
+    "CollectionType": ("Temporal", "Spatial"), "GridType": ("Uniform", "Collection", "Tree", "Subset"),
+    "TimeType": ("Single", "HyperSlab", "List", "Range"), "Version": ("2.0", "3.0"), "Function": ("JOIN($0, $1)",)
+}
 
-
-NAMES = {"Domain": ("grids",), "Attribute": ("array",), "Grid": ("array", "references"), "TopologyType": ("axes", "cells", "GeometryType"),
-         "Dimensions": ("numbers", "is of", "bytes", "components"), "Center": ("array", "points", "cells"), "Name": ("array",),
-         "Precision": ("type", "bytes", "cells with a volume"), "NumberType": ("type",), "DataType": ("type", "cells with a volume"), "Seek": ("bytes",),
-         "include": ("Topology",)}
+NAMES = {
+    "Domain": ("grids",), "Attribute": ("array",), "Grid": ("array", "references"), "TopologyType": ("axes", "cells", "GeometryType"),
+    "Dimensions": ("numbers", "is of", "bytes", "components"), "Center": ("array", "points", "cells"), "Name": ("array",),
+    "Precision": ("type", "bytes", "cells with a volume"), "NumberType": ("type",), "DataType": ("type", "cells with a volume"),
+    "Seek": ("bytes",), "include": ("Topology",)
+}
 
 
 class Xdmf(XmlDocument):
@@ -56,7 +59,10 @@ def text_of(numbers):
 def item(folder, text, values, **attributes):
     """A DataItem in XML."""
     kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind]
-    said = {"Dimensions": " ".join(str(side) for side in values.shape), "NumberType": kind, "Precision": values.dtype.itemsize, "Format": "XML", **attributes}
+    said = {
+        "Dimensions": " ".join(str(side) for side in values.shape), "NumberType": kind, "Precision": values.dtype.itemsize,
+        "Format": "XML", **attributes
+    }
     listed = " ".join(f'{key}="{value}"' for key, value in said.items())
     return f"<DataItem {listed}>{text or text_of(values)}</DataItem>"
 
@@ -83,8 +89,9 @@ def attribute(name, data, kind="Scalar", center="Node"):
 
 
 def save(folder, name, inside, version="2.0", grid='Name="mesh" GridType="Uniform"'):
-    (folder / name).write_text(f'<?xml version="1.0" ?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>\n<Xdmf Version="{version}">\n<Domain>\n<Grid {grid}>'
-                               f"{inside}</Grid>\n</Domain>\n</Xdmf>\n")
+    (folder / name).write_text(
+        f'<?xml version="1.0" ?>\n<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>\n<Xdmf Version="{version}">\n<Domain>\n<Grid {grid}>'
+        f"{inside}</Grid>\n</Domain>\n</Xdmf>\n")
 
 
 def by_vtk(folder):
@@ -103,8 +110,9 @@ def by_vtk(folder):
 
 def cells_of_image(folder):
     """Values of cells; a vector; information that other programs leave; big endian in a binary file."""
-    inside = (even(folder, dimensions="6 7 8") + '<Time Value="1.5"/><Information Name="author" Value="somebody"/>'
-              + attribute("u", hdf(folder, "u", voxels((5, 6, 7, 3))), "Vector", "Cell") + attribute("p", binary(folder, "p.raw", voxels((5, 6, 7))), center="Cell"))
+    inside = (even(folder, dimensions="6 7 8") + '<Time Value="1.5"/><Information Name="author" Value="somebody"/>' +
+              attribute("u", hdf(folder, "u", voxels(
+                  (5, 6, 7, 3))), "Vector", "Cell") + attribute("p", binary(folder, "p.raw", voxels((5, 6, 7))), center="Cell"))
     save(folder, "cells.xmf", inside)
 
 
@@ -113,11 +121,14 @@ def straight(folder):
     larger = voxels((9, 6, 7), "i4")
     with h5py.File(folder / "data.h5", "w") as file:
         file["all"] = larger
-    slab = ('<DataItem ItemType="HyperSlab" Dimensions="5 6 7" Type="HyperSlab">' + item(folder, "3 0 0 1 1 1 5 6 7", np.zeros((3, 3), "i4"))
-            + item(folder, "data.h5:/all", larger, Format="HDF") + "</DataItem>")
-    axes = "".join(item(folder, "", first + step * np.arange(count)) for first, step, count in ((1.0, 0.5, 7), (2.0, 1.0, 6), (3.0, 2.0, 5)))
-    save(folder, "straight.xmf", '<Topology TopologyType="3DRectMesh" Dimensions="5 6 7"/>' f'<Geometry GeometryType="VXVYVZ">{axes}</Geometry>'
-         + attribute("n", slab))
+    slab = ('<DataItem ItemType="HyperSlab" Dimensions="5 6 7" Type="HyperSlab">' +
+            item(folder, "3 0 0 1 1 1 5 6 7", np.zeros(
+                (3, 3), "i4")) + item(folder, "data.h5:/all", larger, Format="HDF") + "</DataItem>")
+    axes = "".join(
+        item(folder, "", first + step * np.arange(count)) for first, step, count in ((1.0, 0.5, 7), (2.0, 1.0, 6), (3.0, 2.0, 5)))
+    save(
+        folder, "straight.xmf", '<Topology TopologyType="3DRectMesh" Dimensions="5 6 7"/>'
+        f'<Geometry GeometryType="VXVYVZ">{axes}</Geometry>' + attribute("n", slab))
 
 
 def times(folder):
@@ -127,7 +138,7 @@ def times(folder):
         shape = even(folder) if number == 0 else ('<Topology Reference="XML">/Xdmf/Domain/Grid/Grid[1]/Topology</Topology>'
                                                   '<Geometry Reference="XML">/Xdmf/Domain/Grid/Grid[1]/Geometry</Geometry>')
         data = binary(folder, f"rho{number}.raw", voxels((5, 6, 7), "i4", number), "<", 0)
-        grids.append(f'<Grid Name="step{number}" GridType="Uniform"><Time Value="{0.25 * number}"/>{shape}{attribute("rho", data)}</Grid>')
+        grids.append(f'<Grid Name="step{number}" GridType="Uniform"><Time Value="{1 + 0.25 * number}"/>{shape}{attribute("rho", data)}</Grid>')
     save(folder, "times.xmf", "".join(grids), grid='Name="series" GridType="Collection" CollectionType="Temporal"')
 
 
@@ -135,7 +146,9 @@ def pieces(folder):
     """Two pieces, side by side along x; numbers in XML."""
     grids = [f'<Grid Name="piece{number}" GridType="Uniform">{even(folder, origin=(30.0, -20.0, 10.0 + 3 * number))}'
              f'{attribute("rho", item(folder, "", voxels((5, 6, 7), "f8", 7)))}</Grid>' for number in range(2)]
-    grids[1] = grids[1].replace(text_of(voxels((5, 6, 7), "f8", 7)), text_of(np.concatenate([voxels((5, 6, 7), "f8", 7)[..., -1:], voxels((5, 6, 6), "f8", 8)], -1)))
+    grids[1] = grids[1].replace(text_of(voxels((5, 6, 7), "f8", 7)),
+                                text_of(np.concatenate([voxels(
+                                    (5, 6, 7), "f8", 7)[..., -1:], voxels((5, 6, 6), "f8", 8)], -1)))
     save(folder, "pieces.xmf", "".join(grids), version="3.0", grid='Name="all" GridType="Collection" CollectionType="Spatial"')
 
 
@@ -152,12 +165,12 @@ def steps(folder):
     with meshio.xdmf.TimeSeriesWriter(folder / "steps.xdmf", data_format="XML") as writer:
         writer.write_points_cells(points, [("tetra", cells)])
         for number in range(3):
-            writer.write_data(0.5 * number, point_data={"T": voxels(len(points), "f8", number)})
+            writer.write_data(1 + 0.5 * number, point_data={"T": voxels(len(points), "f8", number)})
 
 
 def check_known(text):
-    """VTK knows no whole numbers of one or two bytes by Precision, none of eight without a sign, and no other precision than 4 if it is left
-    out; it takes every Time for one of a series."""
+    """VTK knows no whole numbers of one or two bytes by Precision, none of eight without a sign, and no other precision than 4 if it is
+    left out; it takes every Time for one of a series."""
     for item in lxml.etree.fromstring(text).iter("DataItem"):
         kind, precision = item.get("NumberType") or item.get("DataType") or "", item.get("Precision")
         if (kind in ("Int", "UInt") and precision in ("1", "2")) or (kind == "UInt" and precision == "8"):
@@ -258,6 +271,7 @@ def samples(_):
         sample("times", times, image("rho"), "times.xmf", document="times"),
         sample("pieces", pieces, read_pieces, "pieces.xmf", document="pieces"),
         sample("meshio", tetrahedra, cells("T"), "meshioHDF.xdmf", f"?array=T,lattice={LATTICE}", document="meshio"),
-        sample("meshio-binary", lambda folder: tetrahedra(folder, "Binary"), cells("k"), "meshioBinary.xdmf", f"?array=k,lattice={LATTICE}", document="meshio"),
+        sample("meshio-binary", lambda folder: tetrahedra(folder, "Binary"), cells("k"), "meshioBinary.xdmf",
+               f"?array=k,lattice={LATTICE}", document="meshio"),
         sample("steps", steps, read_steps, "steps.xdmf", f"?lattice={LATTICE}", document="steps"),
     ]
