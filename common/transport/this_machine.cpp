@@ -37,7 +37,7 @@ bool NobodyListens(const std::string& text) {
   // On the loopback the answer comes at once, unless a full queue or a firewall swallows the question.
   const timeval patience{1, 0};
   (void)::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
-  const bool refused = ::connect(descriptor, &address.any, sizeof(address)) != 0 && (errno == ECONNREFUSED || errno == ENOENT);
+  const bool refused = ::connect(descriptor, &address.any, sizeof(address.file)) != 0 && (errno == ECONNREFUSED || errno == ENOENT);
   ::close(descriptor);
   return refused;
 }

@@ -285,7 +285,9 @@ TEST_F(ClientTest, AQuestionThatTheServiceKnowsIsAskedOnce) {
     }
     const auto* ping = std::get_if<ClientPing>(&message);
     if (ping == nullptr) return {};
-    if (nonce != 0) EXPECT_THAT(ping->asked, testing::ElementsAre(nonce));
+    if (nonce != 0) {
+      EXPECT_THAT(ping->asked, testing::ElementsAre(nonce.load()));
+    }
     if (++pings < 10) return {{PongTo(*ping), {}}};
     return {{SummaryReply{.nonce = nonce}, {}}};
   });
