@@ -4,7 +4,8 @@
 // be known before it begins.
 //
 // A member that had nothing to do has not saved up time. It counts as if it had used at least as much as the last member in turn had used
-// when that turn began.
+// when that turn began, less a credit. The credit makes up for short waits: a member that waits for something else between its demands, and
+// so misses its turns, has them later.
 // Pure; one thread.
 #pragma once
 
@@ -20,6 +21,8 @@ namespace slabstream {
 template <class Member>
 class FairTurns {
  public:
+  explicit FairTurns(Duration credit = {}) : credit_(credit) {}
+
   // A member's place in the order of turns. The smallest one is next.
   struct Turn {
     Duration used{};
@@ -31,7 +34,7 @@ class FairTurns {
   void Join(const Member& member) { turns_[member] = {TurnOf(member).used, ++count_}; }
   Turn TurnOf(const Member& member) const {
     const auto known = turns_.find(member);
-    return known == turns_.end() ? Turn{used_by_last_, 0} : Turn{std::max(known->second.used, used_by_last_), known->second.last};
+    return known == turns_.end() ? Turn{used_by_last_, 0} : Turn{std::max(known->second.used, used_by_last_ - credit_), known->second.last};
   }
 
   void Take(const Member& member) {  // its turn begins
@@ -44,16 +47,18 @@ class FairTurns {
   }
 
   void Forget(const Member& member) { turns_.erase(member); }
-  // Forgets members that have nothing to do and have used no more than the last one in turn: to remember them would change no turn.
+  // Forgets members that have nothing to do and have used no more than the last one in turn, less the credit. Without credit, to remember
+  // them would change no turn; with it, they come back as if they were new.
   template <class Busy>
   void ForgetIdle(Busy&& busy) {
-    std::erase_if(turns_, [&](const auto& entry) { return entry.second.used <= used_by_last_ && !busy(entry.first); });
+    std::erase_if(turns_, [&](const auto& entry) { return entry.second.used <= used_by_last_ - credit_ && !busy(entry.first); });
   }
   void ForgetAll() { turns_.clear(); }  // nobody has anything to do: the next ones begin as equals
   std::size_t size() const { return turns_.size(); }
 
  private:
   std::map<Member, Turn> turns_;
+  Duration credit_;
   Duration used_by_last_{};  // by the last member in turn, when its turn began
   std::uint64_t count_ = 0;
 };

@@ -44,10 +44,10 @@ void DeadlineForecast::End(FrameId id, Ended how, Time now) {
   if (how != Ended::kGivenUp && costs_.size() >= kMostKinds && !costs_.contains(frame.kind)) costs_.clear();
   if (how == Ended::kDone) {
     Costs& costs = costs_[frame.kind];
-    costs = {.latest = cost, .before = costs.latest};
+    costs = {.latest = cost, .before = costs.latest, .least = std::min(cost, costs.latest)};
   } else if (how == Ended::kLate) {
-    const Duration least = std::max(Expected(frame.kind), kLateCosts * cost);
-    costs_[frame.kind] = {.latest = least, .before = least};
+    const Duration guess = std::max(Expected(frame.kind), kLateCosts * cost);
+    costs_[frame.kind] = {.latest = guess, .before = guess, .least = std::max(Least(frame.kind), cost)};
   }
   free_since = shared_;
   if (--clients_[frame.client] == 0) {
@@ -62,21 +62,26 @@ Duration DeadlineForecast::Expected(FrameKind kind) const {
   return known == costs_.end() ? Duration::zero() : std::min(known->second.latest, known->second.before);
 }
 
-std::vector<DeadlineForecast::Remaining> DeadlineForecast::Remainders(Time now) const {
+Duration DeadlineForecast::Least(FrameKind kind) const {
+  const auto known = costs_.find(kind);
+  return known == costs_.end() ? Duration::zero() : known->second.least;
+}
+
+std::vector<DeadlineForecast::Remaining> DeadlineForecast::Remainders(Time now, CostOf cost) const {
   const Duration shared = Shared(now);
   std::vector<Remaining> all;
   all.reserve(running_.size());
   for (const auto& [id, running] : running_) {
     const auto idle = idle_since_.find(running.frame.client);
     const Duration begun = idle == idle_since_.end() ? running.begun : std::max(running.begun, idle->second);
-    all.push_back({&running.frame, std::max(Expected(running.frame.kind) - (shared - begun), Duration::zero())});
+    all.push_back({&running.frame, std::max((this->*cost)(running.frame.kind) - (shared - begun), Duration::zero())});
   }
   return all;
 }
 
 Duration DeadlineForecast::Left(Time now) const {
   Duration left{};
-  for (const Remaining& each : Remainders(now)) left += each.cost;
+  for (const Remaining& each : Remainders(now, &DeadlineForecast::Least)) left += each.cost;
   return left;
 }
 
@@ -84,7 +89,7 @@ bool DeadlineForecast::MayBegin(const Frame& frame, Time now) const {
   const Duration cost = Expected(frame.kind);
   const bool alone = std::ranges::all_of(clients_, [&](const auto& each) { return each.first == frame.client; });
   if (alone || cost == Duration::zero()) return true;
-  const std::vector<Remaining> running = Remainders(now);
+  const std::vector<Remaining> running = Remainders(now, &DeadlineForecast::Expected);
   if (now + TimeAmong(cost, running) > frame.deadline) return false;
   return std::ranges::none_of(running, [&](const Remaining& each) {
     if (each.frame->client == frame.client || each.frame->used > frame.used) return false;

@@ -4,8 +4,9 @@
 // Workers share their time equally among the clients whose frames run (RenderQueue), so a frame that runs beside those of n - 1 other
 // clients gets an n-th of it (processor sharing; L. Kleinrock, 1967). The cost of a frame is the time that it gets: what it would take
 // alone. Frames of one kind are expected to cost what the cheaper one of the latest two did, since the other one may have waited for its
-// voxels. A frame that was late has cost more than was measured, so its kind is expected to cost four times that. A kind that is not known
-// yet costs nothing: its frames always begin. So do those of a client that is alone. Pure; one thread.
+// voxels. A frame that was late has cost more than was measured, so its kind is expected to cost four times that. That is a guess, by which
+// frames wait; what was measured is known, and by it requests are refused. A kind that is not known yet costs nothing: its frames always
+// begin. So do those of a client that is alone. Pure; one thread.
 #pragma once
 
 #include <cstdint>
@@ -40,7 +41,8 @@ class DeadlineForecast {
   bool MayBegin(const Frame& frame, Time now) const;
 
   Duration Expected(FrameKind kind) const;  // its cost; zero: not known
-  Duration Left(Time now) const;            // what the running frames still cost
+  Duration Least(FrameKind kind) const;     // that as far as it was measured: of late frames it was no guess
+  Duration Left(Time now) const;            // what the running frames still cost at least
 
   static constexpr std::size_t kMostKinds = 1024;  // beyond, all are forgotten
 
@@ -57,7 +59,8 @@ class DeadlineForecast {
   // What each client whose frames run has got since the start.
   Duration Shared(Time now) const;
   void Count(Time now);  // clients_ is about to change
-  std::vector<Remaining> Remainders(Time now) const;
+  using CostOf = Duration (DeadlineForecast::*)(FrameKind) const;
+  std::vector<Remaining> Remainders(Time now, CostOf cost) const;
 
   std::map<FrameId, Running> running_;
   std::map<PeerToken, std::size_t> clients_;  // with so many running frames
@@ -65,7 +68,7 @@ class DeadlineForecast {
   Duration shared_{};
   Time counted_;  // up to when shared_ is
   struct Costs {
-    Duration latest{}, before{};
+    Duration latest{}, before{}, least{};
   };
   std::unordered_map<FrameKind, Costs> costs_;
 };

@@ -356,7 +356,7 @@ bool FrameMachine::State::MayBegin(const OpenRequest& request) const {
   return request.coarse || forecast.MayBegin({request.client, request.kind, request.deadline(), queue.UsedBy(request.client)}, now);
 }
 
-// Requests that could not be in time even if everything cost half as much as is expected. Clients that ask for too much hear it at once,
+// Requests that could not be in time even if everything cost half as much as was measured. Clients that ask for too much hear it at once,
 // rather than at the deadline.
 void FrameMachine::State::RefuseLate() {
   if (!std::exchange(forecast_due, false) || frames.size() == 0) return;
@@ -366,7 +366,7 @@ void FrameMachine::State::RefuseLate() {
   std::map<UseId, Duration> late;  // when they would be ready
   Duration ahead = forecast.Left(now);
   queue.VisitInTurn([&](const OpenRequest& request) {
-    const Duration cost = request.coarse ? Duration::zero() : forecast.Expected(request.kind);
+    const Duration cost = request.coarse ? Duration::zero() : forecast.Least(request.kind);
     if (cost == Duration::zero()) return true;
     if (now + (ahead + cost) / 2 > request.deadline()) {
       late.emplace(request.use, ahead + cost);

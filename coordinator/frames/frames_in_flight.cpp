@@ -90,18 +90,34 @@ bool FramesInFlight::MayStart(PeerToken client, const PlanMade& plan, std::size_
   return bytes <= kWindowBytes + window.frames * largest;
 }
 
+// A worker that holds f frames such as one holds as many groups of it (HasRoomFor).
+bool FramesInFlight::HasRoomForGroup(const RunningFrame& of) const {
+  double taken = 1.0 / of.fit();
+  std::int64_t bytes = FrameBytes(of.plan().setup);
+  for (const RunningFrame& frame : frames_) {
+    const std::uint32_t groups = std::max(frame.unfinished_groups(), 1U);
+    taken += double(groups) / frame.fit();
+    bytes += groups * FrameBytes(frame.plan().setup);
+  }
+  return taken <= of.plan().turn.teams && bytes <= kWindowBytes;
+}
+
 RunningFrame* FramesInFlight::NextToHandOut(std::size_t workers) {
   if (RunningFrame* const tried = OnTrial()) return tried->CanHandOut() ? tried : nullptr;
   const FrameWindow window = Window(workers);
   const bool full = unfinished_groups() >= std::uint32_t(window.groups);
-  const auto waits = [this](PeerToken client) {
-    return std::ranges::none_of(
-        frames_, [client](const RunningFrame& frame) { return frame.request().client == client && frame.unfinished_groups() > 0; });
+  const auto on_their_way = [this](PeerToken client) {
+    std::uint32_t groups = 0;
+    for (const RunningFrame& frame : frames_) groups += frame.request().client == client ? frame.unfinished_groups() : 0;
+    return groups;
+  };
+  const auto may_go_beyond = [&](const RunningFrame& frame) {
+    const std::uint32_t groups = on_their_way(frame.request().client);
+    return groups == 0 || (groups == 1 && HasRoomForGroup(frame));
   };
   const auto next = std::ranges::find_if(frames_, [&](const RunningFrame& frame) {
     const bool masked = UsesOcclusion(frame.plan().setup);
-    return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups)) &&
-           (!full || waits(frame.request().client));
+    return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups)) && (!full || may_go_beyond(frame));
   });
   return next == frames_.end() ? nullptr : &*next;
 }

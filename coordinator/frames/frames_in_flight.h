@@ -1,7 +1,8 @@
 // FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. The window (common/planning/frame_window.h)
 // limits the running frames and their groups. But no client waits because of the frames of others. A client without a frame may have one
-// frame beyond the window, as far as memory allows. A client without a group on its way may have one group beyond the window. Workers share
-// their time among clients.
+// frame beyond the window, as far as memory allows. A client without a group on its way may have one group beyond the window, and a second
+// one as far as memory allows: voxels of the next group are read, and workers that are done with theirs go on, while the first one is
+// rendered. Workers share their time among clients.
 #pragma once
 
 #include <list>
@@ -49,6 +50,7 @@ class FramesInFlight {
  private:
   FrameWindow Window(std::size_t workers) const;
   std::uint32_t unfinished_groups() const;
+  bool HasRoomForGroup(const RunningFrame& of) const;  // beyond the window
 
   std::list<RunningFrame> frames_;  // references stay valid
   std::vector<FrameId> over_;       // not smaller than finished_before(), ascending

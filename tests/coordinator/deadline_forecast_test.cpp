@@ -118,6 +118,21 @@ TEST(DeadlineForecast, OneFrameThatTookLongMeansNothing) {
   EXPECT_EQ(forecast.Expected(kKind), milliseconds(100));
 }
 
+// Four times what was measured is a guess: frames wait by it, but nobody is refused by it.
+TEST(DeadlineForecast, OfALateFrameItIsKnownWhatWasMeasured) {
+  DeadlineForecast forecast;
+  for (PeerToken client = 1; client <= 4; ++client) forecast.Begin(client, {client, kKind, At(120), {}}, At(0));
+  for (PeerToken client = 1; client <= 4; ++client) forecast.End(client, Ended::kLate, At(120));
+  EXPECT_EQ(forecast.Expected(kKind), seconds(120));
+  EXPECT_EQ(forecast.Least(kKind), seconds(30));
+  forecast.Begin(5, {1, kKind, At(320), {}}, At(200));
+  EXPECT_EQ(forecast.Left(At(200)), seconds(30));
+  EXPECT_FALSE(forecast.MayBegin({2, kKind, At(320), {}}, At(200)));
+  forecast.End(5, Ended::kDone, At(201));
+  EXPECT_EQ(forecast.Expected(kKind), seconds(1));
+  EXPECT_EQ(forecast.Least(kKind), seconds(1));
+}
+
 class TwoClients : public testing::Test {
  protected:
   // Frames cost 1 s.

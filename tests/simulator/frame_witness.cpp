@@ -113,8 +113,8 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
   // While frames wait for their next attempt, the groups of the last one, which may have had the window to itself, are still out but no
   // longer counted.
   const FrameWindow window = WindowFor(workers, std::uint32_t(teams), FrameBytes(assignment.setup));
-  if (of_client > 1) {  // the first one may be beyond the window, as may be those of others
-    const std::size_t beyond = OthersThan(assignment.client);
+  if (of_client > 2) {  // the first two may be beyond the window, as may be those of others
+    const std::size_t beyond = 2 * OthersThan(assignment.client);
     const std::size_t counted = std::size_t(window.groups), waiting = std::size_t(window.frames) - 1 + beyond;
     EXPECT_LE(unfinished, counted + (faultless_ ? 0 : counted * waiting) + beyond);
   }

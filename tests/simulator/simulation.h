@@ -8,7 +8,7 @@
 //   all groups of a frame are of the same voxels, in every attempt, and those stay until its end, whatever becomes of the file
 //   where only stores misbehave, errors say which store, and why
 //   no image is left, read after its release or released twice; no padded box is rendered from before it is complete; credits are kept
-//   no more groups are unfinished at a time than the window allows, but for one of each other client, nor of one frame with masks
+//   no more groups are unfinished at a time than the window allows, but for two of each other client, nor of one frame with masks
 //   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is
 //     finished, as long as a worker is there all the time
 //   where everybody stops at once, or the coordinator's clock jumps, and nothing else: no frame needs a second attempt

@@ -2,7 +2,8 @@
 // the other, in order of frame, group and rank. The next one is the first whose boxes are complete: its padded box, and those of the light
 // volumes and of the other fields that the frame shows; and whose frame awaits no tiles. The clients take turns of at least kTurn. The next
 // turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a client's turn is
-// over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
+// over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody. And a frame of many
+// boxes gets its share: turns that it misses while it waits for voxels or for other workers, it has later, up to kCredit.
 //
 // A render that is told to pause stops only between two of its pieces. A render that is cancelled ends soon, but not at once. So other
 // renders run beside it for a moment. Renders of several clients, paused ones included, use the same padded box at the same time, as long
@@ -24,7 +25,7 @@ namespace slabstream {
 
 class RenderQueue {
  public:
-  static constexpr Duration kTurn = std::chrono::milliseconds(10);
+  static constexpr Duration kTurn = std::chrono::milliseconds(10), kCredit = 20 * kTurn;
 
   // Both must outlive the queue.
   RenderQueue(BoxFetcher& boxes, ImageNames& names) : boxes_(boxes), names_(names) {}
@@ -98,7 +99,7 @@ class RenderQueue {
   std::map<FrameId, Awaited> tiles_;
   std::map<ClientId, Begun> begun_;  // at most one of a client; all but that of the client whose turn it is are paused or dropped
   std::optional<TurnNow> turn_;
-  FairTurns<ClientId> turns_;
+  FairTurns<ClientId> turns_{kCredit};
 };
 
 }  // namespace slabstream

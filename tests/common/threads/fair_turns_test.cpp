@@ -137,5 +137,28 @@ TEST(FairTurns, ForgettingThoseWhoHaveNothingToMakeUpForChangesNoTurn) {
   EXPECT_LT(turns.TurnOf(2), turns.TurnOf(1));
 }
 
+// A member that waits for something between its demands has the turns that it has missed, up to the credit. After a longer absence it is
+// new.
+TEST(FairTurns, WithCreditTurnsThatWereMissedComeLater) {
+  constexpr Duration kTurn = std::chrono::milliseconds(10);
+  FairTurns<int> turns(5 * kTurn);
+  const auto take = [&](int member) {
+    turns.Take(member);
+    turns.Charge(member, kTurn);
+    turns.ForgetIdle([](int each) { return each == 2; });
+  };
+  turns.Join(1);
+  turns.Join(2);
+  take(1);
+  for (int i = 0; i < 4; ++i) take(2);
+  turns.Join(1);
+  int missed = 0;
+  for (; turns.TurnOf(1) < turns.TurnOf(2); ++missed) take(1);
+  EXPECT_EQ(missed, 3);
+  for (int i = 0; i < 20; ++i) take(2);
+  turns.Join(1);
+  EXPECT_EQ(turns.TurnOf(2).used - turns.TurnOf(1).used, kTurn) << "as if it had not been there before";
+}
+
 }  // namespace
 }  // namespace slabstream
