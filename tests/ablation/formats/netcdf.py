@@ -14,12 +14,11 @@ FOREIGN_READER_CRASHES = True
 REMARKS = ("Conventions", "standard_name_vocabulary", "frequency", "keywords", "summary", "contact", "project", "step", "unit_long",
            "geospatial_lat_min", "geospatial_vertical_positive", "cell_methods", "cell_measures", "_NCProperties")
 MEANINGS = Meanings(
-    kinds={"tracking_id": "identifier", "creation_date": "date",
-           **{name: "comment" for name in REMARKS}},
+    kinds={"tracking_id": "identifier", "creation_date": "date", **{name: "comment" for name in REMARKS}},
     roles={"scale_factor": "scale", "add_offset": "offset", "_FillValue": "fill", "missing_value": "fill", "units": "unit"},
-    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",), "axis": ("axes",),
-           "_FillValue": ("as missing_value says",), "positive": ("run down", "running down"), **{f"{name}_bnds": ("bounds",) for name in
-                                                                                             ("depth", "lat", "lon")}},
+    names={"valid_min": ("valid range",), "valid_max": ("valid range",), "valid_range": ("valid range",), "units": ("coordinates",),
+           "axis": ("axes",), "_FillValue": ("as missing_value says",), "positive": ("run down", "running down"),
+           **{f"{name}_bnds": ("bounds",) for name in ("depth", "lat", "lon")}},
     words={"units": ("km", "m", "mm", "feet"), "positive": ("up", "down"), "axis": ("X", "Y", "Z", "T"), "_Unsigned": ("true", "false"),
            "calendar": ("360_day", "noleap"), "standard_name": ("longitude", "latitude", "time", "depth", "projection_x_coordinate")})
 METRES = {
