@@ -21,18 +21,29 @@ ROLES = {"RescaleSlope": "scale", "RescaleIntercept": "offset", "DoseGridScaling
          "DoseUnits": "unit", "PixelSpacing": "spacing", "SpacingBetweenSlices": "spacing", "GridFrameOffsetVector": "spacing",
          "ImagePositionPatient": "affine", "ImageOrientationPatient": "affine", "RealWorldValueSlope": "scale",
          "RealWorldValueIntercept": "offset", "MaximumFractionalValue": "scale"}
-NAMES = {"ImagePositionPatient": ("position",), "ImageOrientationPatient": ("orientation", "direction"), "PixelSpacing": ("spacing",),
-         "Rows": ("pixels",), "Columns": ("pixels",), "NumberOfFrames": ("frames",), "SamplesPerPixel": ("colour", "samples a pixel"),
-         "PhotometricInterpretation": ("colour",), "PixelData": ("pixels",), "FloatPixelData": ("pixels", "Pixel Data"),
+NAMES = {"ImagePositionPatient": ("position", "slices"), "ImageOrientationPatient": ("orientation", "direction"), "PixelSpacing": ("spacing",),
+         "Rows": ("pixels", "sizes"), "Columns": ("pixels", "sizes"), "NumberOfFrames": ("frames", "single slice"), "SamplesPerPixel": ("colour", "samples a pixel"),
+         "PhotometricInterpretation": ("colour", "MONOCHROME"), "PixelData": ("pixels",), "FloatPixelData": ("pixels", "Pixel Data"),
          "TransferSyntaxUID": ("transfer syntax",), "ImageType": ("localizer", "mosaic", "type"), "BitsAllocated": ("bits", "bytes of pixels"),
-         "SegmentNumber": ("segment",), "ReferencedSegmentNumber": ("segment",), "SeriesInstanceUID": ("series",),
+         "SegmentNumber": ("segment",), "SegmentIdentificationSequence": ("segment",), "SegmentLabel": ("labels",),
+         "PixelRepresentation": ("type", "int8"), "DetectorInformationSequence": ("place",), "ReferencedSegmentNumber": ("segment",), "SeriesInstanceUID": ("series",),
          "SOPInstanceUID": ("copies", "copy"), "SliceVector": ("slice",), "ModalityLUTSequence": ("Modality LUT",),
          "PlanePositionSequence": ("position",), "PlaneOrientationSequence": ("orientation", "direction"),
          "PixelMeasuresSequence": ("spacing",), "PerFrameFunctionalGroupsSequence": ("position", "frame"),
          "SharedFunctionalGroupsSequence": ("orientation", "spacing")}
 SYNTAXES = {"implicit": ImplicitVRLittleEndian, "big endian": ExplicitVRBigEndian, "deflated": DeflatedExplicitVRLittleEndian, "RLE": RLELossless}
 COMMON_GROUPS = (0x0002, 0x0008, 0x0010, 0x0032, 0x0040)
-OF_KIND = ("ImageType", "SOPClassUID", "Modality")  # of these groups, what depends on the kind of object
+OF_KIND = ("ImageType", "SOPClassUID")  # of these groups, what depends on the kind of object
+# Of other groups: series, equipment, frame of reference, pixels (PS3.3 C.7.3 to C.7.6).
+COMMON = ("AcquisitionNumber", "InstanceNumber", "Laterality", "PositionReferenceIndicator", "StudyID", "StudyInstanceUID", "SeriesNumber",
+          "SeriesInstanceUID", "FrameOfReferenceUID", "SoftwareVersions", "DeviceSerialNumber", "ProtocolName", "BodyPartExamined", "PatientPosition",
+          "BurnedInAnnotation", "LossyImageCompression", "SamplesPerPixel", "PhotometricInterpretation", "Rows", "Columns", "SliceThickness",
+          "ContentLabel", "ContentDescription", "ContentCreatorName")
+
+
+def is_common(element, keyword):
+    return keyword in COMMON or (element.tag.group in COMMON_GROUPS and keyword not in OF_KIND)
+
 
 
 def plain_value(element):
@@ -92,7 +103,7 @@ class DicomDocument(Document):
             if element.tag.element == 0:
                 continue  # lengths of groups, which the writer counts
             keyword = name_of(element.tag)
-            shared = not path and element.tag.group in COMMON_GROUPS and keyword not in OF_KIND
+            shared = not path and not self.groups and is_common(element, keyword)
             if shared and not self.common:
                 continue
             here = f"{path or ('common' if shared else self.name)}/{keyword}"

@@ -1,5 +1,7 @@
 """DICOM by pydicom: series of files, enhanced multi-frame objects, dose, segmentations, SPECT. The foreign reader is pydicom; voxels are placed
 by the standard (PS3.3 C.7.6.2, C.7.6.16, C.8.8.3, C.8.4.15), and values are those of the Modality LUT (C.11.1)."""
+import collections
+
 import numpy as np
 import pydicom
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
@@ -442,8 +444,13 @@ def no_key(_ds, _frame):
     return 0
 
 
-def read(paths, key=no_key, as_channels=False):
-    frames = [frame for path in paths for frame in frames_of(pydicom.dcmread(path), key)]
+def read(paths, key=no_key, as_channels=False, segmentation=None):
+    """The series with most files."""
+    sets = [pydicom.dcmread(path) for path in paths]
+    if segmentation and sets[0].SegmentationType != segmentation:
+        raise ValueError("SegmentationType")
+    series = collections.Counter(str(ds.get("SeriesInstanceUID", "")) for ds in sets).most_common(1)[0][0]
+    frames = [frame for ds in sets if str(ds.get("SeriesInstanceUID", "")) == series for frame in frames_of(ds, key)]
     keys = sorted({frame["key"] for frame in frames})
     stacks = [stack([frame for frame in frames if frame["key"] == value]) for value in keys]
     if any(not np.allclose(affine, stacks[0][1], atol=1e-4) or values.shape != stacks[0][0].shape for values, affine in stacks):
@@ -454,7 +461,7 @@ def read(paths, key=no_key, as_channels=False):
 
 def read_binary(paths):
     """Segments as labels."""
-    segments = read(paths, segment_of, as_channels=True)
+    segments = read(paths, segment_of, as_channels=True, segmentation="BINARY")
     numbers = sorted({segment_of(pydicom.dcmread(path), frame) for path in paths for frame in range(2 * SLICES)})
     labels = sum(number * segments.fields[0, i] for i, number in enumerate(numbers))
     return Answer(fields={(0, 0): labels}, affine=segments.affine)
@@ -484,7 +491,7 @@ def series(name, kind, write, key=no_key):
     """Of files: what all of them say, and what one of them says otherwise."""
     def documents(folder):
         paths = sorted((folder / "study").iterdir())
-        return [DicomDocument(paths, kind, kind == "ct"), DicomDocument(paths[:1], f"{kind}-slice", groups=SLICE_GROUPS)]
+        return [DicomDocument(paths, kind, kind == "ct"), DicomDocument(paths[:1], "slice", groups=SLICE_GROUPS)]
 
     def make(folder):
         (folder / "study").mkdir()
@@ -511,8 +518,9 @@ def samples(_):
         single("dose-absolute", "dose", lambda folder: write_dose(folder, 20.0)),
         single("seg-binary", "segments", lambda folder: write_segmentation(folder, "BINARY"), read_binary),
         single("seg-fractional", "segments", lambda folder: write_segmentation(folder, "FRACTIONAL"),
-               lambda paths: read(paths, segment_of, as_channels=True)),
-        single("seg-labelmap", "segments", lambda folder: write_segmentation(folder, "LABELMAP")),
+               lambda paths: read(paths, segment_of, as_channels=True, segmentation="FRACTIONAL")),
+        single("seg-labelmap", "segments", lambda folder: write_segmentation(folder, "LABELMAP"),
+               lambda paths: read(paths, segmentation="LABELMAP")),
         single("parametric", "parametric", write_parametric),
         single("spect", "spect", write_spect),
     ]

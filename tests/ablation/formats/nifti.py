@@ -8,9 +8,9 @@ from documents import HeaderDocument
 KINDS = {"descrip": "comment", "aux_file": "comment", "db_name": "comment", "intent_name": "comment"}
 ROLES = {"scl_slope": "scale", "scl_inter": "offset", "pixdim": "spacing", "xyzt_units": "unit", "srow_x": "affine", "srow_y": "affine",
          "srow_z": "affine", "qoffset_x": "affine"}
-NAMES = {"dim": ("size", "dimension", "bytes"), "srow_x": ("sform",), "srow_y": ("sform",), "srow_z": ("sform",), "quatern_b": ("qform",),
+NAMES = {"dim": ("size", "dimension", "bytes", "channels", "times"), "srow_x": ("sform",), "srow_y": ("sform",), "srow_z": ("sform",), "quatern_b": ("qform",),
          "quatern_c": ("qform",), "quatern_d": ("qform",), "qoffset_x": ("qform",), "qoffset_y": ("qform",), "qoffset_z": ("qform",),
-         "vox_offset": ("offset", "truncated"), "magic": ("n+1", "ni1", "NIfTI"), "sizeof_hdr": ("NIfTI",), "datatype": ("type",), "bitpix": ("bits",),
+         "vox_offset": ("offset", "truncated"), "magic": ("n+1", "ni1", "NIfTI"), "sizeof_hdr": ("NIfTI",), "datatype": ("type", "truncated"), "bitpix": ("bits",),
          "qform_code": ("qform", "sform"), "sform_code": ("qform", "sform")}
 COLOUR = np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")])
 TYPES = (np.uint8, np.int16, np.int32, np.float32, np.float64)
@@ -158,6 +158,8 @@ def read_spacing(path):
 def read(path):
     """As nibabel has it, in mm: it does not convert units."""
     loaded = nibabel.load(path)
+    if path.suffix == ".nii" and float(nibabel.load(path).dataobj.offset) < 348:
+        raise ValueError("nibabel takes the header for samples")
     if loaded.get_data_dtype().fields:
         parts = np.asanyarray(loaded.dataobj)
         data = np.stack([parts[name].astype(float) for name in parts.dtype.names], axis=-1)[:, :, :, np.newaxis]

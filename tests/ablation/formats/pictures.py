@@ -119,6 +119,8 @@ def read_pictures(folder, ending):
     loaded = []
     for path in sorted(folder.glob(f"*.{ending}")):
         image = Image.open(path)
+        if ending == "bmp" and image.tile[0][2] != struct.unpack_from("<I", path.read_bytes(), 10)[0]:
+            raise ValueError("Pillow finds the samples elsewhere than the header says")
         if image.mode in ("P", "PA"):
             image = image.convert("RGBA" if "transparency" in image.info else "RGB")
             array = np.asarray(image)
@@ -167,9 +169,11 @@ def read_bov(path):
     origin = np.array([float(v) for v in said.get("BRICK_ORIGIN", "0 0 0").split()])
     zonal = said.get("CENTERING", "nodal").lower() == "zonal"
     step = length / (np.array(size) if zonal else np.array(size) - 1)
+    if np.any(step <= 0):
+        raise ValueError("BRICK_SIZE")
     affine = np.eye(4)
     affine[:3, :3], affine[:3, 3] = np.diag(step), origin + (step / 2 if zonal else 0)
-    return Answer(fields={(0, c): stored[..., c].transpose(2, 1, 0) for c in range(components)}, affine=affine if np.all(step > 0) else None)
+    return Answer(fields={(0, c): stored[..., c].transpose(2, 1, 0) for c in range(components)}, affine=affine)
 
 
 # Samples.
