@@ -1,4 +1,4 @@
-"""Pictures: the chunks of PNG, the segments of JPEG, the boxes of JPEG 2000, the header of BMP; NumPy's header; several files that say the same."""
+"""Pictures: chunks of PNG, segments of JPEG, boxes of JPEG 2000, the header of BMP; the header of NumPy; files that say the same."""
 
 import ast
 import io

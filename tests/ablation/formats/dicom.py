@@ -1,4 +1,4 @@
-"""DICOM by pydicom: series of files, enhanced multi-frame objects, dose, segmentations, SPECT. The foreign reader is pydicom; voxels are placed
+"""DICOM by pydicom: series of files, enhanced multi-frame objects, dose, segmentations, SPECT. The foreign reader is pydicom; voxels lie
 by the standard (PS3.3 C.7.6.2, C.7.6.16, C.8.8.3, C.8.4.15), and values are those of the Modality LUT (C.11.1)."""
 
 import collections

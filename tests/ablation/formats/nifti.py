@@ -1,5 +1,4 @@
 """NIfTI-1, NIfTI-2 and Analyze 7.5, by nibabel. The header's fields are those of nibabel's dtypes."""
-
 import nibabel
 import numpy as np
 
@@ -7,35 +6,12 @@ from ablation import Answer, CannotWrite, Change, Document, Node, Sample
 from documents import HeaderDocument
 
 KINDS = {"descrip": "comment", "aux_file": "comment", "db_name": "comment", "intent_name": "comment"}
-ROLES = {
-    "scl_slope": "scale",
-    "scl_inter": "offset",
-    "pixdim": "spacing",
-    "xyzt_units": "unit",
-    "srow_x": "affine",
-    "srow_y": "affine",
-    "srow_z": "affine",
-    "qoffset_x": "affine",
-}
-NAMES = {
-    "dim": ("size", "dimension", "bytes", "channels", "times"),
-    "srow_x": ("sform",),
-    "srow_y": ("sform",),
-    "srow_z": ("sform",),
-    "quatern_b": ("qform",),
-    "quatern_c": ("qform",),
-    "quatern_d": ("qform",),
-    "qoffset_x": ("qform",),
-    "qoffset_y": ("qform",),
-    "qoffset_z": ("qform",),
-    "vox_offset": ("offset", "truncated"),
-    "magic": ("n+1", "ni1", "NIfTI"),
-    "sizeof_hdr": ("NIfTI",),
-    "datatype": ("type", "truncated"),
-    "bitpix": ("bits",),
-    "qform_code": ("qform", "sform"),
-    "sform_code": ("qform", "sform"),
-}
+ROLES = {"scl_slope": "scale", "scl_inter": "offset", "pixdim": "spacing", "xyzt_units": "unit", "srow_x": "affine", "srow_y": "affine",
+         "srow_z": "affine", "qoffset_x": "affine"}
+NAMES = {"dim": ("size", "dimension", "bytes", "channels", "times"), "srow_x": ("sform",), "srow_y": ("sform",), "srow_z": ("sform",), "quatern_b": ("qform",),
+         "quatern_c": ("qform",), "quatern_d": ("qform",), "qoffset_x": ("qform",), "qoffset_y": ("qform",), "qoffset_z": ("qform",),
+         "vox_offset": ("offset", "truncated"), "magic": ("n+1", "ni1", "NIfTI"), "sizeof_hdr": ("NIfTI",), "datatype": ("type", "truncated"), "bitpix": ("bits",),
+         "qform_code": ("qform", "sform"), "sform_code": ("qform", "sform")}
 COLOUR = np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")])
 TYPES = (np.uint8, np.int16, np.int32, np.float32, np.float64)
 
@@ -93,16 +69,8 @@ class LabelLines(Document):
         self.path, self.lines = path, path.read_text().splitlines()
 
     def nodes(self):
-        return [
-            Node(
-                "label-names/*",
-                line,
-                lambda new, n=n: self.lines.__setitem__(n, new),
-                lambda n=n: self.lines.__delitem__(n),
-                ("nii.txt", "name"),
-            )
-            for n, line in enumerate(self.lines)
-        ]
+        return [Node("label-names/*", line, lambda new, n=n: self.lines.__setitem__(n, new), lambda n=n: self.lines.__delitem__(n), ("nii.txt", "name"))
+                for n, line in enumerate(self.lines)]
 
     def save(self):
         self.path.write_text("".join(line + "\n" for line in self.lines))
@@ -115,19 +83,9 @@ class LabelColours(Document):
         self.path, self.data = path, path.read_bytes()
 
     def nodes(self):
-        return [
-            Node(
-                "label-colours",
-                None,
-                None,
-                None,
-                ("nii.lut", "colour"),
-                more=[
-                    Change("inverted", lambda: setattr(self, "data", bytes(255 - v for v in self.data))),
-                    Change("truncated", lambda: setattr(self, "data", self.data[:700])),
-                ],
-            )
-        ]
+        return [Node("label-colours", None, None, None, ("nii.lut", "colour"), more=[
+            Change("inverted", lambda: setattr(self, "data", bytes(255 - v for v in self.data))),
+            Change("truncated", lambda: setattr(self, "data", self.data[:700]))])]
 
     def save(self):
         self.path.write_bytes(self.data)
@@ -209,47 +167,27 @@ def read(path):
         data = loaded.get_fdata()
     data = data.reshape(data.shape + (1,) * (5 - data.ndim))
     placed = isinstance(loaded.header, nibabel.Nifti1Header) and (loaded.header["sform_code"] > 0 or loaded.header["qform_code"] > 0)
-    unit = (
-        {"meter": 1000.0, "micron": 0.001}.get(loaded.header.get_xyzt_units()[0], 1.0) if hasattr(loaded.header, "get_xyzt_units") else 1.0
-    )
-    return Answer(
-        fields={(t, c): data[..., t, c] for t in range(data.shape[3]) for c in range(data.shape[4])},
-        affine=np.diag([unit] * 3 + [1.0]) @ loaded.affine if placed else None,
-    )
+    unit = {"meter": 1000.0, "micron": 0.001}.get(loaded.header.get_xyzt_units()[0], 1.0) if hasattr(loaded.header, "get_xyzt_units") else 1.0
+    return Answer(fields={(t, c): data[..., t, c] for t in range(data.shape[3]) for c in range(data.shape[4])},
+                  affine=np.diag([unit] * 3 + [1.0]) @ loaded.affine if placed else None)
 
 
 def sample(name, file, make, kind, reader=read):
     header = file.replace(".img", ".hdr")
-    return Sample(
-        name,
-        file,
-        lambda folder: nibabel.save(make(), folder / file),
-        lambda folder: [Header(folder / header, kind)],
-        lambda folder: reader(folder / file),
-        tuple({header, file} - {file}),
-    )
+    return Sample(name, file, lambda folder: nibabel.save(make(), folder / file), lambda folder: [Header(folder / header, kind)],
+                  lambda folder: reader(folder / file), tuple({header, file} - {file}))
 
 
 def with_extension():
-    plain = sample(
-        "extension", "a.nii", lambda: extended(image(nibabel.Nifti1Image, (5, 6, 7), np.int16)), nibabel.Nifti1Image.header_class
-    )
-    plain.documents = lambda folder: [
-        Header(folder / "a.nii", nibabel.Nifti1Image.header_class),
-        HeaderDocument(folder / "a.nii", "extension", EXTENSION, 348),
-    ]
+    plain = sample("extension", "a.nii", lambda: extended(image(nibabel.Nifti1Image, (5, 6, 7), np.int16)), nibabel.Nifti1Image.header_class)
+    plain.documents = lambda folder: [Header(folder / "a.nii", nibabel.Nifti1Image.header_class),
+                                      HeaderDocument(folder / "a.nii", "extension", EXTENSION, 348)]
     return plain
 
 
 def atlas():
-    return Sample(
-        "atlas",
-        "a.nii",
-        labelled,
-        lambda folder: [LabelLines(folder / "a.nii.txt"), LabelColours(folder / "a.nii.lut")],
-        lambda folder: read(folder / "a.nii"),
-        ("a.nii.txt", "a.nii.lut"),
-    )
+    return Sample("atlas", "a.nii", labelled, lambda folder: [LabelLines(folder / "a.nii.txt"), LabelColours(folder / "a.nii.lut")],
+                  lambda folder: read(folder / "a.nii"), ("a.nii.txt", "a.nii.lut"))
 
 
 def packed():
@@ -272,9 +210,7 @@ def samples(_):
         sample("spectrum", "a.nii", lambda: image(one, (5, 6, 7, 4), np.float32, units=("mm", "ppm")), one.header_class),
         sample("labels", "a.nii", lambda: image(one, (5, 6, 7), np.uint8, intent="label"), one.header_class),
         sample("second", "b.nii", lambda: image(two, (5, 6, 7), np.int32, slope=(0.5, -1.0)), two.header_class),
-        with_extension(),
-        atlas(),
-        packed(),
+        with_extension(), atlas(), packed(),
         sample("analyze", "d.img", lambda: analyze(nibabel.AnalyzeImage), nibabel.AnalyzeImage.header_class, read_spacing),
         sample("spm", "d.img", lambda: analyze(nibabel.Spm99AnalyzeImage), nibabel.Spm99AnalyzeImage.header_class, read_spacing),
         sample("pair", "c.img", lambda: image(nibabel.Nifti1Pair, (5, 6, 7), np.int16), nibabel.Nifti1Pair.header_class),

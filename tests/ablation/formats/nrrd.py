@@ -1,4 +1,4 @@
-"""NRRD by pynrrd and ITK: each line of the header is a node; `key:=value` lines are another document, since they mean what programs agree on."""
+"""NRRD by pynrrd and ITK: each line of the header is a node; `key:=value` lines mean what programs agree on, and have a name of their own."""
 
 import re
 
