@@ -1,4 +1,5 @@
 """Files of DICOM by pydicom: each element of a data set, in sequences too, is a node."""
+
 import pathlib
 
 import numpy as np
@@ -6,44 +7,110 @@ import pydicom
 from pydicom.datadict import keyword_for_tag, tag_for_keyword
 from pydicom.dataelem import DataElement
 from pydicom.multival import MultiValue
-from pydicom.uid import (DeflatedExplicitVRLittleEndian, ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian,
-                         RLELossless)
+from pydicom.tag import Tag
+from pydicom.uid import DeflatedExplicitVRLittleEndian, ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian, RLELossless
 
 from ablation import CannotWrite, Change, Document, Node
 
 FREE_TEXT = ("LO", "SH", "ST", "LT", "UT", "PN", "UC")
 # Texts that are no free texts: PS3.3 lists terms for them, or they are codes.
-CODES = ("RescaleType", "ModalityLUTType", "CodeValue", "CodingSchemeDesignator", "LUTLabel", "ReconstructionMethod", "ScatterCorrectionMethod",
-         "PixelSpacingCalibrationDescription")
+CODES = (
+    "RescaleType",
+    "ModalityLUTType",
+    "CodeValue",
+    "CodingSchemeDesignator",
+    "LUTLabel",
+    "ReconstructionMethod",
+    "ScatterCorrectionMethod",
+    "PixelSpacingCalibrationDescription",
+)
 # Identifiers that say to readers of images what they have to do with them.
 CLASSES = ("SOPClassUID", "MediaStorageSOPClassUID", "TransferSyntaxUID", "FrameOfReferenceUID")
-ROLES = {"RescaleSlope": "scale", "RescaleIntercept": "offset", "DoseGridScaling": "scale", "PixelPaddingValue": "fill", "Units": "unit",
-         "DoseUnits": "unit", "PixelSpacing": "spacing", "SpacingBetweenSlices": "spacing", "GridFrameOffsetVector": "spacing",
-         "ImagePositionPatient": "affine", "ImageOrientationPatient": "affine", "RealWorldValueSlope": "scale",
-         "RealWorldValueIntercept": "offset", "MaximumFractionalValue": "scale"}
-NAMES = {"ImagePositionPatient": ("position", "slices"), "ImageOrientationPatient": ("orientation", "direction"), "PixelSpacing": ("spacing",),
-         "Rows": ("pixels", "sizes"), "Columns": ("pixels", "sizes"), "NumberOfFrames": ("frames", "single slice"), "SamplesPerPixel": ("colour", "samples a pixel"),
-         "PhotometricInterpretation": ("colour", "MONOCHROME"), "PixelData": ("pixels",), "FloatPixelData": ("pixels", "Pixel Data"),
-         "TransferSyntaxUID": ("transfer syntax",), "ImageType": ("localizer", "mosaic", "type"), "BitsAllocated": ("bits", "bytes of pixels"),
-         "SegmentNumber": ("segment",), "SegmentIdentificationSequence": ("segment",), "SegmentLabel": ("labels",),
-         "PixelRepresentation": ("type", "int8"), "DetectorInformationSequence": ("place",), "ReferencedSegmentNumber": ("segment",), "SeriesInstanceUID": ("series",),
-         "SOPInstanceUID": ("copies", "copy"), "SliceVector": ("slice",), "ModalityLUTSequence": ("Modality LUT",),
-         "PlanePositionSequence": ("position",), "PlaneOrientationSequence": ("orientation", "direction"),
-         "PixelMeasuresSequence": ("spacing",), "PerFrameFunctionalGroupsSequence": ("position", "frame"),
-         "SharedFunctionalGroupsSequence": ("orientation", "spacing")}
-SYNTAXES = {"implicit": ImplicitVRLittleEndian, "big endian": ExplicitVRBigEndian, "deflated": DeflatedExplicitVRLittleEndian, "RLE": RLELossless}
+ROLES = {
+    "RescaleSlope": "scale",
+    "RescaleIntercept": "offset",
+    "DoseGridScaling": "scale",
+    "PixelPaddingValue": "fill",
+    "Units": "unit",
+    "DoseUnits": "unit",
+    "PixelSpacing": "spacing",
+    "SpacingBetweenSlices": "spacing",
+    "GridFrameOffsetVector": "spacing",
+    "ImagePositionPatient": "affine",
+    "ImageOrientationPatient": "affine",
+    "RealWorldValueSlope": "scale",
+    "RealWorldValueIntercept": "offset",
+    "MaximumFractionalValue": "scale",
+}
+NAMES = {
+    "ImagePositionPatient": ("position", "slices"),
+    "ImageOrientationPatient": ("orientation", "direction"),
+    "PixelSpacing": ("spacing",),
+    "Rows": ("pixels", "sizes"),
+    "Columns": ("pixels", "sizes"),
+    "NumberOfFrames": ("frames", "single slice"),
+    "SamplesPerPixel": ("colour", "samples a pixel"),
+    "PhotometricInterpretation": ("colour", "MONOCHROME"),
+    "PixelData": ("pixels",),
+    "FloatPixelData": ("pixels", "Pixel Data"),
+    "TransferSyntaxUID": ("transfer syntax",),
+    "ImageType": ("localizer", "mosaic", "type"),
+    "BitsAllocated": ("bits", "bytes of pixels"),
+    "SegmentNumber": ("segment",),
+    "SegmentIdentificationSequence": ("segment",),
+    "SegmentLabel": ("labels",),
+    "PixelRepresentation": ("type", "int8"),
+    "DetectorInformationSequence": ("place",),
+    "ReferencedSegmentNumber": ("segment",),
+    "SeriesInstanceUID": ("series",),
+    "SOPInstanceUID": ("copies", "copy"),
+    "SliceVector": ("slice",),
+    "ModalityLUTSequence": ("Modality LUT",),
+    "PlanePositionSequence": ("position",),
+    "PlaneOrientationSequence": ("orientation", "direction"),
+    "PixelMeasuresSequence": ("spacing",),
+    "PerFrameFunctionalGroupsSequence": ("position", "frame"),
+    "SharedFunctionalGroupsSequence": ("orientation", "spacing"),
+}
+SYNTAXES = {
+    "implicit": ImplicitVRLittleEndian,
+    "big endian": ExplicitVRBigEndian,
+    "deflated": DeflatedExplicitVRLittleEndian,
+    "RLE": RLELossless,
+}
 COMMON_GROUPS = (0x0002, 0x0008, 0x0010, 0x0032, 0x0040)
 OF_KIND = ("ImageType", "SOPClassUID")  # of these groups, what depends on the kind of object
 # Of other groups: series, equipment, frame of reference, pixels (PS3.3 C.7.3 to C.7.6).
-COMMON = ("AcquisitionNumber", "InstanceNumber", "Laterality", "PositionReferenceIndicator", "StudyID", "StudyInstanceUID", "SeriesNumber",
-          "SeriesInstanceUID", "FrameOfReferenceUID", "SoftwareVersions", "DeviceSerialNumber", "ProtocolName", "BodyPartExamined", "PatientPosition",
-          "BurnedInAnnotation", "LossyImageCompression", "SamplesPerPixel", "PhotometricInterpretation", "Rows", "Columns", "SliceThickness",
-          "ContentLabel", "ContentDescription", "ContentCreatorName")
+COMMON = (
+    "AcquisitionNumber",
+    "InstanceNumber",
+    "Laterality",
+    "PositionReferenceIndicator",
+    "StudyID",
+    "StudyInstanceUID",
+    "SeriesNumber",
+    "SeriesInstanceUID",
+    "FrameOfReferenceUID",
+    "SoftwareVersions",
+    "DeviceSerialNumber",
+    "ProtocolName",
+    "BodyPartExamined",
+    "PatientPosition",
+    "BurnedInAnnotation",
+    "LossyImageCompression",
+    "SamplesPerPixel",
+    "PhotometricInterpretation",
+    "Rows",
+    "Columns",
+    "SliceThickness",
+    "ContentLabel",
+    "ContentDescription",
+    "ContentCreatorName",
+)
 
 
 def is_common(element, keyword):
     return keyword in COMMON or (element.tag.group in COMMON_GROUPS and keyword not in OF_KIND)
-
 
 
 def plain_value(element):
@@ -62,7 +129,9 @@ def plain_value(element):
 def element_of(tag, vr, value):
     try:
         if vr == "DS":
-            value = [f"{float(v):.10g}" for v in value] if isinstance(value, (list, tuple)) else f"{float(value):.10g}" if value != "" else ""
+            value = (
+                [f"{float(v):.10g}" for v in value] if isinstance(value, (list, tuple)) else f"{float(value):.10g}" if value != "" else ""
+            )
         if vr in ("IS", "US", "SS", "UL", "SL", "AT"):
             value = [int(v) for v in value] if isinstance(value, (list, tuple)) else int(value) if value != "" else ""
         return DataElement(tag, vr, value)
@@ -111,7 +180,9 @@ class DicomDocument(Document):
             if element.VR == "SQ":
                 for item in range(len(element.value)):
                     inside = [s[element.tag].value[item] for s in sets if element.tag in s and item < len(s[element.tag].value)]
-                    yield Node(f"{here}/*", None, None, lambda s=sets, t=element.tag, i=item: self._remove_item(s, t, i), NAMES.get(keyword, ()))
+                    yield Node(
+                        f"{here}/*", None, None, lambda s=sets, t=element.tag, i=item: self._remove_item(s, t, i), NAMES.get(keyword, ())
+                    )
                     yield from self._walk(inside, f"{here}/*")
 
     @staticmethod
@@ -122,9 +193,15 @@ class DicomDocument(Document):
     def _node(self, path, keyword, element, sets):
         sequence = element.VR == "SQ"
         binary = element.VR in ("OB", "OW", "OF", "OD", "OB or OW")
-        node = Node(path, None if sequence or binary else plain_value(element), None if sequence or binary else
-                    lambda new, t=element.tag, vr=element.VR: self._set(sets, t, vr, new),
-                    lambda t=element.tag: self._remove(sets, t), NAMES.get(keyword, ()), ROLES.get(keyword, ""), kind_of(keyword, element.VR))
+        node = Node(
+            path,
+            None if sequence or binary else plain_value(element),
+            None if sequence or binary else lambda new, t=element.tag, vr=element.VR: self._set(sets, t, vr, new),
+            lambda t=element.tag: self._remove(sets, t),
+            NAMES.get(keyword, ()),
+            ROLES.get(keyword, ""),
+            kind_of(keyword, element.VR),
+        )
         if keyword == "TransferSyntaxUID":
             node.more = [Change(name, lambda s=s: setattr(self, "syntax", s), same=True) for name, s in SYNTAXES.items()]
         elif keyword == "ImageOrientationPatient":

@@ -1,4 +1,5 @@
-"""Pictures: the chunks of PNG, the segments of JPEG, the boxes of JPEG 2000, the header of BMP; NumPy's header; several files that say the same."""
+"""Pictures: chunks of PNG, segments of JPEG, boxes of JPEG 2000, the header of BMP; the header of NumPy; files that say the same."""
+
 import ast
 import io
 import pathlib
@@ -41,15 +42,37 @@ class Together(Document):
 
 
 # Fields of PNG's chunks, by the specification; big endian.
-PNG = {"IHDR": (("width", "I"), ("height", "I"), ("bit depth", "B"), ("colour type", "B"), ("compression", "B"), ("filter", "B"), ("interlace", "B")),
-       "pHYs": (("x", "I"), ("y", "I"), ("unit", "B")), "gAMA": (("gamma", "I"),), "sRGB": (("intent", "B"),),
-       "cHRM": tuple((name, "I") for name in ("white x", "white y", "red x", "red y", "green x", "green y", "blue x", "blue y")),
-       "tIME": (("year", "H"), ("month", "B"), ("day", "B"), ("hour", "B"), ("minute", "B"), ("second", "B")), "oFFs": (("x", "i"), ("y", "i"), ("unit", "B"))}
+PNG = {
+    "IHDR": (
+        ("width", "I"),
+        ("height", "I"),
+        ("bit depth", "B"),
+        ("colour type", "B"),
+        ("compression", "B"),
+        ("filter", "B"),
+        ("interlace", "B"),
+    ),
+    "pHYs": (("x", "I"), ("y", "I"), ("unit", "B")),
+    "gAMA": (("gamma", "I"),),
+    "sRGB": (("intent", "B"),),
+    "cHRM": tuple((name, "I") for name in ("white x", "white y", "red x", "red y", "green x", "green y", "blue x", "blue y")),
+    "tIME": (("year", "H"), ("month", "B"), ("day", "B"), ("hour", "B"), ("minute", "B"), ("second", "B")),
+    "oFFs": (("x", "i"), ("y", "i"), ("unit", "B")),
+}
 ROLES = {"pHYs/x": "spacing", "pHYs/y": "spacing", "pHYs/unit": "unit"}
-NAMES = {"IHDR/width": ("size", "truncated", "png"), "IHDR/height": ("size", "truncated", "png"), "IHDR/bit depth": ("bit depth", "bits", "png"),
-         "IHDR/colour type": ("colour", "color", "png", "components"), "IHDR/interlace": ("interlace", "png"), "IHDR": ("png", "IHDR"),
-         "IHDR/compression": ("compression", "png"), "IHDR/filter": ("filter", "png"), "PLTE": ("palette", "png"), "IDAT": ("png", "truncated"),
-         "IEND": ("png", "truncated")}
+NAMES = {
+    "IHDR/width": ("size", "truncated", "png"),
+    "IHDR/height": ("size", "truncated", "png"),
+    "IHDR/bit depth": ("bit depth", "bits", "png"),
+    "IHDR/colour type": ("colour", "color", "png", "components"),
+    "IHDR/interlace": ("interlace", "png"),
+    "IHDR": ("png", "IHDR"),
+    "IHDR/compression": ("compression", "png"),
+    "IHDR/filter": ("filter", "png"),
+    "PLTE": ("palette", "png"),
+    "IDAT": ("png", "truncated"),
+    "IEND": ("png", "truncated"),
+}
 
 
 class PngDocument(Document):
@@ -58,8 +81,8 @@ class PngDocument(Document):
         data = self.path.read_bytes()
         self.chunks, at = [], 8
         while at < len(data):
-            size, = struct.unpack_from(">I", data, at)
-            self.chunks.append([data[at + 4:at + 8].decode(), bytearray(data[at + 8:at + 8 + size])])
+            (size,) = struct.unpack_from(">I", data, at)
+            self.chunks.append([data[at + 4 : at + 8].decode(), bytearray(data[at + 8 : at + 8 + size])])
             at += 12 + size
 
     def nodes(self):
@@ -68,19 +91,38 @@ class PngDocument(Document):
             kind, data = chunk
             here = f"{self.name}/{kind}"
             text = "comment" if kind in ("tEXt", "zTXt", "iTXt") else "date" if kind == "tIME" else ""
-            nodes.append(Node(here, bytes(data) if kind not in ("IDAT", "PLTE") else None, None, lambda c=chunk: self.chunks.remove(c),
-                              NAMES.get(kind, ()), kind=text))
+            nodes.append(
+                Node(
+                    here,
+                    bytes(data) if kind not in ("IDAT", "PLTE") else None,
+                    None,
+                    lambda c=chunk: self.chunks.remove(c),
+                    NAMES.get(kind, ()),
+                    kind=text,
+                )
+            )
             at = 0
             for name, letter in PNG.get(kind, ()):
-                value, = struct.unpack_from(">" + letter, data, at)
+                (value,) = struct.unpack_from(">" + letter, data, at)
                 key = f"{kind}/{name}"
-                nodes.append(Node(f"{self.name}/{key}", value, lambda new, c=chunk, a=at, x=letter: self._set(c, a, x, new), None,
-                                  NAMES.get(key, ()), ROLES.get(key, ""), text))
+                nodes.append(
+                    Node(
+                        f"{self.name}/{key}",
+                        value,
+                        lambda new, c=chunk, a=at, x=letter: self._set(c, a, x, new),
+                        None,
+                        NAMES.get(key, ()),
+                        ROLES.get(key, ""),
+                        text,
+                    )
+                )
                 at += struct.calcsize(letter)
             if kind == "PLTE":
                 nodes.append(Node(f"{here}/colours", list(data), lambda new, c=chunk: c.__setitem__(1, bytearray(new)), names=("palette",)))
             elif kind == "tRNS":
-                nodes.append(Node(f"{here}/alphas", list(data), lambda new, c=chunk: c.__setitem__(1, bytearray(new)), names=("alpha", "transparen")))
+                nodes.append(
+                    Node(f"{here}/alphas", list(data), lambda new, c=chunk: c.__setitem__(1, bytearray(new)), names=("alpha", "transparen"))
+                )
         return nodes
 
     @staticmethod
@@ -107,8 +149,13 @@ class PngDocument(Document):
 JFIF = (("major", "B"), ("minor", "B"), ("units", "B"), ("x density", "H"), ("y density", "H"), ("thumbnail x", "B"), ("thumbnail y", "B"))
 FRAME = (("precision", "B"), ("height", "H"), ("width", "H"), ("components", "B"))
 JPEG_ROLES = {"x density": "spacing", "y density": "spacing", "units": "unit"}
-JPEG_NAMES = {"precision": ("bits", "precision", "jpeg"), "height": ("size", "jpeg", "truncated"), "width": ("size", "jpeg", "truncated"),
-              "components": ("components", "jpeg", "colour"), "sampling": ("jpeg",)}
+JPEG_NAMES = {
+    "precision": ("bits", "precision", "jpeg"),
+    "height": ("size", "jpeg", "truncated"),
+    "width": ("size", "jpeg", "truncated"),
+    "components": ("components", "jpeg", "colour"),
+    "sampling": ("jpeg",),
+}
 
 
 class JpegDocument(Document):
@@ -119,8 +166,8 @@ class JpegDocument(Document):
         data = self.path.read_bytes()
         self.segments, at = [], 2
         while data[at + 1] != 0xDA:
-            size, = struct.unpack_from(">H", data, at + 2)
-            self.segments.append([data[at + 1], bytearray(data[at + 4:at + 2 + size])])
+            (size,) = struct.unpack_from(">H", data, at + 2)
+            self.segments.append([data[at + 1], bytearray(data[at + 4 : at + 2 + size])])
             at += 2 + size
         self.scan = data[at:]
         self.exif = Image.open(io.BytesIO(data)).getexif()
@@ -142,17 +189,33 @@ class JpegDocument(Document):
             word = TiffImagePlugin.TiffTags.TAGS_V2.get(tag)
             key = word.name if word else str(tag)
             plain = float(value) if isinstance(value, TiffImagePlugin.IFDRational) else value
-            nodes.append(Node(f"{self.name}/exif/{key}", plain, lambda new, t=tag: self._set_exif(t, new), lambda t=tag: self._drop_exif(t),
-                              kind="comment" if key in ("Make", "Model", "Software", "ImageDescription") else "date" if key == "DateTime" else "",
-                              role="spacing" if key.endswith("Resolution") else "", words=(1, 3, 6, 8) if key == "Orientation" else ()))
+            nodes.append(
+                Node(
+                    f"{self.name}/exif/{key}",
+                    plain,
+                    lambda new, t=tag: self._set_exif(t, new),
+                    lambda t=tag: self._drop_exif(t),
+                    kind="comment" if key in ("Make", "Model", "Software", "ImageDescription") else "date" if key == "DateTime" else "",
+                    role="spacing" if key.endswith("Resolution") else "",
+                    words=(1, 3, 6, 8) if key == "Orientation" else (),
+                )
+            )
         return nodes
 
     def _fields(self, kind, segment, fields, at):
         nodes = [Node(f"{self.name}/{kind}", None, None, lambda s=segment: self.segments.remove(s), ("jpeg",))]
         for name, letter in fields:
-            value, = struct.unpack_from(">" + letter, segment[1], at)
-            nodes.append(Node(f"{self.name}/{kind}/{name}", value, lambda new, s=segment, a=at, x=letter: PngDocument._set(s, a, x, new), None,
-                              JPEG_NAMES.get(name, ()), JPEG_ROLES.get(name, "")))
+            (value,) = struct.unpack_from(">" + letter, segment[1], at)
+            nodes.append(
+                Node(
+                    f"{self.name}/{kind}/{name}",
+                    value,
+                    lambda new, s=segment, a=at, x=letter: PngDocument._set(s, a, x, new),
+                    None,
+                    JPEG_NAMES.get(name, ()),
+                    JPEG_ROLES.get(name, ""),
+                )
+            )
             at += struct.calcsize(letter)
         return nodes
 
@@ -173,24 +236,76 @@ class JpegDocument(Document):
         self.path.write_bytes(told + self.scan)
 
 
-BMP = np.dtype([("signature", "S2"), ("file_size", "<u4"), ("reserved", "<u4"), ("data_offset", "<u4"), ("header_size", "<u4"), ("width", "<i4"),
-                ("height", "<i4"), ("planes", "<u2"), ("bits", "<u2"), ("compression", "<u4"), ("image_size", "<u4"), ("x_per_metre", "<i4"),
-                ("y_per_metre", "<i4"), ("colours", "<u4"), ("important_colours", "<u4")])
-BMP_NAMES = {"signature": ("bmp",), "width": ("size", "truncated"), "height": ("size", "truncated", "rows"), "bits": ("bits", "truncated"),
-             "data_offset": ("offset", "truncated", "bytes"), "header_size": ("header",), "colours": ("palette", "colour"), "planes": ("planes",)}
+BMP = np.dtype(
+    [
+        ("signature", "S2"),
+        ("file_size", "<u4"),
+        ("reserved", "<u4"),
+        ("data_offset", "<u4"),
+        ("header_size", "<u4"),
+        ("width", "<i4"),
+        ("height", "<i4"),
+        ("planes", "<u2"),
+        ("bits", "<u2"),
+        ("compression", "<u4"),
+        ("image_size", "<u4"),
+        ("x_per_metre", "<i4"),
+        ("y_per_metre", "<i4"),
+        ("colours", "<u4"),
+        ("important_colours", "<u4"),
+    ]
+)
+BMP_NAMES = {
+    "signature": ("bmp",),
+    "width": ("size", "truncated"),
+    "height": ("size", "truncated", "rows"),
+    "bits": ("bits", "truncated"),
+    "data_offset": ("offset", "truncated", "bytes"),
+    "header_size": ("header",),
+    "colours": ("palette", "colour"),
+    "planes": ("planes",),
+}
 
 
 def bmp_document(path, name="bmp"):
     return HeaderDocument(path, name, BMP, names=BMP_NAMES, roles={"x_per_metre": "spacing", "y_per_metre": "spacing"})
 
 
-BOXES = {b"ihdr": (("height", "I"), ("width", "I"), ("components", "H"), ("bits", "B"), ("compression", "B"), ("unknown colour", "B"),
-                   ("intellectual property", "B")),
-         b"colr": (("method", "B"), ("precedence", "B"), ("approximation", "B"), ("space", "I")),
-         b"resc": (("vertical over", "H"), ("vertical under", "H"), ("horizontal over", "H"), ("horizontal under", "H"), ("vertical exponent", "b"),
-                   ("horizontal exponent", "b"))}
-SIZ = (("capabilities", "H"), ("width", "I"), ("height", "I"), ("x offset", "I"), ("y offset", "I"), ("tile width", "I"), ("tile height", "I"),
-       ("tile x offset", "I"), ("tile y offset", "I"), ("components", "H"), ("bits", "B"), ("x step", "B"), ("y step", "B"))
+BOXES = {
+    b"ihdr": (
+        ("height", "I"),
+        ("width", "I"),
+        ("components", "H"),
+        ("bits", "B"),
+        ("compression", "B"),
+        ("unknown colour", "B"),
+        ("intellectual property", "B"),
+    ),
+    b"colr": (("method", "B"), ("precedence", "B"), ("approximation", "B"), ("space", "I")),
+    b"resc": (
+        ("vertical over", "H"),
+        ("vertical under", "H"),
+        ("horizontal over", "H"),
+        ("horizontal under", "H"),
+        ("vertical exponent", "b"),
+        ("horizontal exponent", "b"),
+    ),
+}
+SIZ = (
+    ("capabilities", "H"),
+    ("width", "I"),
+    ("height", "I"),
+    ("x offset", "I"),
+    ("y offset", "I"),
+    ("tile width", "I"),
+    ("tile height", "I"),
+    ("tile x offset", "I"),
+    ("tile y offset", "I"),
+    ("components", "H"),
+    ("bits", "B"),
+    ("x step", "B"),
+    ("y step", "B"),
+)
 
 
 class Jp2Document(Document):
@@ -212,8 +327,16 @@ class Jp2Document(Document):
     def _fields(self, kind, fields, at):
         nodes = []
         for name, letter in fields:
-            value, = struct.unpack_from(">" + letter, self.data, at)
-            nodes.append(Node(f"{self.name}/{kind}/{name}", value, lambda new, a=at, x=letter: self._set(a, x, new), None, ("jp2", "JPEG 2000", "size")))
+            (value,) = struct.unpack_from(">" + letter, self.data, at)
+            nodes.append(
+                Node(
+                    f"{self.name}/{kind}/{name}",
+                    value,
+                    lambda new, a=at, x=letter: self._set(a, x, new),
+                    None,
+                    ("jp2", "JPEG 2000", "size"),
+                )
+            )
             at += struct.calcsize(letter)
         return nodes
 
@@ -236,14 +359,25 @@ class NpyDocument(Document):
         self.version = data[6:8]
         size = struct.unpack_from("<H" if self.version[0] == 1 else "<I", data, 8)[0]
         at = 10 if self.version[0] == 1 else 12
-        self.header, self.tail, self.array = ast.literal_eval(data[at:at + size].decode("latin-1")), data[at + size:], None
+        self.header, self.tail, self.array = ast.literal_eval(data[at : at + size].decode("latin-1")), data[at + size :], None
 
     def nodes(self):
-        nodes = [Node(f"{self.name}/version", self.version[0], lambda new: setattr(self, "version", bytes([int(new), 0])), names=("version", "npy", "header"))]
+        nodes = [
+            Node(
+                f"{self.name}/version",
+                self.version[0],
+                lambda new: setattr(self, "version", bytes([int(new), 0])),
+                names=("version", "npy", "header"),
+            )
+        ]
         for key, value in self.header.items():
-            node = Node(f"{self.name}/{key}", list(value) if isinstance(value, tuple) else value,
-                        lambda new, k=key: self.header.__setitem__(k, tuple(new) if isinstance(new, list) else new),
-                        lambda k=key: self.header.pop(k), {"shape": ("size", "truncated", "bytes", "axes"), "descr": ("type", "truncated", "dtype")}.get(key, ()))
+            node = Node(
+                f"{self.name}/{key}",
+                list(value) if isinstance(value, tuple) else value,
+                lambda new, k=key: self.header.__setitem__(k, tuple(new) if isinstance(new, list) else new),
+                lambda k=key: self.header.pop(k),
+                {"shape": ("size", "truncated", "bytes", "axes"), "descr": ("type", "truncated", "dtype")}.get(key, ()),
+            )
             if key == "descr":
                 node.words = ("<f4", ">f4", "|u1", "<i2", "<c8", "|O", "|S4", "<U1")
             nodes.append(node)
@@ -256,4 +390,6 @@ class NpyDocument(Document):
         text = repr(self.header).encode()
         first = self.version[0] == 1
         size = -(-(len(text) + 1 + (10 if first else 12)) // 64) * 64 - (10 if first else 12)
-        self.path.write_bytes(b"\x93NUMPY" + self.version + struct.pack("<H" if first else "<I", size) + text.ljust(size - 1) + b"\n" + self.tail)
+        self.path.write_bytes(
+            b"\x93NUMPY" + self.version + struct.pack("<H" if first else "<I", size) + text.ljust(size - 1) + b"\n" + self.tail
+        )

@@ -1,4 +1,5 @@
 """TIFF files: tags as tifffile names and reads them, and what is written in them (OME-XML, ImageJ's lines and binary block, JSON)."""
+
 import io
 import json
 import pathlib
@@ -13,16 +14,47 @@ from documents import JsonDocument, LinesDocument, XmlDocument
 SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 13: 4, 16: 8, 17: 8, 18: 8}
 LETTERS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d", 13: "I", 16: "Q", 17: "q", 18: "Q"}
 DESCRIPTION, SUB_IFDS = 270, 330
-KINDS = {"DateTime": "date", "Software": "comment", "Artist": "comment", "HostComputer": "comment", "Make": "comment", "Model": "comment",
-         "Copyright": "comment", "DocumentName": "comment", "PageName": "comment"}
-ROLES = {"XResolution": "spacing", "YResolution": "spacing", "ResolutionUnit": "unit", "ModelPixelScaleTag": "spacing", "GDAL_NODATA": "fill"}
-NAMES = {"ImageWidth": ("size", "pixels", "truncated"), "ImageLength": ("size", "pixels", "truncated", "rows", "strips"),
-         "BitsPerSample": ("bits", "type"), "SampleFormat": ("sample format", "type", "format", "predictor"), "SamplesPerPixel": ("samples", "components"),
-         "StripOffsets": ("strip", "truncated"), "StripByteCounts": ("strip", "truncated"), "TileOffsets": ("tile", "truncated"),
-         "TileByteCounts": ("tile", "truncated"), "Compression": ("compress", "decoding"), "PhotometricInterpretation": ("photometric", "0 as white", "colour", "samplesperpixel"),
-         "NewSubfileType": ("reduced", "resolution"), "SubIFDs": ("level",), "RowsPerStrip": ("strip",), "TileWidth": ("tile",),
-         "TileLength": ("tile",), "ImageDescription": ("description",), "ExtraSamples": ("alpha", "components"), "ImageDepth": ("slices",),
-         "PlanarConfiguration": ("planes",), "ColorMap": ("colour map",)}
+KINDS = {
+    "DateTime": "date",
+    "Software": "comment",
+    "Artist": "comment",
+    "HostComputer": "comment",
+    "Make": "comment",
+    "Model": "comment",
+    "Copyright": "comment",
+    "DocumentName": "comment",
+    "PageName": "comment",
+}
+ROLES = {
+    "XResolution": "spacing",
+    "YResolution": "spacing",
+    "ResolutionUnit": "unit",
+    "ModelPixelScaleTag": "spacing",
+    "GDAL_NODATA": "fill",
+}
+NAMES = {
+    "ImageWidth": ("size", "pixels", "truncated"),
+    "ImageLength": ("size", "pixels", "truncated", "rows", "strips"),
+    "BitsPerSample": ("bits", "type"),
+    "SampleFormat": ("sample format", "type", "format", "predictor"),
+    "SamplesPerPixel": ("samples", "components"),
+    "StripOffsets": ("strip", "truncated"),
+    "StripByteCounts": ("strip", "truncated"),
+    "TileOffsets": ("tile", "truncated"),
+    "TileByteCounts": ("tile", "truncated"),
+    "Compression": ("compress", "decoding"),
+    "PhotometricInterpretation": ("photometric", "0 as white", "colour", "samplesperpixel"),
+    "NewSubfileType": ("reduced", "resolution"),
+    "SubIFDs": ("level",),
+    "RowsPerStrip": ("strip",),
+    "TileWidth": ("tile",),
+    "TileLength": ("tile",),
+    "ImageDescription": ("description",),
+    "ExtraSamples": ("alpha", "components"),
+    "ImageDepth": ("slices",),
+    "PlanarConfiguration": ("planes",),
+    "ColorMap": ("colour map",),
+}
 ONE_OF_MANY = ("like the first",)  # how messages speak of a page that differs
 STRUCTURE = ("StripOffsets", "StripByteCounts", "TileOffsets", "TileByteCounts", "SubIFDs", "TileWidth", "TileLength")  # where samples lie
 
@@ -32,16 +64,16 @@ class Ifd:
 
     def __init__(self, data, at, order, big):
         self.order = order
-        count, = struct.unpack_from(order + ("Q" if big else "H"), data, at)
+        (count,) = struct.unpack_from(order + ("Q" if big else "H"), data, at)
         at += 8 if big else 2
         self.entries = []
         for _ in range(count):
             tag, kind, number = struct.unpack_from(order + ("HHQ" if big else "HHI"), data, at)
             size, field = SIZES[kind] * number, at + (12 if big else 8)
             place = field if size <= (8 if big else 4) else struct.unpack_from(order + ("Q" if big else "I"), data, field)[0]
-            self.entries.append([tag, kind, number, bytes(data[place:place + size])])
+            self.entries.append([tag, kind, number, bytes(data[place : place + size])])
             at += 20 if big else 12
-        self.next, = struct.unpack_from(order + ("Q" if big else "I"), data, at)
+        (self.next,) = struct.unpack_from(order + ("Q" if big else "I"), data, at)
 
     def index(self, tag):
         return next((i for i, entry in enumerate(self.entries) if entry[0] == tag), None)
@@ -84,7 +116,7 @@ class TiffBytes:
         self.order = "<" if self.data[:2] == b"II" else ">"
         self.big = 43 in self.data[2:4]
         self.ifds = []
-        at, = struct.unpack_from(self.order + ("Q" if self.big else "I"), self.data, 8 if self.big else 4)
+        (at,) = struct.unpack_from(self.order + ("Q" if self.big else "I"), self.data, 8 if self.big else 4)
         while at:
             self.ifds.append(Ifd(self.data, at, self.order, self.big))
             at = self.ifds[-1].next
@@ -117,7 +149,7 @@ class TagsDocument(Document):
         self.tiff, self.whole = TiffBytes(path), None
 
     def _ifds(self):
-        return self.tiff.ifds if self.page is None else self.tiff.ifds[self.page:self.page + 1]
+        return self.tiff.ifds if self.page is None else self.tiff.ifds[self.page : self.page + 1]
 
     def nodes(self):
         nodes = []
@@ -139,13 +171,25 @@ class TagsDocument(Document):
             value = None
         if tag.name in STRUCTURE:
             value = None
-        node = Node(f"{self.name}/{tag.name}", value, None if value is None else lambda new, t=tag.code, k=kind: self._set(t, k, new),
-                    lambda t=tag.code: self._remove(t), NAMES.get(tag.name, ()) + (ONE_OF_MANY if self.page is not None else ()),
-                    ROLES.get(tag.name, ""), KINDS.get(tag.name, ""))
+        node = Node(
+            f"{self.name}/{tag.name}",
+            value,
+            None if value is None else lambda new, t=tag.code, k=kind: self._set(t, k, new),
+            lambda t=tag.code: self._remove(t),
+            NAMES.get(tag.name, ()) + (ONE_OF_MANY if self.page is not None else ()),
+            ROLES.get(tag.name, ""),
+            KINDS.get(tag.name, ""),
+        )
         if tag.name == "Compression" and self.page is None:
-            node.more = [Change(name, lambda o=options: self._rewrite(**o), same=True) for name, options in (
-                ("Deflate in tiles", dict(compression="zlib", tile=(16, 16))), ("LZW, predictor", dict(compression="lzw", predictor=True)),
-                ("other byte order", dict(swap=True)), ("BigTIFF", dict(bigtiff=True)))]
+            node.more = [
+                Change(name, lambda o=options: self._rewrite(**o), same=True)
+                for name, options in (
+                    ("Deflate in tiles", dict(compression="zlib", tile=(16, 16))),
+                    ("LZW, predictor", dict(compression="lzw", predictor=True)),
+                    ("other byte order", dict(swap=True)),
+                    ("BigTIFF", dict(bigtiff=True)),
+                )
+            ]
         return node
 
     def _set(self, tag, kind, value):
@@ -171,11 +215,22 @@ class TagsDocument(Document):
                         raise CannotWrite("ImageJ's block has the byte order of the file")
                     keep = dict(options, predictor=predictor if page.bitspersample % 8 == 0 else None)
                     resolution = (tags[282].value, tags[283].value) if 282 in tags and 283 in tags else None
-                    extra = [(t.code, t.dtype, t.count, t.value, True) for t in tags if t.code in (42113, 33550, 33922, 34735, 34737, 42112)]
-                    writer.write(page.asarray(), photometric=page.photometric, description=page.description.encode() or None, metadata=None,
-                                 resolution=resolution, resolutionunit=tags[296].value if 296 in tags else None, extratags=extra,
-                                 planarconfig=page.planarconfig if page.samplesperpixel > 1 else None, subfiletype=int(page.subfiletype),
-                                 colormap=page.colormap, **keep)
+                    extra = [
+                        (t.code, t.dtype, t.count, t.value, True) for t in tags if t.code in (42113, 33550, 33922, 34735, 34737, 42112)
+                    ]
+                    writer.write(
+                        page.asarray(),
+                        photometric=page.photometric,
+                        description=page.description.encode() or None,
+                        metadata=None,
+                        resolution=resolution,
+                        resolutionunit=tags[296].value if 296 in tags else None,
+                        extratags=extra,
+                        planarconfig=page.planarconfig if page.samplesperpixel > 1 else None,
+                        subfiletype=int(page.subfiletype),
+                        colormap=page.colormap,
+                        **keep,
+                    )
         self.whole = made.getvalue()
 
     def add(self, path, value):
@@ -236,27 +291,73 @@ class OmeDocument(XmlDocument):
             set_description(self.file, '<?xml version="1.0" encoding="UTF-8"?>' + self.text)
 
 
-OME_NAMES = {"@SizeZ": ("plane", "page", "slices"), "@SizeC": ("plane", "page", "channel"), "@SizeT": ("plane", "page", "time"),
-             "@IFD": ("page", "directory"), "@PlaneCount": ("page", "plane"), "@FirstZ": ("plane", "page"), "@FirstC": ("plane", "page"),
-             "@FirstT": ("plane", "page"), "@FileName": ("file",), "TiffData": ("page", "plane"), "@SizeX": ("size", "pixels"),
-             "@SizeY": ("size", "pixels"), "@Type": ("type",), "Pixels": ("OME", "image"), "Image": ("image", "OME"), "Channel": ("channel",),
-             "@SamplesPerPixel": ("samples", "components", "channel")}
-OME_ROLES = {"@PhysicalSizeX": "spacing", "@PhysicalSizeY": "spacing", "@PhysicalSizeZ": "spacing", "@TimeIncrement": "spacing",
-             "@PhysicalSizeXUnit": "unit", "@PhysicalSizeYUnit": "unit", "@PhysicalSizeZUnit": "unit", "@TimeIncrementUnit": "unit"}
+OME_NAMES = {
+    "@SizeZ": ("plane", "page", "slices"),
+    "@SizeC": ("plane", "page", "channel"),
+    "@SizeT": ("plane", "page", "time"),
+    "@IFD": ("page", "directory"),
+    "@PlaneCount": ("page", "plane"),
+    "@FirstZ": ("plane", "page"),
+    "@FirstC": ("plane", "page"),
+    "@FirstT": ("plane", "page"),
+    "@FileName": ("file",),
+    "TiffData": ("page", "plane"),
+    "@SizeX": ("size", "pixels"),
+    "@SizeY": ("size", "pixels"),
+    "@Type": ("type",),
+    "Pixels": ("OME", "image"),
+    "Image": ("image", "OME"),
+    "Channel": ("channel",),
+    "@SamplesPerPixel": ("samples", "components", "channel"),
+}
+OME_ROLES = {
+    "@PhysicalSizeX": "spacing",
+    "@PhysicalSizeY": "spacing",
+    "@PhysicalSizeZ": "spacing",
+    "@TimeIncrement": "spacing",
+    "@PhysicalSizeXUnit": "unit",
+    "@PhysicalSizeYUnit": "unit",
+    "@PhysicalSizeZUnit": "unit",
+    "@TimeIncrementUnit": "unit",
+}
 LENGTHS, TIMES = ("nm", "mm", "pixel"), ("ms", "min", "h")
-OME_WORDS = {"@PhysicalSizeXUnit": LENGTHS, "@PhysicalSizeYUnit": LENGTHS, "@PhysicalSizeZUnit": LENGTHS, "@TimeIncrementUnit": TIMES,
-             "@DeltaTUnit": TIMES, "@DimensionOrder": ("XYZCT", "XYZTC", "XYCTZ", "XYTCZ", "XYTZC", "XYCZT"), "@BigEndian": ("true", "false"),
-             "@Interleaved": ("true", "false"), "@Type": ("uint8", "int16", "uint16", "float"), "@PositionXUnit": LENGTHS}
+OME_WORDS = {
+    "@PhysicalSizeXUnit": LENGTHS,
+    "@PhysicalSizeYUnit": LENGTHS,
+    "@PhysicalSizeZUnit": LENGTHS,
+    "@TimeIncrementUnit": TIMES,
+    "@DeltaTUnit": TIMES,
+    "@DimensionOrder": ("XYZCT", "XYZTC", "XYCTZ", "XYTCZ", "XYTZC", "XYCZT"),
+    "@BigEndian": ("true", "false"),
+    "@Interleaved": ("true", "false"),
+    "@Type": ("uint8", "int16", "uint16", "float"),
+    "@PositionXUnit": LENGTHS,
+}
 
 
 class ImageJLines(LinesDocument):
     """ImageJ's description: a line for each key."""
 
-    WORDS = {"unit": ("micron", "um", "nm", "inch", "pixel", "cm"), "tunit": ("sec", "ms", "min"), "mode": ("grayscale", "color", "composite"),
-             "order": ("zct", "xyzct", "default"), "cf": ("0", "1", "20", "21"), "hyperstack": ("true", "false")}
+    WORDS = {
+        "unit": ("micron", "um", "nm", "inch", "pixel", "cm"),
+        "tunit": ("sec", "ms", "min"),
+        "mode": ("grayscale", "color", "composite"),
+        "order": ("zct", "xyzct", "default"),
+        "cf": ("0", "1", "20", "21"),
+        "hyperstack": ("true", "false"),
+    }
     ROLES = {"spacing": "spacing", "finterval": "spacing", "unit": "unit", "tunit": "unit", "c0": "offset", "c1": "scale"}
-    NAMES = {"images": ("pages", "pictures"), "channels": ("pages", "channel"), "slices": ("pages", "slice"), "frames": ("pages", "time"),
-             "ImageJ": ("pages",), "cf": ("calibration", "function"), "c0": ("calibrat",), "c1": ("calibrat",), "vunit": ("calibrated",)}
+    NAMES = {
+        "images": ("pages", "pictures"),
+        "channels": ("pages", "channel"),
+        "slices": ("pages", "slice"),
+        "frames": ("pages", "time"),
+        "ImageJ": ("pages",),
+        "cf": ("calibration", "function"),
+        "c0": ("calibrat",),
+        "c1": ("calibrat",),
+        "vunit": ("calibrated",),
+    }
 
     def __init__(self, path, name="imagej"):
         self.path, self.name, self.separator = pathlib.Path(path), name, "="
@@ -303,12 +404,20 @@ class ImageJBlock(Document):
         nodes = []
         for key, value in self.block.items():
             plain = key in ("Ranges", "Labels", "Info")
-            nodes.append(Node(f"{self.name}/{key}", list(value) if isinstance(value, tuple) else value if plain else None,
-                              (lambda new, k=key: self.block.__setitem__(k, new)) if plain else None, lambda k=key: self.block.pop(k),
-                              kind="comment" if key in ("Info", "Labels") else ""))
+            nodes.append(
+                Node(
+                    f"{self.name}/{key}",
+                    list(value) if isinstance(value, tuple) else value if plain else None,
+                    (lambda new, k=key: self.block.__setitem__(k, new)) if plain else None,
+                    lambda k=key: self.block.pop(k),
+                    kind="comment" if key in ("Info", "Labels") else "",
+                )
+            )
             if key == "LUTs":
-                nodes[-1].more = [Change("reversed", lambda: self.block.__setitem__("LUTs", list(self.block["LUTs"])[::-1])),
-                                  Change("inverted", lambda: self.block.__setitem__("LUTs", [255 - lut for lut in self.block["LUTs"]]))]
+                nodes[-1].more = [
+                    Change("reversed", lambda: self.block.__setitem__("LUTs", list(self.block["LUTs"])[::-1])),
+                    Change("inverted", lambda: self.block.__setitem__("LUTs", [255 - lut for lut in self.block["LUTs"]])),
+                ]
         return nodes
 
     def save(self):

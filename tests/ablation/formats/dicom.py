@@ -1,5 +1,6 @@
-"""DICOM by pydicom: series of files, enhanced multi-frame objects, dose, segmentations, SPECT. The foreign reader is pydicom; voxels are placed
+"""DICOM by pydicom: series of files, enhanced multi-frame objects, dose, segmentations, SPECT. The foreign reader is pydicom; voxels lie
 by the standard (PS3.3 C.7.6.2, C.7.6.16, C.8.8.3, C.8.4.15), and values are those of the Modality LUT (C.11.1)."""
+
 import collections
 
 import numpy as np
@@ -116,6 +117,7 @@ def write_ct(folder, dtype=np.int16, bits=None, rescale=(1, -1024), photometric=
         ds.LossyImageCompression, ds.BurnedInAnnotation, ds.PixelAspectRatio = "00", "NO", [8, 7]
         del ds.PixelAspectRatio
         return ds
+
     slices(folder, "ct", SLICES, make, dtype, 1, 4000)
 
 
@@ -136,6 +138,7 @@ def write_echoes(folder):
         ds.EchoNumbers, ds.EchoTime = k // 3 + 1, 5 + 10 * (k // 3)
         set_plane(ds, k % 3)
         return ds
+
     slices(folder, "echoes", 6, make, np.uint16, 1, 4000)
 
 
@@ -147,6 +150,7 @@ def write_cine(folder):
         set_plane(ds, k % 2)
         ds.SmallestImagePixelValue, ds.LargestImagePixelValue = 0, 4000
         return ds
+
     slices(folder, "cine", 6, make, np.uint16, 1, 4000)
 
 
@@ -155,18 +159,32 @@ def write_pet(folder):
         ds = header(PET, "PT", "pet", k)
         ds.ImageType = ["ORIGINAL", "PRIMARY"]
         ds.SeriesType, ds.Units, ds.CountsSource, ds.DecayCorrection = ["STATIC", "IMAGE"], "BQML", "EMISSION", "START"
-        ds.CorrectedImage, ds.RandomsCorrectionMethod, ds.AttenuationCorrectionMethod = ["NORM", "DTIM", "ATTN", "SCAT", "DECY"], "DLYD", "CT"
+        ds.CorrectedImage, ds.RandomsCorrectionMethod, ds.AttenuationCorrectionMethod = (
+            ["NORM", "DTIM", "ATTN", "SCAT", "DECY"],
+            "DLYD",
+            "CT",
+        )
         ds.ScatterCorrectionMethod, ds.ReconstructionMethod, ds.NumberOfSlices = "Model-based", "OSEM3D 4i8s", SLICES
         ds.ActualFrameDuration, ds.FrameReferenceTime, ds.DecayFactor, ds.DoseCalibrationFactor = 180000, 90000, 1.02, 1
         ds.ScatterFractionFactor, ds.DeadTimeFactor, ds.ImageIndex, ds.SUVType = 0.3, 1.01, k + 1, "BW"
         ds.CollimatorType, ds.PatientGantryRelationshipCodeSequence = "NONE", Sequence([code("F-10470", "SRT", "headfirst")])
         ds.PatientOrientationCodeSequence = Sequence([code("F-10450", "SRT", "recumbent")])
-        ds.RadiopharmaceuticalInformationSequence = Sequence([item(
-            Radiopharmaceutical="FDG", RadiopharmaceuticalStartTime="093000", RadionuclideTotalDose=370000000, RadionuclideHalfLife=6586.2,
-            RadionuclidePositronFraction=0.97, RadionuclideCodeSequence=Sequence([code("C-111A1", "SRT", "18F")]))])
+        ds.RadiopharmaceuticalInformationSequence = Sequence(
+            [
+                item(
+                    Radiopharmaceutical="FDG",
+                    RadiopharmaceuticalStartTime="093000",
+                    RadionuclideTotalDose=370000000,
+                    RadionuclideHalfLife=6586.2,
+                    RadionuclidePositronFraction=0.97,
+                    RadionuclideCodeSequence=Sequence([code("C-111A1", "SRT", "18F")]),
+                )
+            ]
+        )
         set_plane(ds, k)
         ds.RescaleSlope, ds.RescaleIntercept, ds.RescaleType = 0.5 + 0.25 * k, 0, "BQML"
         return ds
+
     slices(folder, "pet", SLICES, make, np.int16, 1, 4000)
 
 
@@ -179,6 +197,7 @@ def write_dynamic_pet(folder):
         set_plane(ds, k % 2)
         ds.RescaleSlope, ds.RescaleIntercept = 0.5 + 0.25 * (k // 2), 0
         return ds
+
     slices(folder, "dynamic", 6, make, np.int16, 1, 4000)
 
 
@@ -186,15 +205,31 @@ def multi_frame(sop_class, modality, name, stored, **pixels):
     ds = header(sop_class, modality, name)
     ds.ContentLabel, ds.ContentDescription, ds.ContentCreatorName = "IMAGE", "made", "Who^A"
     ds.PresentationLUTShape, ds.LossyImageCompression, ds.BurnedInAnnotation = "IDENTITY", "00", "NO"
-    ds.AcquisitionDateTime, ds.AcquisitionDuration, ds.ContentQualification, ds.VolumetricProperties = "20240102101112", 10, "PRODUCT", "VOLUME"
+    ds.AcquisitionDateTime, ds.AcquisitionDuration, ds.ContentQualification, ds.VolumetricProperties = (
+        "20240102101112",
+        10,
+        "PRODUCT",
+        "VOLUME",
+    )
     set_pixels(ds, stored, **pixels)
     ds.DimensionOrganizationSequence = Sequence([item(DimensionOrganizationUID=uid("dimensions"))])
     ds.DimensionOrganizationType = "3D"
-    ds.DimensionIndexSequence = Sequence([
-        item(DimensionOrganizationUID=uid("dimensions"), DimensionIndexPointer=0x00209056, FunctionalGroupPointer=0x00209111,
-             DimensionDescriptionLabel="Stack ID"),
-        item(DimensionOrganizationUID=uid("dimensions"), DimensionIndexPointer=0x00209057, FunctionalGroupPointer=0x00209111,
-             DimensionDescriptionLabel="In-Stack Position Number")])
+    ds.DimensionIndexSequence = Sequence(
+        [
+            item(
+                DimensionOrganizationUID=uid("dimensions"),
+                DimensionIndexPointer=0x00209056,
+                FunctionalGroupPointer=0x00209111,
+                DimensionDescriptionLabel="Stack ID",
+            ),
+            item(
+                DimensionOrganizationUID=uid("dimensions"),
+                DimensionIndexPointer=0x00209057,
+                FunctionalGroupPointer=0x00209111,
+                DimensionDescriptionLabel="In-Stack Position Number",
+            ),
+        ]
+    )
     return ds
 
 
@@ -207,8 +242,15 @@ def measures(step=2.5):
 
 
 def frame_group(k, time=0, slices_=SLICES, times=1):
-    content = item(FrameAcquisitionNumber=1, FrameReferenceDateTime="20240102101112", FrameAcquisitionDateTime="20240102101112",
-                   FrameAcquisitionDuration=10.0, StackID="1", InStackPositionNumber=k + 1, DimensionIndexValues=[1, k + 1])
+    content = item(
+        FrameAcquisitionNumber=1,
+        FrameReferenceDateTime="20240102101112",
+        FrameAcquisitionDateTime="20240102101112",
+        FrameAcquisitionDuration=10.0,
+        StackID="1",
+        InStackPositionNumber=k + 1,
+        DimensionIndexValues=[1, k + 1],
+    )
     if times > 1:
         content.TemporalPositionIndex, content.DimensionIndexValues = time + 1, [1, k + 1, time + 1]
     return item(FrameContentSequence=Sequence([content]), PlanePositionSequence=Sequence([item(ImagePositionPatient=position(k, 2.5))]))
@@ -219,20 +261,47 @@ def window():
 
 
 def value_map(slope, intercept, unit):
-    return Sequence([item(RealWorldValueFirstValueMapped=0, RealWorldValueLastValueMapped=4095, RealWorldValueSlope=float(slope),
-                          RealWorldValueIntercept=float(intercept), LUTExplanation="map", LUTLabel="map",
-                          MeasurementUnitsCodeSequence=Sequence([code(unit, "UCUM", unit)]))])
+    return Sequence(
+        [
+            item(
+                RealWorldValueFirstValueMapped=0,
+                RealWorldValueLastValueMapped=4095,
+                RealWorldValueSlope=float(slope),
+                RealWorldValueIntercept=float(intercept),
+                LUTExplanation="map",
+                LUTLabel="map",
+                MeasurementUnitsCodeSequence=Sequence([code(unit, "UCUM", unit)]),
+            )
+        ]
+    )
 
 
 def write_enhanced_ct(folder):
     ds = multi_frame(ENHANCED_CT, "CT", "enhanced ct", stored_values((SLICES, ROWS, COLUMNS), np.int16, 1, 4000))
     ds.ImageType = ["ORIGINAL", "PRIMARY", "VOLUME", "NONE"]
-    ds.SharedFunctionalGroupsSequence = Sequence([item(
-        PlaneOrientationSequence=plane_orientation(), PixelMeasuresSequence=measures(), FrameVOILUTSequence=window(),
-        PixelValueTransformationSequence=Sequence([item(RescaleSlope=2, RescaleIntercept=-1024, RescaleType="HU")]),
-        FrameAnatomySequence=Sequence([item(FrameLaterality="U", AnatomicRegionSequence=Sequence([code("T-D1100", "SRT", "Head")]))]),
-        CTImageFrameTypeSequence=Sequence([item(FrameType=["ORIGINAL", "PRIMARY", "VOLUME", "NONE"], PixelPresentation="MONOCHROME",
-                                                VolumetricProperties="VOLUME", VolumeBasedCalculationTechnique="NONE")]))])
+    ds.SharedFunctionalGroupsSequence = Sequence(
+        [
+            item(
+                PlaneOrientationSequence=plane_orientation(),
+                PixelMeasuresSequence=measures(),
+                FrameVOILUTSequence=window(),
+                PixelValueTransformationSequence=Sequence([item(RescaleSlope=2, RescaleIntercept=-1024, RescaleType="HU")]),
+                FrameAnatomySequence=Sequence(
+                    [item(FrameLaterality="U", AnatomicRegionSequence=Sequence([code("T-D1100", "SRT", "Head")]))]
+                ),
+                CTImageFrameTypeSequence=Sequence(
+                    [
+                        item(
+                            FrameType=["ORIGINAL", "PRIMARY", "VOLUME", "NONE"],
+                            PixelPresentation="MONOCHROME",
+                            VolumetricProperties="VOLUME",
+                            VolumeBasedCalculationTechnique="NONE",
+                        )
+                    ]
+                ),
+            )
+        ]
+    )
     ds.PerFrameFunctionalGroupsSequence = Sequence([frame_group(k) for k in (2, 0, 1, 3)])
     ds.save_as(folder / "a.dcm", enforce_file_format=True)
 
@@ -265,21 +334,36 @@ def write_enhanced_pet(folder):
 def write_dose(folder, first=0.0):
     ds = header(DOSE, "RTDOSE", f"dose {first}")
     set_pixels(ds, stored_values((SLICES, ROWS, COLUMNS), np.uint32, 1, 400000))
-    ds.ImagePositionPatient, ds.ImageOrientationPatient, ds.PixelSpacing, ds.SliceThickness = [-30, -40, 20], [1, 0, 0, 0, 1, 0], [2, 3], None
-    ds.FrameIncrementPointer = 0x3004000c
+    ds.ImagePositionPatient, ds.ImageOrientationPatient, ds.PixelSpacing, ds.SliceThickness = (
+        [-30, -40, 20],
+        [1, 0, 0, 0, 1, 0],
+        [2, 3],
+        None,
+    )
+    ds.FrameIncrementPointer = 0x3004000C
     ds.GridFrameOffsetVector = [first + 2.5 * k for k in range(SLICES)]
     ds.DoseUnits, ds.DoseType, ds.DoseComment, ds.DoseSummationType, ds.DoseGridScaling = "GY", "PHYSICAL", "plan", "PLAN", 0.00025
     ds.TissueHeterogeneityCorrection, ds.NormalizationPoint = "IMAGE", [0, 0, 20]
-    ds.ReferencedRTPlanSequence = Sequence([item(ReferencedSOPClassUID="1.2.840.10008.5.1.4.1.1.481.5", ReferencedSOPInstanceUID=uid("plan"))])
+    ds.ReferencedRTPlanSequence = Sequence(
+        [item(ReferencedSOPClassUID="1.2.840.10008.5.1.4.1.1.481.5", ReferencedSOPInstanceUID=uid("plan"))]
+    )
     ds.save_as(folder / "a.dcm", enforce_file_format=True)
 
 
 def segment(number, label):
-    return item(SegmentNumber=number, SegmentLabel=label, SegmentDescription="a part", SegmentAlgorithmType="AUTOMATIC",
-                SegmentAlgorithmName="net", RecommendedDisplayCIELabValue=[30000 + number, 40000, 20000], RecommendedDisplayGrayscaleValue=65535,
-                TrackingID=label, TrackingUID=uid("tracking", number),
-                SegmentedPropertyCategoryCodeSequence=Sequence([code("T-D0050", "SRT", "Tissue")]),
-                SegmentedPropertyTypeCodeSequence=Sequence([code("T-62000", "SRT", "Liver")]))
+    return item(
+        SegmentNumber=number,
+        SegmentLabel=label,
+        SegmentDescription="a part",
+        SegmentAlgorithmType="AUTOMATIC",
+        SegmentAlgorithmName="net",
+        RecommendedDisplayCIELabValue=[30000 + number, 40000, 20000],
+        RecommendedDisplayGrayscaleValue=65535,
+        TrackingID=label,
+        TrackingUID=uid("tracking", number),
+        SegmentedPropertyCategoryCodeSequence=Sequence([code("T-D0050", "SRT", "Tissue")]),
+        SegmentedPropertyTypeCodeSequence=Sequence([code("T-62000", "SRT", "Liver")]),
+    )
 
 
 def write_segmentation(folder, kind):
@@ -295,7 +379,9 @@ def write_segmentation(folder, kind):
         ds.PixelPaddingValue = 0
     else:
         of_frames = [(k, n) for n in numbers for k in range(SLICES)]
-        frames = np.stack([(labels[k] == n) * 1 if kind == "BINARY" else random.integers(0, 201, (ROWS, COLUMNS)) for k, n in of_frames]).astype(np.uint8)
+        frames = np.stack(
+            [(labels[k] == n) * 1 if kind == "BINARY" else random.integers(0, 201, (ROWS, COLUMNS)) for k, n in of_frames]
+        ).astype(np.uint8)
     set_pixels(ds, frames)
     if kind == "FRACTIONAL":
         ds.SegmentationFractionalType, ds.MaximumFractionalValue = "PROBABILITY", 200
@@ -321,8 +407,15 @@ def write_parametric(folder):
     ds.BitsAllocated = 32
     ds.FloatPixelData = np.random.default_rng(5).normal(size=(SLICES, ROWS, COLUMNS)).astype(np.float32).tobytes()
     ds.FloatPixelPaddingValue = -9999.0
-    ds.SharedFunctionalGroupsSequence = Sequence([item(PlaneOrientationSequence=plane_orientation(), PixelMeasuresSequence=measures(),
-                                                       RealWorldValueMappingSequence=value_map(2, 1, "mm2/s"))])
+    ds.SharedFunctionalGroupsSequence = Sequence(
+        [
+            item(
+                PlaneOrientationSequence=plane_orientation(),
+                PixelMeasuresSequence=measures(),
+                RealWorldValueMappingSequence=value_map(2, 1, "mm2/s"),
+            )
+        ]
+    )
     ds.PerFrameFunctionalGroupsSequence = Sequence([frame_group(k) for k in range(SLICES)])
     ds.save_as(folder / "a.dcm", enforce_file_format=True)
 
@@ -335,19 +428,32 @@ def write_spect(folder):
     ds.FrameIncrementPointer = [0x00540080]
     ds.NumberOfSlices, ds.SliceVector = SLICES, list(range(1, SLICES + 1))
     ds.NumberOfEnergyWindows, ds.NumberOfDetectors = 1, 1
-    ds.EnergyWindowInformationSequence = Sequence([item(EnergyWindowName="Tc99m", EnergyWindowRangeSequence=Sequence(
-        [item(EnergyWindowLowerLimit=126, EnergyWindowUpperLimit=154)]))])
-    ds.DetectorInformationSequence = Sequence([item(ImagePositionPatient=[-30, -40, 20], ImageOrientationPatient=[1, 0, 0, 0, 1, 0],
-                                                    CollimatorType="PARA", FieldOfViewShape="RECTANGLE", StartAngle=0, RadialPosition=200,
-                                                    FocalDistance=0)])
-    ds.RotationInformationSequence = Sequence([item(StartAngle=0, AngularStep=6, RotationDirection="CW", ScanArc=360, ActualFrameDuration=20000,
-                                                    NumberOfFramesInRotation=60)])
+    ds.EnergyWindowInformationSequence = Sequence(
+        [item(EnergyWindowName="Tc99m", EnergyWindowRangeSequence=Sequence([item(EnergyWindowLowerLimit=126, EnergyWindowUpperLimit=154)]))]
+    )
+    ds.DetectorInformationSequence = Sequence(
+        [
+            item(
+                ImagePositionPatient=[-30, -40, 20],
+                ImageOrientationPatient=[1, 0, 0, 0, 1, 0],
+                CollimatorType="PARA",
+                FieldOfViewShape="RECTANGLE",
+                StartAngle=0,
+                RadialPosition=200,
+                FocalDistance=0,
+            )
+        ]
+    )
+    ds.RotationInformationSequence = Sequence(
+        [item(StartAngle=0, AngularStep=6, RotationDirection="CW", ScanArc=360, ActualFrameDuration=20000, NumberOfFramesInRotation=60)]
+    )
     ds.PatientOrientationCodeSequence = Sequence([code("F-10450", "SRT", "recumbent")])
     ds.RescaleSlope, ds.RescaleIntercept = 1, 0
     ds.save_as(folder / "a.dcm", enforce_file_format=True)
 
 
 # The foreign reader.
+
 
 def stored_frames(ds):
     """Frames [frame, row, column] of the bits that are stored."""
@@ -395,7 +501,9 @@ def position_of(ds, frame):
     if ds.SOPClassUID == NM:
         detector = ds.DetectorInformationSequence[0]
         directions = np.array(detector.ImageOrientationPatient, float).reshape(2, 3)
-        return np.array(detector.ImagePositionPatient, float) + np.cross(*directions) * float(ds.SpacingBetweenSlices) * (ds.SliceVector[frame] - 1)
+        return np.array(detector.ImagePositionPatient, float) + np.cross(*directions) * float(ds.SpacingBetweenSlices) * (
+            ds.SliceVector[frame] - 1
+        )
     return np.array(at, float)
 
 
@@ -416,8 +524,13 @@ def frames_of(ds, key):
         directions = in_groups(ds, frame, "PlaneOrientationSequence", "ImageOrientationPatient")
         if ds.SOPClassUID == NM:
             directions = ds.DetectorInformationSequence[0].ImageOrientationPatient
-        yield dict(position=position_of(ds, frame), directions=np.array(directions, float).reshape(2, 3), values=slope * pixels + intercept,
-                   spacing=np.array(in_groups(ds, frame, "PixelMeasuresSequence", "PixelSpacing"), float), key=key(ds, frame))
+        yield dict(
+            position=position_of(ds, frame),
+            directions=np.array(directions, float).reshape(2, 3),
+            values=slope * pixels + intercept,
+            spacing=np.array(in_groups(ds, frame, "PixelMeasuresSequence", "PixelSpacing"), float),
+            key=key(ds, frame),
+        )
 
 
 def stack(frames):
@@ -427,7 +540,11 @@ def stack(frames):
     at = np.array([frame["position"] for frame in frames])
     step = (at[-1] - at[0]) / (len(at) - 1)
     side = [np.linalg.norm(np.cross(step, normal))]
-    if np.any(np.abs(at - at[0] - np.arange(len(at))[:, None] * step) > 0.02 * np.linalg.norm(step)) or side[0] > 1e-3 or np.linalg.norm(step) < 1e-3:
+    if (
+        np.any(np.abs(at - at[0] - np.arange(len(at))[:, None] * step) > 0.02 * np.linalg.norm(step))
+        or side[0] > 1e-3
+        or np.linalg.norm(step) < 1e-3
+    ):
         raise ValueError("positions")
     for frame in frames:
         for name in ("directions", "spacing"):
@@ -489,6 +606,7 @@ def temporal_position_of(ds, frame):
 
 def series(name, kind, write, key=no_key):
     """Of files: what all of them say, and what one of them says otherwise."""
+
     def documents(folder):
         paths = sorted((folder / "study").iterdir())
         return [DicomDocument(paths, kind, kind == "ct"), DicomDocument(paths[:1], "slice", groups=SLICE_GROUPS)]
@@ -496,11 +614,18 @@ def series(name, kind, write, key=no_key):
     def make(folder):
         (folder / "study").mkdir()
         write(folder / "study")
+
     return Sample(name, "study", make, documents, lambda folder: read(sorted((folder / "study").iterdir()), key))
 
 
 def single(name, kind, write, read_file=read):
-    return Sample(name, "a.dcm", write, lambda folder: [DicomDocument([folder / "a.dcm"], kind, kind == "dose")], lambda folder: read_file([folder / "a.dcm"]))
+    return Sample(
+        name,
+        "a.dcm",
+        write,
+        lambda folder: [DicomDocument([folder / "a.dcm"], kind, kind == "dose")],
+        lambda folder: read_file([folder / "a.dcm"]),
+    )
 
 
 def samples(_):
@@ -517,10 +642,18 @@ def samples(_):
         single("dose", "dose", write_dose),
         single("dose-absolute", "dose", lambda folder: write_dose(folder, 20.0)),
         single("seg-binary", "segments", lambda folder: write_segmentation(folder, "BINARY"), read_binary),
-        single("seg-fractional", "segments", lambda folder: write_segmentation(folder, "FRACTIONAL"),
-               lambda paths: read(paths, segment_of, as_channels=True, segmentation="FRACTIONAL")),
-        single("seg-labelmap", "segments", lambda folder: write_segmentation(folder, "LABELMAP"),
-               lambda paths: read(paths, segmentation="LABELMAP")),
+        single(
+            "seg-fractional",
+            "segments",
+            lambda folder: write_segmentation(folder, "FRACTIONAL"),
+            lambda paths: read(paths, segment_of, as_channels=True, segmentation="FRACTIONAL"),
+        ),
+        single(
+            "seg-labelmap",
+            "segments",
+            lambda folder: write_segmentation(folder, "LABELMAP"),
+            lambda paths: read(paths, segmentation="LABELMAP"),
+        ),
         single("parametric", "parametric", write_parametric),
         single("spect", "spect", write_spect),
     ]

@@ -1,4 +1,5 @@
 """MetaImage by ITK: each line of the header is a node."""
+
 import re
 
 import numpy as np
@@ -11,17 +12,51 @@ from documents import LinesDocument
 
 FOREIGN_READER_CRASHES = True  # ITK does, on some headers
 
-KINDS = {"Comment": "comment", "Name": "comment", "ID": "identifier", "ParentID": "identifier", "AcquisitionDate": "date", "ITK_InputFilterName": "comment"}
-ROLES = {"ElementSpacing": "spacing", "ElementSize": "spacing", "Offset": "affine", "Position": "affine", "Origin": "affine", "TransformMatrix": "affine",
-         "Rotation": "affine", "CenterOfRotation": "affine", "DistanceUnits": "unit", "ElementToIntensityFunctionSlope": "scale",
-         "ElementToIntensityFunctionOffset": "offset"}
-NAMES = {"DimSize": ("size", "bytes", "truncated", "samples"), "NDims": ("dimension", "DimSize"), "ElementType": ("type", "bytes", "truncated"),
-         "BinaryData": ("binary", "text"), "CompressedData": ("compress", "inflat", "zlib", "truncated"), "CompressedDataSize": ("compress", "bytes"),
-         "ElementNumberOfChannels": ("channels", "components", "bytes"), "HeaderSize": ("header", "bytes"), "ElementDataFile": ("file",),
-         "ObjectType": ("ObjectType", "Image"), "TransformMatrix": ("matrix", "axes", "directions"), "ElementSpacing": ("spacing",)}
-WORDS = {"ElementType": ("MET_UCHAR", "MET_SHORT", "MET_USHORT", "MET_FLOAT", "MET_DOUBLE", "MET_LONG"), "BinaryDataByteOrderMSB": ("True", "False"),
-         "ElementByteOrderMSB": ("True", "False"), "BinaryData": ("True", "False"), "CompressedData": ("True", "False"),
-         "AnatomicalOrientation": ("RAI", "LPS", "RAS", "???"), "DistanceUnits": ("mm", "um", "cm", "m"), "ObjectType": ("Image", "Mesh", "Tube")}
+KINDS = {
+    "Comment": "comment",
+    "Name": "comment",
+    "ID": "identifier",
+    "ParentID": "identifier",
+    "AcquisitionDate": "date",
+    "ITK_InputFilterName": "comment",
+}
+ROLES = {
+    "ElementSpacing": "spacing",
+    "ElementSize": "spacing",
+    "Offset": "affine",
+    "Position": "affine",
+    "Origin": "affine",
+    "TransformMatrix": "affine",
+    "Rotation": "affine",
+    "CenterOfRotation": "affine",
+    "DistanceUnits": "unit",
+    "ElementToIntensityFunctionSlope": "scale",
+    "ElementToIntensityFunctionOffset": "offset",
+}
+NAMES = {
+    "DimSize": ("size", "bytes", "truncated", "samples"),
+    "NDims": ("dimension", "DimSize"),
+    "ElementType": ("type", "bytes", "truncated"),
+    "BinaryData": ("binary", "text"),
+    "CompressedData": ("compress", "inflat", "zlib", "truncated"),
+    "CompressedDataSize": ("compress", "bytes"),
+    "ElementNumberOfChannels": ("channels", "components", "bytes"),
+    "HeaderSize": ("header", "bytes"),
+    "ElementDataFile": ("file",),
+    "ObjectType": ("ObjectType", "Image"),
+    "TransformMatrix": ("matrix", "axes", "directions"),
+    "ElementSpacing": ("spacing",),
+}
+WORDS = {
+    "ElementType": ("MET_UCHAR", "MET_SHORT", "MET_USHORT", "MET_FLOAT", "MET_DOUBLE", "MET_LONG"),
+    "BinaryDataByteOrderMSB": ("True", "False"),
+    "ElementByteOrderMSB": ("True", "False"),
+    "BinaryData": ("True", "False"),
+    "CompressedData": ("True", "False"),
+    "AnatomicalOrientation": ("RAI", "LPS", "RAS", "???"),
+    "DistanceUnits": ("mm", "um", "cm", "m"),
+    "ObjectType": ("Image", "Mesh", "Tube"),
+}
 TYPES = (SimpleITK.sitkUInt8, SimpleITK.sitkInt32, SimpleITK.sitkFloat32, SimpleITK.sitkFloat64)
 
 
@@ -41,7 +76,9 @@ class Header(LinesDocument):
             key = node.path.split("/")[-1]
             node.kind, node.role, node.names, node.words = KINDS.get(key, ""), ROLES.get(key, ""), NAMES.get(key, ()), WORDS.get(key, ())
             if key == "ElementType":
-                node.more = [Change(f"samples are {SimpleITK.GetPixelIDValueAsString(t)}", lambda t=t: self._encode(t), same=True) for t in TYPES]
+                node.more = [
+                    Change(f"samples are {SimpleITK.GetPixelIDValueAsString(t)}", lambda t=t: self._encode(t), same=True) for t in TYPES
+                ]
             elif key == "CompressedData":
                 node.more = [Change("compressed or not", self._compress, same=True)]
             elif key == "BinaryDataByteOrderMSB":
@@ -79,7 +116,7 @@ class Header(LinesDocument):
     def _exchange(self, node):
         numbers = node.value.split()
         side = round(len(numbers) ** 0.5)
-        node.set(" ".join(numbers[side:2 * side] + numbers[:side] + numbers[2 * side:]))
+        node.set(" ".join(numbers[side : 2 * side] + numbers[:side] + numbers[2 * side :]))
 
     def place(self, at):
         """Before the line of the data."""
@@ -130,17 +167,42 @@ def packed(folder):
 def spelled(folder):
     """As other programs of MetaIO write it: comments, names, units, sizes of elements, intensities."""
     SimpleITK.WriteImage(image(np.uint8), str(folder / "a.mha"))
-    with_lines(folder / "a.mha", ["ElementMin = 1", "ElementMax = 119", "ElementSize = 1.5 2 2.5", "DistanceUnits = um", "Modality = MET_MOD_MR",
-                                  "ElementToIntensityFunctionSlope = 1", "ElementToIntensityFunctionOffset = 0"])
-    with_lines(folder / "a.mha", [], [("CenterOfRotation", "CenterOfRotation = 1 2 3"), ("ObjectType", "Comment = made by a scanner\nObjectType = Image"),
-                                      ("NDims", "ObjectSubType = Image\nName = head\nID = 1\nParentID = 0\nAcquisitionDate = 2024.01.02\nColor = 1 0 0 1\nNDims = 3")])
+    with_lines(
+        folder / "a.mha",
+        [
+            "ElementMin = 1",
+            "ElementMax = 119",
+            "ElementSize = 1.5 2 2.5",
+            "DistanceUnits = um",
+            "Modality = MET_MOD_MR",
+            "ElementToIntensityFunctionSlope = 1",
+            "ElementToIntensityFunctionOffset = 0",
+        ],
+    )
+    with_lines(
+        folder / "a.mha",
+        [],
+        [
+            ("CenterOfRotation", "CenterOfRotation = 1 2 3"),
+            ("ObjectType", "Comment = made by a scanner\nObjectType = Image"),
+            ("NDims", "ObjectSubType = Image\nName = head\nID = 1\nParentID = 0\nAcquisitionDate = 2024.01.02\nColor = 1 0 0 1\nNDims = 3"),
+        ],
+    )
 
 
 def sized(folder):
     """ElementSize instead of ElementSpacing, Position instead of Offset, as old writers have them."""
     SimpleITK.WriteImage(image(np.int16, False), str(folder / "a.mha"))
-    with_lines(folder / "a.mha", [], [("ElementSpacing", "ElementSize = 1.5 2 2.5"), ("Offset", "Position = 10 -20 30"),
-                                      ("TransformMatrix", "Orientation = 1 0 0 0 1 0 0 0 1"), ("CenterOfRotation", None)])
+    with_lines(
+        folder / "a.mha",
+        [],
+        [
+            ("ElementSpacing", "ElementSize = 1.5 2 2.5"),
+            ("Offset", "Position = 10 -20 30"),
+            ("TransformMatrix", "Orientation = 1 0 0 0 1 0 0 0 1"),
+            ("CenterOfRotation", None),
+        ],
+    )
 
 
 def by_vtk(folder):
@@ -148,7 +210,9 @@ def by_vtk(folder):
     data.SetDimensions(5, 6, 7), data.SetSpacing(1.5, 2.0, 2.5), data.SetOrigin(10, -20, 30)
     data.GetPointData().SetScalars(numpy_support.numpy_to_vtk(values((210,), np.float32), deep=True))
     writer = vtk.vtkMetaImageWriter()
-    writer.SetInputData(data), writer.SetFileName(str(folder / "a.mhd")), writer.SetRAWFileName(str(folder / "a.raw")), writer.SetCompression(False)
+    writer.SetInputData(data), writer.SetFileName(str(folder / "a.mhd")), writer.SetRAWFileName(
+        str(folder / "a.raw")
+    ), writer.SetCompression(False)
     writer.Write()
     with_lines(folder / "a.mhd", [], [("ElementDataFile", "ElementDataFile = a.raw")])
 
@@ -170,7 +234,7 @@ def listed(folder, line):
     detached(folder)
     raw = (folder / "a.raw").read_bytes()
     for k in range(7):
-        (folder / f"s{k:03d}.raw").write_bytes(raw[60 * k:60 * (k + 1)])
+        (folder / f"s{k:03d}.raw").write_bytes(raw[60 * k : 60 * (k + 1)])
     (folder / "a.raw").unlink()
     with_lines(folder / "a.mhd", [], [("ElementDataFile", line)])
 
@@ -178,12 +242,22 @@ def listed(folder, line):
 def ultrasound(folder):
     """As PLUS writes sequences: a key for each frame."""
     SimpleITK.WriteImage(image(np.int16, False), str(folder / "a.mha"))
-    with_lines(folder / "a.mha", ["UltrasoundImageOrientation = MFA", "UltrasoundImageType = BRIGHTNESS", "ElementByteOrderMSB = False",
-                                  "Seq_Frame0000_ImageStatus = OK", "Seq_Frame0000_Timestamp = 1.5",
-                                  "Seq_Frame0000_ProbeToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "Kinds = domain domain list"])
+    with_lines(
+        folder / "a.mha",
+        [
+            "UltrasoundImageOrientation = MFA",
+            "UltrasoundImageType = BRIGHTNESS",
+            "ElementByteOrderMSB = False",
+            "Seq_Frame0000_ImageStatus = OK",
+            "Seq_Frame0000_Timestamp = 1.5",
+            "Seq_Frame0000_ProbeToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1",
+            "Kinds = domain domain list",
+        ],
+    )
 
 
 # The foreign reader.
+
 
 def read(path):
     """By ITK: left, posterior, superior. A file without a matrix, an origin and letters has no orientation, and VTK's is a scene."""
@@ -207,17 +281,20 @@ def read(path):
 
 
 def sample(name, write, file="a.mha", sidecars=()):
-    return Sample(name, file, write, lambda folder: [Header(folder / file, "header")],
-                  lambda folder: read(folder / file), sidecars)
+    return Sample(name, file, write, lambda folder: [Header(folder / file, "header")], lambda folder: read(folder / file), sidecars)
 
 
 def samples(_):
     return [
-        sample("itk", itk), sample("packed", packed), sample("spelled", spelled), sample("sized", sized),
+        sample("itk", itk),
+        sample("packed", packed),
+        sample("spelled", spelled),
+        sample("sized", sized),
         sample("by-vtk", by_vtk, "a.mhd", ("a.raw",)),
         sample("floats", lambda folder: SimpleITK.WriteImage(image(np.float64), str(folder / "a.mha"))),
         sample("vectors", lambda folder: SimpleITK.WriteImage(image(np.float32, components=3), str(folder / "a.mha"))),
-        sample("times", times), sample("ultrasound", ultrasound),
+        sample("times", times),
+        sample("ultrasound", ultrasound),
         sample("detached", detached, "a.mhd", ("a.raw",)),
         sample("front", lambda folder: detached(folder, ["HeaderSize = 24"], b"\1" * 24), "a.mhd"),
         sample("from-the-end", lambda folder: detached(folder, ["HeaderSize = -1"], b"\1" * 24), "a.mhd"),

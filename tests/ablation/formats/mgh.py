@@ -1,4 +1,5 @@
 """MGH by nibabel: FreeSurfer's header, and what follows the voxels."""
+
 import gzip
 
 import nibabel
@@ -8,11 +9,28 @@ from nibabel.freesurfer.mghformat import MGHImage
 from ablation import Answer, CannotWrite, Change, Sample
 from documents import HeaderDocument
 
-HEADER = np.dtype([("version", ">i4"), ("dims", ">i4", 4), ("type", ">i4"), ("dof", ">i4"), ("goodRASFlag", ">i2"), ("delta", ">f4", 3),
-                   ("Mdc", ">f4", 9), ("Pxyz_c", ">f4", 3)])
+HEADER = np.dtype(
+    [
+        ("version", ">i4"),
+        ("dims", ">i4", 4),
+        ("type", ">i4"),
+        ("dof", ">i4"),
+        ("goodRASFlag", ">i2"),
+        ("delta", ">f4", 3),
+        ("Mdc", ">f4", 9),
+        ("Pxyz_c", ">f4", 3),
+    ]
+)
 FOOTER = np.dtype([("tr", ">f4"), ("flip_angle", ">f4"), ("te", ">f4"), ("ti", ">f4"), ("fov", ">f4")])
-NAMES = {"dims": ("size", "truncated", "voxels", "dimension"), "type": ("type", "truncated"), "version": ("MGH", "version"),
-         "delta": ("spacing", "voxel", "step"), "Mdc": ("axes", "cosines", "ras", "direction"), "Pxyz_c": ("c_ras", "centre"), "goodRASFlag": ("ras_good_flag",)}
+NAMES = {
+    "dims": ("size", "truncated", "voxels", "dimension"),
+    "type": ("type", "truncated"),
+    "version": ("MGH", "version"),
+    "delta": ("spacing", "voxel", "step"),
+    "Mdc": ("axes", "cosines", "ras", "direction"),
+    "Pxyz_c": ("c_ras", "centre"),
+    "goodRASFlag": ("ras_good_flag",),
+}
 ROLES = {"delta": "spacing", "Mdc": "affine", "Pxyz_c": "affine"}
 TYPES = (np.uint8, np.int16, np.int32, np.float32)
 
@@ -73,7 +91,13 @@ def affine():
 
 def write(folder, shape, dtype, name="a.mgh", tags=b""):
     made = MGHImage(np.random.default_rng(5).integers(1, 120, shape).astype(dtype), affine())
-    made.header["tr"], made.header["flip_angle"], made.header["te"], made.header["ti"], made.header["fov"] = 2300.0, 0.14, 2.98, 900.0, 256.0
+    made.header["tr"], made.header["flip_angle"], made.header["te"], made.header["ti"], made.header["fov"] = (
+        2300.0,
+        0.14,
+        2.98,
+        900.0,
+        256.0,
+    )
     nibabel.save(made, folder / name)
     if tags:
         with open(folder / name, "ab") as file:
@@ -89,8 +113,10 @@ def unplaced(folder):
 
 def command_tag():
     """Tags behind the voxels, as FreeSurfer writes them: the talairach transform (31) and a command line (3)."""
-    return b"".join(int(tag).to_bytes(4, "big") + len(text).to_bytes(8, "big") + text
-                    for tag, text in ((31, b"transforms/talairach.xfm\0"), (3, b"mri_convert a.nii a.mgh ProgramVersion: 7.4\0")))
+    return b"".join(
+        int(tag).to_bytes(4, "big") + len(text).to_bytes(8, "big") + text
+        for tag, text in ((31, b"transforms/talairach.xfm\0"), (3, b"mri_convert a.nii a.mgh ProgramVersion: 7.4\0"))
+    )
 
 
 def read(path):
@@ -111,6 +137,7 @@ def sample(name, write_file, file="a.mgh", footer=None, document="header"):
     def documents(folder):
         found = [Part(folder / file, document, HEADER)]
         return found + ([Part(folder / file, "footer", FOOTER, 284 + footer)] if footer else [])
+
     return Sample(name, file, write_file, documents, lambda folder: read(folder / file))
 
 

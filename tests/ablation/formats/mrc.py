@@ -1,4 +1,5 @@
 """MRC and CCP4 by mrcfile: the 1024 bytes of the header, with IMOD's fields in what the definition leaves free, and the extended header."""
+
 import gzip
 
 import mrcfile
@@ -7,19 +8,72 @@ import numpy as np
 from ablation import Answer, CannotWrite, Change, Sample
 from documents import HeaderDocument
 
-FIELDS = [("nx", "i4"), ("ny", "i4"), ("nz", "i4"), ("mode", "i4"), ("nxstart", "i4"), ("nystart", "i4"), ("nzstart", "i4"), ("mx", "i4"),
-          ("my", "i4"), ("mz", "i4"), ("cella", "f4", 3), ("cellb", "f4", 3), ("mapc", "i4"), ("mapr", "i4"), ("maps", "i4"), ("dmin", "f4"),
-          ("dmax", "f4"), ("dmean", "f4"), ("ispg", "i4"), ("nsymbt", "i4"), ("extra1", "V8"), ("exttyp", "S4"), ("nversion", "i4"), ("extra2", "V16"),
-          ("imod_nint", "i2"), ("imod_nreal", "i2"), ("imod_sub", "i2"), ("imod_zfac", "i2"), ("imod_ranges", "f4", 4), ("imodStamp", "i4"),
-          ("imodFlags", "i4"), ("imod_idtype", "i2"), ("imod_lens", "i2"), ("imod_nd1", "i2"), ("imod_nd2", "i2"), ("imod_vd1", "i2"), ("imod_vd2", "i2"),
-          ("imod_tiltangles", "f4", 6), ("origin", "f4", 3), ("map", "S4"), ("machst", "u1", 4), ("rms", "f4"), ("nlabl", "i4"), ("label", "S80", 10)]
+FIELDS = [
+    ("nx", "i4"),
+    ("ny", "i4"),
+    ("nz", "i4"),
+    ("mode", "i4"),
+    ("nxstart", "i4"),
+    ("nystart", "i4"),
+    ("nzstart", "i4"),
+    ("mx", "i4"),
+    ("my", "i4"),
+    ("mz", "i4"),
+    ("cella", "f4", 3),
+    ("cellb", "f4", 3),
+    ("mapc", "i4"),
+    ("mapr", "i4"),
+    ("maps", "i4"),
+    ("dmin", "f4"),
+    ("dmax", "f4"),
+    ("dmean", "f4"),
+    ("ispg", "i4"),
+    ("nsymbt", "i4"),
+    ("extra1", "V8"),
+    ("exttyp", "S4"),
+    ("nversion", "i4"),
+    ("extra2", "V16"),
+    ("imod_nint", "i2"),
+    ("imod_nreal", "i2"),
+    ("imod_sub", "i2"),
+    ("imod_zfac", "i2"),
+    ("imod_ranges", "f4", 4),
+    ("imodStamp", "i4"),
+    ("imodFlags", "i4"),
+    ("imod_idtype", "i2"),
+    ("imod_lens", "i2"),
+    ("imod_nd1", "i2"),
+    ("imod_nd2", "i2"),
+    ("imod_vd1", "i2"),
+    ("imod_vd2", "i2"),
+    ("imod_tiltangles", "f4", 6),
+    ("origin", "f4", 3),
+    ("map", "S4"),
+    ("machst", "u1", 4),
+    ("rms", "f4"),
+    ("nlabl", "i4"),
+    ("label", "S80", 10),
+]
 KINDS = {"label": "comment"}
 ROLES = {"cella": "spacing", "mx": "spacing", "my": "spacing", "mz": "spacing", "origin": "affine", "nxstart": "affine", "mapc": "affine"}
-NAMES = {"nx": ("size", "truncated", "voxels", "bytes"), "ny": ("size", "truncated", "voxels", "bytes"), "nz": ("size", "truncated", "voxels", "bytes"),
-         "mode": ("mode", "truncated"), "nsymbt": ("extended header", "truncated", "bytes"), "mx": ("intervals", "grid", "MX", "spacing"),
-         "my": ("intervals", "grid", "spacing"), "mz": ("intervals", "grid", "volumes", "spacing"), "cella": ("cell", "spacing"),
-         "cellb": ("angle", "cell"), "mapc": ("MAPC", "axes", "axis"), "mapr": ("MAPC", "axes", "axis"), "maps": ("MAPC", "axes", "axis"),
-         "map": ("MAP ",), "machst": ("byte order", "MAP "), "ispg": ("space group", "stack", "volumes")}
+NAMES = {
+    "nx": ("size", "truncated", "voxels", "bytes"),
+    "ny": ("size", "truncated", "voxels", "bytes"),
+    "nz": ("size", "truncated", "voxels", "bytes"),
+    "mode": ("mode", "truncated"),
+    "nsymbt": ("extended header", "truncated", "bytes"),
+    "mx": ("intervals", "grid", "MX", "spacing"),
+    "my": ("intervals", "grid", "spacing"),
+    "mz": ("intervals", "grid", "volumes", "spacing"),
+    "cella": ("cell", "spacing"),
+    "cellb": ("angle", "cell"),
+    "mapc": ("MAPC", "axes", "axis"),
+    "mapr": ("MAPC", "axes", "axis"),
+    "maps": ("MAPC", "axes", "axis"),
+    "map": ("MAP ",),
+    "machst": ("byte order", "MAP "),
+    "ispg": ("space group", "stack", "volumes"),
+}
 STAMP = 1146047817
 TYPES = {0: np.int8, 1: np.int16, 2: np.float32, 6: np.uint16, 12: np.float16}
 
@@ -38,7 +92,11 @@ class Header(HeaderDocument):
         for node in nodes:
             key = node.path.split("/")[-1]
             if key == "mode":
-                node.more = [Change(f"samples are {np.dtype(t).name}", lambda m=m: self._encode(m), same=True) for m, t in TYPES.items() if m in (1, 2, 6)]
+                node.more = [
+                    Change(f"samples are {np.dtype(t).name}", lambda m=m: self._encode(m), same=True)
+                    for m, t in TYPES.items()
+                    if m in (1, 2, 6)
+                ]
             elif key == "machst":
                 node.more = [Change("the other byte order", self._swap, same=True)]
             elif key == "mapc":
@@ -130,6 +188,7 @@ def tilts(folder):
 
 # The foreign reader.
 
+
 def read(path):
     """Voxels by mrcfile; places by the definition of 2014. Bytes are unsigned where IMOD's stamp and flags say so."""
     with mrcfile.open(path, permissive=True) as file:
@@ -157,7 +216,9 @@ def read(path):
 
 
 def sample(name, write_file, file="a.mrc", documents=None):
-    return Sample(name, file, write_file, documents or (lambda folder: [Header(folder / file, "header")]), lambda folder: read(folder / file))
+    return Sample(
+        name, file, write_file, documents or (lambda folder: [Header(folder / file, "header")]), lambda folder: read(folder / file)
+    )
 
 
 def samples(_):

@@ -1,4 +1,5 @@
-"""NRRD by pynrrd and ITK: each line of the header is a node; `key:=value` lines are another document, since they mean what programs agree on."""
+"""NRRD by pynrrd and ITK: each line of the header is a node; `key:=value` lines mean what programs agree on, and have a name of their own."""
+
 import re
 
 import nrrd
@@ -10,17 +11,48 @@ from ablation import Answer, CannotWrite, Change, Document, Node, Sample
 FOREIGN_READER_CRASHES = True  # ITK does, on some headers
 
 KINDS = {"content": "comment"}
-ROLES = {"spacings": "spacing", "space directions": "affine", "space origin": "affine", "space": "affine", "space units": "unit", "units": "unit"}
-NAMES = {"sizes": ("size", "truncated", "bytes", "samples"), "dimension": ("dimension", "axes", "sizes"), "type": ("type", "bytes"),
-         "encoding": ("encoding", "gzip", "inflat", "bzip", "compressed", "truncated"), "space dimension": ("space",), "space": ("space",), "kinds": ("kind", "axis"),
-         "data file": ("file", "samples in"), "datafile": ("file",), "byte skip": ("byteskip", "truncated", "bytes"), "line skip": ("lineskip", "truncated", "lines"),
-         "space directions": ("space directions", "axes", "axis"), "centers": ("centerings",)}
-WORDS = {"space": ("right-anterior-superior", "left-anterior-superior", "RAS", "scanner-xyz", "3D-right-handed"),
-         "endian": ("big", "little"), "encoding": ("raw", "gzip", "bzip2", "ascii", "hex", "zrl"), "type": ("uint8", "short", "unsigned short", "float", "double"),
-         "kinds": ("domain domain domain", "space space space", "space space time", "list domain domain domain", "domain domain domain list",
-                   "domain domain domain time", "vector domain domain domain"),
-         "space units": ('"mm" "mm" "mm"', '"um" "um" "um"', '"m" "m" "m"', '"mm" "um" "mm"'), "units": ('"mm" "mm" "mm"', '"um" "um" "um"'),
-         "centers": ("cell cell cell", "node node node"), "centerings": ("cell cell cell", "node node node")}
+ROLES = {
+    "spacings": "spacing",
+    "space directions": "affine",
+    "space origin": "affine",
+    "space": "affine",
+    "space units": "unit",
+    "units": "unit",
+}
+NAMES = {
+    "sizes": ("size", "truncated", "bytes", "samples"),
+    "dimension": ("dimension", "axes", "sizes"),
+    "type": ("type", "bytes"),
+    "encoding": ("encoding", "gzip", "inflat", "bzip", "compressed", "truncated"),
+    "space dimension": ("space",),
+    "space": ("space",),
+    "kinds": ("kind", "axis"),
+    "data file": ("file", "samples in"),
+    "datafile": ("file",),
+    "byte skip": ("byteskip", "truncated", "bytes"),
+    "line skip": ("lineskip", "truncated", "lines"),
+    "space directions": ("space directions", "axes", "axis"),
+    "centers": ("centerings",),
+}
+WORDS = {
+    "space": ("right-anterior-superior", "left-anterior-superior", "RAS", "scanner-xyz", "3D-right-handed"),
+    "endian": ("big", "little"),
+    "encoding": ("raw", "gzip", "bzip2", "ascii", "hex", "zrl"),
+    "type": ("uint8", "short", "unsigned short", "float", "double"),
+    "kinds": (
+        "domain domain domain",
+        "space space space",
+        "space space time",
+        "list domain domain domain",
+        "domain domain domain list",
+        "domain domain domain time",
+        "vector domain domain domain",
+    ),
+    "space units": ('"mm" "mm" "mm"', '"um" "um" "um"', '"m" "m" "m"', '"mm" "um" "mm"'),
+    "units": ('"mm" "mm" "mm"', '"um" "um" "um"'),
+    "centers": ("cell cell cell", "node node node"),
+    "centerings": ("cell cell cell", "node node node"),
+}
 TYPES = (np.uint8, np.int32, np.float32, np.float64)
 
 
@@ -31,8 +63,8 @@ class Lines(Document):
         self.path, self.name, self.fields = path, name, fields
         data = path.read_bytes()
         found = re.search(rb"\r?\n\r?\n", data)
-        self.lines = data[:found.start() if found else len(data)].decode("latin-1").splitlines()
-        self.tail = b"\n" + data[found.end():] if found else b""
+        self.lines = data[: found.start() if found else len(data)].decode("latin-1").splitlines()
+        self.tail = b"\n" + data[found.end() :] if found else b""
         self.whole = None
 
     @staticmethod
@@ -40,23 +72,31 @@ class Lines(Document):
         """Key, what divides, value; None: neither a field nor a key with a value."""
         at = line.find(":=")
         if at > 0 and ": " not in line[:at]:
-            return line[:at], ":=", line[at + 2:]
+            return line[:at], ":=", line[at + 2 :]
         at = line.find(": ")
-        return (line[:at], ": ", line[at + 2:].strip()) if at > 0 and not line.startswith("#") else None
+        return (line[:at], ": ", line[at + 2 :].strip()) if at > 0 and not line.startswith("#") else None
 
     def nodes(self):
         nodes = []
         if self.fields:
-            nodes.append(Node(f"{self.name}/magic", self.lines[0], lambda new: self.lines.__setitem__(0, new), names=("NRRD",),
-                              words=("NRRD0009",)))
+            nodes.append(
+                Node(f"{self.name}/magic", self.lines[0], lambda new: self.lines.__setitem__(0, new), names=("NRRD",), words=("NRRD0009",))
+            )
         for number, line in enumerate(self.lines[1:], 1):
             parts = self._split(line)
             if parts is None or (parts[1] == ": ") != self.fields:
                 continue
             key, divider, value = parts
-            node = Node(f"{self.name}/{key}", value, lambda new, n=number, k=key, d=divider: self._set(n, f"{k}{d}{new}"),
-                        lambda n=number: self._set(n, None), tuple(NAMES.get(key, ())), ROLES.get(key, ""),
-                        KINDS.get(key, "") if self.fields else "", words=WORDS.get(key, ()) if self.fields else ())
+            node = Node(
+                f"{self.name}/{key}",
+                value,
+                lambda new, n=number, k=key, d=divider: self._set(n, f"{k}{d}{new}"),
+                lambda n=number: self._set(n, None),
+                tuple(NAMES.get(key, ())),
+                ROLES.get(key, ""),
+                KINDS.get(key, "") if self.fields else "",
+                words=WORDS.get(key, ()) if self.fields else (),
+            )
             if key == "type":
                 node.more = [Change(f"samples are {np.dtype(t).name}", lambda t=t: self._encode(dtype=t), same=True) for t in TYPES]
             elif key == "encoding":
@@ -125,7 +165,13 @@ def write(folder, data, header, name="a.nrrd", **options):
 
 
 def placed(space="left-posterior-superior", **more):
-    return {"space": space, "space directions": directions(), "space origin": np.array([10.0, -20.0, 30.0]), "kinds": ["domain"] * 3, **more}
+    return {
+        "space": space,
+        "space directions": directions(),
+        "space origin": np.array([10.0, -20.0, 30.0]),
+        "kinds": ["domain"] * 3,
+        **more,
+    }
 
 
 def with_lines(folder, lines, fields=True, name="a.nrrd"):
@@ -137,7 +183,10 @@ def with_lines(folder, lines, fields=True, name="a.nrrd"):
 
 def slicer(folder):
     write(folder, values((5, 6, 7)), placed(encoding="gzip", content="a head"))
-    with_lines(folder, ["measurement frame: (1,0,0) (0,1,0) (0,0,1)", 'space units: "um" "um" "um"', "old min: 0", "old max: 4000", "sample units: HU"])
+    with_lines(
+        folder,
+        ["measurement frame: (1,0,0) (0,1,0) (0,0,1)", 'space units: "um" "um" "um"', "old min: 0", "old max: 4000", "sample units: HU"],
+    )
 
 
 def itk(folder):
@@ -148,8 +197,17 @@ def itk(folder):
 
 
 def spaced(folder):
-    write(folder, values((5, 6, 7), np.float32), {"spacings": [1.5, 2.0, 2.5], "units": ["um", "um", "um"], "labels": ["x", "y", "z"],
-                                                  "thicknesses": [1.5, 2.0, 3.0], "encoding": "raw"})
+    write(
+        folder,
+        values((5, 6, 7), np.float32),
+        {
+            "spacings": [1.5, 2.0, 2.5],
+            "units": ["um", "um", "um"],
+            "labels": ["x", "y", "z"],
+            "thicknesses": [1.5, 2.0, 3.0],
+            "encoding": "raw",
+        },
+    )
     with_lines(folder, ["centers: cell cell cell", "block size: 1", "number: 210"][:1])
 
 
@@ -160,22 +218,53 @@ def axis_mins(folder):
 
 
 def colours(folder):
-    write(folder, values((3, 5, 6, 7), np.uint8), {"space": "left-posterior-superior", "kinds": ["RGB-color", "domain", "domain", "domain"],
-          "space directions": np.vstack([[np.nan] * 3, directions()]), "space origin": [10.0, -20.0, 30.0], "encoding": "gzip"})
+    write(
+        folder,
+        values((3, 5, 6, 7), np.uint8),
+        {
+            "space": "left-posterior-superior",
+            "kinds": ["RGB-color", "domain", "domain", "domain"],
+            "space directions": np.vstack([[np.nan] * 3, directions()]),
+            "space origin": [10.0, -20.0, 30.0],
+            "encoding": "gzip",
+        },
+    )
 
 
 def diffusion(folder):
     """As Slicer writes it: directions of gradients as keys."""
-    write(folder, values((5, 6, 7, 3), np.int16), {"space": "left-posterior-superior", "kinds": ["space", "space", "space", "list"],
-          "space directions": np.vstack([directions(), [np.nan] * 3]), "space origin": [10.0, -20.0, 30.0], "encoding": "raw",
-          "thicknesses": [np.nan, np.nan, 2.5, np.nan], "modality": "DWMRI", "DWMRI_b-value": "1000", "DWMRI_gradient_0000": "0 0 0",
-          "DWMRI_gradient_0001": "1 0 0", "DWMRI_gradient_0002": "0 1 0"})
+    write(
+        folder,
+        values((5, 6, 7, 3), np.int16),
+        {
+            "space": "left-posterior-superior",
+            "kinds": ["space", "space", "space", "list"],
+            "space directions": np.vstack([directions(), [np.nan] * 3]),
+            "space origin": [10.0, -20.0, 30.0],
+            "encoding": "raw",
+            "thicknesses": [np.nan, np.nan, 2.5, np.nan],
+            "modality": "DWMRI",
+            "DWMRI_b-value": "1000",
+            "DWMRI_gradient_0000": "0 0 0",
+            "DWMRI_gradient_0001": "1 0 0",
+            "DWMRI_gradient_0002": "0 1 0",
+        },
+    )
     with_lines(folder, ["measurement frame: (-1,0,0) (0,-1,0) (0,0,1)", "centerings: cell cell cell ???"])
 
 
 def times(folder):
-    write(folder, values((5, 6, 7, 3), np.int16), {"kinds": ["domain", "domain", "domain", "time"], "spacings": [1.5, 2.0, 2.5, 0.5],
-          "units": ["mm", "mm", "mm", "s"], "labels": ["i", "j", "k", "t"], "encoding": "raw"})
+    write(
+        folder,
+        values((5, 6, 7, 3), np.int16),
+        {
+            "kinds": ["domain", "domain", "domain", "time"],
+            "spacings": [1.5, 2.0, 2.5, 0.5],
+            "units": ["mm", "mm", "mm", "s"],
+            "labels": ["i", "j", "k", "t"],
+            "encoding": "raw",
+        },
+    )
 
 
 def itk_times(folder):
@@ -186,13 +275,26 @@ def itk_times(folder):
 
 def segmentation(folder):
     """As Slicer writes .seg.nrrd."""
-    keys = {"Segmentation_MasterRepresentation": "Binary labelmap", "Segmentation_ContainedRepresentationNames": "Binary labelmap|",
-            "Segmentation_ReferenceImageExtentOffset": "0 0 0", "Segmentation_ConversionParameters": "Smoothing factor|0.5|"}
+    keys = {
+        "Segmentation_MasterRepresentation": "Binary labelmap",
+        "Segmentation_ContainedRepresentationNames": "Binary labelmap|",
+        "Segmentation_ReferenceImageExtentOffset": "0 0 0",
+        "Segmentation_ConversionParameters": "Smoothing factor|0.5|",
+    }
     for i, (name, color) in enumerate((("Liver", "0.8 0.4 0.2"), ("Spleen", "0.1 0.5 0.9"))):
-        keys.update({f"Segment{i}_ID": f"Segment_{i + 1}", f"Segment{i}_Name": name, f"Segment{i}_NameAutoGenerated": "0",
-                     f"Segment{i}_Color": color, f"Segment{i}_ColorAutoGenerated": "0", f"Segment{i}_Extent": "0 4 0 5 0 6",
-                     f"Segment{i}_LabelValue": str(i + 1), f"Segment{i}_Layer": "0",
-                     f"Segment{i}_Tags": "Segmentation.Status:inprogress|TerminologyEntry:Segmentation category~SCT^123037004^Tissue|"})
+        keys.update(
+            {
+                f"Segment{i}_ID": f"Segment_{i + 1}",
+                f"Segment{i}_Name": name,
+                f"Segment{i}_NameAutoGenerated": "0",
+                f"Segment{i}_Color": color,
+                f"Segment{i}_ColorAutoGenerated": "0",
+                f"Segment{i}_Extent": "0 4 0 5 0 6",
+                f"Segment{i}_LabelValue": str(i + 1),
+                f"Segment{i}_Layer": "0",
+                f"Segment{i}_Tags": "Segmentation.Status:inprogress|TerminologyEntry:Segmentation category~SCT^123037004^Tissue|",
+            }
+        )
     write(folder, values((5, 6, 7), np.uint8, 3), {**placed(encoding="gzip"), **keys}, "a.seg.nrrd")
 
 
@@ -200,10 +302,28 @@ def layers(folder):
     """Segments that overlap, in layers."""
     keys = {"Segmentation_MasterRepresentation": "Binary labelmap"}
     for i, name in enumerate(("Liver", "Spleen")):
-        keys.update({f"Segment{i}_ID": f"Segment_{i + 1}", f"Segment{i}_Name": name, f"Segment{i}_Color": "0.8 0.4 0.2",
-                     f"Segment{i}_LabelValue": "1", f"Segment{i}_Layer": str(i)})
-    write(folder, values((2, 5, 6, 7), np.uint8, 2), {"space": "left-posterior-superior", "kinds": ["list", "domain", "domain", "domain"],
-          "space directions": np.vstack([[np.nan] * 3, directions()]), "space origin": [10.0, -20.0, 30.0], "encoding": "gzip", **keys}, "a.seg.nrrd")
+        keys.update(
+            {
+                f"Segment{i}_ID": f"Segment_{i + 1}",
+                f"Segment{i}_Name": name,
+                f"Segment{i}_Color": "0.8 0.4 0.2",
+                f"Segment{i}_LabelValue": "1",
+                f"Segment{i}_Layer": str(i),
+            }
+        )
+    write(
+        folder,
+        values((2, 5, 6, 7), np.uint8, 2),
+        {
+            "space": "left-posterior-superior",
+            "kinds": ["list", "domain", "domain", "domain"],
+            "space directions": np.vstack([[np.nan] * 3, directions()]),
+            "space origin": [10.0, -20.0, 30.0],
+            "encoding": "gzip",
+            **keys,
+        },
+        "a.seg.nrrd",
+    )
 
 
 def big_endian(folder):
@@ -211,8 +331,17 @@ def big_endian(folder):
 
 
 def unnamed_space(folder):
-    write(folder, values((5, 6, 7), np.float64), {"space dimension": 3, "space directions": directions(), "space origin": [1.0, 2.0, 3.0],
-                                                  "space units": ["um", "um", "um"], "encoding": "raw"})
+    write(
+        folder,
+        values((5, 6, 7), np.float64),
+        {
+            "space dimension": 3,
+            "space directions": directions(),
+            "space origin": [1.0, 2.0, 3.0],
+            "space units": ["um", "um", "um"],
+            "encoding": "raw",
+        },
+    )
 
 
 def detached(folder, encoding="raw"):
@@ -231,7 +360,7 @@ def listed(folder):
     detached(folder)
     raw = (folder / "a.raw").read_bytes()
     for k in range(7):
-        (folder / f"s{k:03d}.raw").write_bytes(raw[60 * k:60 * (k + 1)])
+        (folder / f"s{k:03d}.raw").write_bytes(raw[60 * k : 60 * (k + 1)])
     (folder / "a.raw").unlink()
     document = Lines(folder / "a.nhdr", "header")
     document.lines = ["data file: s%03d.raw 0 6 1 2" if line.startswith("data file") else line for line in document.lines]
@@ -240,8 +369,14 @@ def listed(folder):
 
 # The foreign reader.
 
-LPS = {"left-posterior-superior": (-1, -1, 1), "lps": (-1, -1, 1), "right-anterior-superior": (1, 1, 1), "ras": (1, 1, 1),
-       "left-anterior-superior": (-1, 1, 1), "las": (-1, 1, 1)}
+LPS = {
+    "left-posterior-superior": (-1, -1, 1),
+    "lps": (-1, -1, 1),
+    "right-anterior-superior": (1, 1, 1),
+    "ras": (1, 1, 1),
+    "left-anterior-superior": (-1, 1, 1),
+    "las": (-1, 1, 1),
+}
 
 
 def space_of(header, axes):
@@ -291,21 +426,38 @@ def read_by_itk(path):
     affine = np.eye(4)
     affine[:3, :3] = np.array(image.GetDirection()).reshape(3, 3) @ np.diag(image.GetSpacing())
     affine[:3, 3] = image.GetOrigin()
-    return Answer(fields={(0, 0): SimpleITK.GetArrayFromImage(image).transpose(2, 1, 0).astype(float)}, affine=np.diag([-1, -1, 1, 1]) @ affine)
+    return Answer(
+        fields={(0, 0): SimpleITK.GetArrayFromImage(image).transpose(2, 1, 0).astype(float)}, affine=np.diag([-1, -1, 1, 1]) @ affine
+    )
 
 
 def sample(name, write_file, file="a.nrrd", document="header", sidecars=(), reader=read):
-    return Sample(name, file, write_file, lambda folder: [Lines(folder / file, document), Lines(folder / file, f"{document}-keys", False)],
-                  lambda folder: reader(folder / file), sidecars)
+    return Sample(
+        name,
+        file,
+        write_file,
+        lambda folder: [Lines(folder / file, document), Lines(folder / file, f"{document}-keys", False)],
+        lambda folder: reader(folder / file),
+        sidecars,
+    )
 
 
 def samples(_):
     return [
-        sample("slicer", slicer), sample("spacings", spaced), sample("colours", colours), sample("times", times), sample("itk-times", itk_times),
-        sample("big-endian", big_endian), sample("unnamed-space", unnamed_space),
-        sample("diffusion", diffusion), sample("axis-mins", axis_mins), sample("itk", itk),
-        sample("detached", detached, "a.nhdr", "header", ("a.raw",)), sample("skipped", skipped, "a.nhdr"),
+        sample("slicer", slicer),
+        sample("spacings", spaced),
+        sample("colours", colours),
+        sample("times", times),
+        sample("itk-times", itk_times),
+        sample("big-endian", big_endian),
+        sample("unnamed-space", unnamed_space),
+        sample("diffusion", diffusion),
+        sample("axis-mins", axis_mins),
+        sample("itk", itk),
+        sample("detached", detached, "a.nhdr", "header", ("a.raw",)),
+        sample("skipped", skipped, "a.nhdr"),
         sample("detached-gzip", lambda folder: detached(folder, "gzip"), "a.nhdr"),
         sample("slices", listed, "a.nhdr", "header", ("s003.raw",), read_by_itk),
-        sample("segmentation", segmentation, "a.seg.nrrd"), sample("layers", layers, "a.seg.nrrd"),
+        sample("segmentation", segmentation, "a.seg.nrrd"),
+        sample("layers", layers, "a.seg.nrrd"),
     ]

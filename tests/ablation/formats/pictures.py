@@ -1,4 +1,5 @@
 """Pictures by Pillow, one for each slice, arrays by NumPy, raw samples, and bricks of values (BOV) as simulations write them for VisIt."""
+
 import gzip
 import struct
 
@@ -11,10 +12,19 @@ from documents import LinesDocument
 from picture_documents import JpegDocument, Jp2Document, NpyDocument, PngDocument, Together, bmp_document
 
 SLICES, ROWS, COLUMNS = 5, 6, 7
-BOV_NAMES = {"DATA_SIZE": ("size", "bytes", "truncated"), "DATA_FORMAT": ("format", "bytes", "truncated"), "DATA_FILE": ("file",),
-             "BYTE_OFFSET": ("offset", "truncated", "bytes"), "DATA_COMPONENTS": ("components", "bytes", "truncated")}
-BOV_WORDS = {"DATA_FORMAT": ("BYTE", "SHORT", "INT", "DOUBLE"), "DATA_ENDIAN": ("LITTLE", "BIG"), "CENTERING": ("nodal", "zonal"),
-             "DIVIDE_BRICK": ("true", "false")}
+BOV_NAMES = {
+    "DATA_SIZE": ("size", "bytes", "truncated"),
+    "DATA_FORMAT": ("format", "bytes", "truncated"),
+    "DATA_FILE": ("file",),
+    "BYTE_OFFSET": ("offset", "truncated", "bytes"),
+    "DATA_COMPONENTS": ("components", "bytes", "truncated"),
+}
+BOV_WORDS = {
+    "DATA_FORMAT": ("BYTE", "SHORT", "INT", "DOUBLE"),
+    "DATA_ENDIAN": ("LITTLE", "BIG"),
+    "CENTERING": ("nodal", "zonal"),
+    "DIVIDE_BRICK": ("true", "false"),
+}
 
 
 def values(shape, dtype=np.uint8, seed=5, high=120):
@@ -52,6 +62,7 @@ def palette(folder):
         image.putdata(page.reshape(-1).tolist())
         image.putpalette(values((256 * 3,), high=255).tolist())
         return image
+
     png(folder, [colored(page) for page in pages(high=250)], transparency=3)
 
 
@@ -63,7 +74,14 @@ def jpeg(folder, channels=0):
     for k, page in enumerate(pages((ROWS, COLUMNS) + ((channels,) if channels else ()))):
         image = Image.fromarray(page)
         exif = Image.Exif()
-        exif[0x0112], exif[0x011A], exif[0x011B], exif[0x0128], exif[0x010F], exif[0x0132] = 1, 100.0, 50.0, 3, "Maker", "2024:01:02 03:04:05"
+        exif[0x0112], exif[0x011A], exif[0x011B], exif[0x0128], exif[0x010F], exif[0x0132] = (
+            1,
+            100.0,
+            50.0,
+            3,
+            "Maker",
+            "2024:01:02 03:04:05",
+        )
         image.save(folder / f"s{k + 8:02d}.jpg", quality=95, dpi=(254, 127), exif=exif, comment=b"made")
 
 
@@ -74,15 +92,17 @@ def bmp(folder, mode="L"):
 
 def jp2(folder, dtype=np.uint8, channels=0):
     for k, page in enumerate(pages((ROWS * 3, COLUMNS * 3) + ((channels,) if channels else ()), dtype)):
-        (folder / f"s{k + 8:02d}.jp2").write_bytes(with_resolution(imagecodecs.jpeg2k_encode(page, level=0, codecformat="jp2", reversible=True)))
+        (folder / f"s{k + 8:02d}.jp2").write_bytes(
+            with_resolution(imagecodecs.jpeg2k_encode(page, level=0, codecformat="jp2", reversible=True))
+        )
 
 
 def with_resolution(data):
     """A box of the resolution at capture, behind the others of the image header: 100 and 50 pixels a metre."""
     at = data.find(b"jp2h") - 4
-    size, = struct.unpack_from(">I", data, at)
+    (size,) = struct.unpack_from(">I", data, at)
     box = struct.pack(">I4sI4sHHHHbb", 26, b"res ", 18, b"resc", 50, 1, 100, 1, 0, 0)
-    return data[:at] + struct.pack(">I", size + len(box)) + data[at + 4:at + size] + box + data[at + size:]
+    return data[:at] + struct.pack(">I", size + len(box)) + data[at + 4 : at + size] + box + data[at + size :]
 
 
 def npy(folder, array, version=None):
@@ -95,9 +115,22 @@ def bov(folder, dtype=np.float32, components=1, extra=(), file="a.values", zonal
     data = b"\0" * 12 + stored.tobytes()
     (folder / file).write_bytes(gzip.compress(data) if file.endswith(".gz") else data)
     words = {np.float32: "FLOAT", np.uint8: "BYTE", np.float64: "DOUBLE", np.dtype(">i4"): "INT"}
-    lines = ["TIME: 1.5", f"DATA_FILE: {file}", "DATA_SIZE: 5 6 7", f"DATA_FORMAT: {words[dtype]}", "VARIABLE: density",
-             f"DATA_ENDIAN: {'BIG' if dtype == np.dtype('>i4') else 'LITTLE'}", f"CENTERING: {'zonal' if zonal else 'nodal'}", "BRICK_ORIGIN: 1. 2. 3.",
-             "BRICK_SIZE: 5. 12. 21.", "BYTE_OFFSET: 12", "DIVIDE_BRICK: false", "DATA_BRICKLETS: 5 6 7", f"DATA_COMPONENTS: {components}", *extra]
+    lines = [
+        "TIME: 1.5",
+        f"DATA_FILE: {file}",
+        "DATA_SIZE: 5 6 7",
+        f"DATA_FORMAT: {words[dtype]}",
+        "VARIABLE: density",
+        f"DATA_ENDIAN: {'BIG' if dtype == np.dtype('>i4') else 'LITTLE'}",
+        f"CENTERING: {'zonal' if zonal else 'nodal'}",
+        "BRICK_ORIGIN: 1. 2. 3.",
+        "BRICK_SIZE: 5. 12. 21.",
+        "BYTE_OFFSET: 12",
+        "DIVIDE_BRICK: false",
+        "DATA_BRICKLETS: 5 6 7",
+        f"DATA_COMPONENTS: {components}",
+        *extra,
+    ]
     (folder / "a.bov").write_text("\n".join(lines) + "\n")
 
 
@@ -113,6 +146,7 @@ class Bov(LinesDocument):
 
 
 # Foreign readers.
+
 
 def read_pictures(folder, ending):
     """A slice for each picture; components of colours are channels. Palettes of colours count as RGB, those of greys as greys."""
@@ -178,47 +212,81 @@ def read_bov(path):
 
 # Samples.
 
+
 def stack(name, document, ending, write, read=read_pictures):
     """What all pictures say, and what one of them says otherwise."""
+
     def documents(folder):
         paths = sorted(folder.glob(f"*.{ending}"))
         return [Together([document(path, ending) for path in paths]), document(paths[2], f"{ending}-slice")]
+
     return Sample(name, "", write, documents, read and (lambda folder: read(folder, ending)))
 
 
 def array(name, make, version=None):
-    return Sample(name, "a.npy", lambda folder: npy(folder, make(), version), lambda folder: [NpyDocument(folder / "a.npy")],
-                  lambda folder: read_npy(folder / "a.npy"))
+    return Sample(
+        name,
+        "a.npy",
+        lambda folder: npy(folder, make(), version),
+        lambda folder: [NpyDocument(folder / "a.npy")],
+        lambda folder: read_npy(folder / "a.npy"),
+    )
 
 
 def brick(name, **options):
-    return Sample(name, "a.bov", lambda folder: bov(folder, **options), lambda folder: [Bov(folder / "a.bov", "bov", ":", comment="#")],
-                  lambda folder: read_bov(folder / "a.bov"), (options.get("file", "a.values"),))
+    return Sample(
+        name,
+        "a.bov",
+        lambda folder: bov(folder, **options),
+        lambda folder: [Bov(folder / "a.bov", "bov", ":", comment="#")],
+        lambda folder: read_bov(folder / "a.bov"),
+        (options.get("file", "a.values"),),
+    )
 
 
 def raw(name, dtype, front=b""):
     words = {"<": "little", ">": "big"}
     kind = np.dtype(dtype)
     options = f"?dims=5,6,7,type={kind.name},endian={words.get(kind.byteorder, 'little')},offset={len(front)},spacing=0.5,1,2"
-    return Sample(name, "a.raw" + options, lambda folder: (folder / "a.raw").write_bytes(front + values((7, 6, 5), kind).tobytes()),
-                  lambda folder: [], lambda folder: Answer(
-                      fields={(0, 0): np.frombuffer((folder / "a.raw").read_bytes()[len(front):], kind).reshape(7, 6, 5).transpose(2, 1, 0).astype(float)},
-                      affine=np.diag([0.5, 1.0, 2.0, 1.0])))
+    return Sample(
+        name,
+        "a.raw" + options,
+        lambda folder: (folder / "a.raw").write_bytes(front + values((7, 6, 5), kind).tobytes()),
+        lambda folder: [],
+        lambda folder: Answer(
+            fields={
+                (0, 0): np.frombuffer((folder / "a.raw").read_bytes()[len(front) :], kind).reshape(7, 6, 5).transpose(2, 1, 0).astype(float)
+            },
+            affine=np.diag([0.5, 1.0, 2.0, 1.0]),
+        ),
+    )
 
 
 def samples(_):
     return [
-        stack("png", PngDocument, "png", grey), stack("png-16", PngDocument, "png", grey16), stack("png-1", PngDocument, "png", bilevel),
-        stack("png-palette", PngDocument, "png", palette), stack("png-rgb", PngDocument, "png", rgb),
+        stack("png", PngDocument, "png", grey),
+        stack("png-16", PngDocument, "png", grey16),
+        stack("png-1", PngDocument, "png", bilevel),
+        stack("png-palette", PngDocument, "png", palette),
+        stack("png-rgb", PngDocument, "png", rgb),
         stack("png-alpha", PngDocument, "png", lambda folder: rgb(folder, 4)),
-        stack("jpeg", JpegDocument, "jpg", jpeg, None), stack("jpeg-rgb", JpegDocument, "jpg", lambda folder: jpeg(folder, 3), None),
-        stack("bmp", bmp_document, "bmp", bmp), stack("bmp-rgb", bmp_document, "bmp", lambda folder: bmp(folder, "RGB")),
-        stack("jp2", Jp2Document, "jp2", jp2, read_jp2), stack("jp2-16", Jp2Document, "jp2", lambda folder: jp2(folder, np.uint16), read_jp2),
+        stack("jpeg", JpegDocument, "jpg", jpeg, None),
+        stack("jpeg-rgb", JpegDocument, "jpg", lambda folder: jpeg(folder, 3), None),
+        stack("bmp", bmp_document, "bmp", bmp),
+        stack("bmp-rgb", bmp_document, "bmp", lambda folder: bmp(folder, "RGB")),
+        stack("jp2", Jp2Document, "jp2", jp2, read_jp2),
+        stack("jp2-16", Jp2Document, "jp2", lambda folder: jp2(folder, np.uint16), read_jp2),
         stack("jp2-rgb", Jp2Document, "jp2", lambda folder: jp2(folder, np.uint8, 3), read_jp2),
-        array("npy", lambda: values((7, 6, 5), np.float32)), array("npy-fortran", lambda: np.asfortranarray(values((7, 6, 5), ">i2"))),
-        array("npy-times", lambda: values((3, 7, 6, 5), np.uint8), (2, 0)), array("npy-halves", lambda: values((7, 6, 5), np.float16), (3, 0)),
+        array("npy", lambda: values((7, 6, 5), np.float32)),
+        array("npy-fortran", lambda: np.asfortranarray(values((7, 6, 5), ">i2"))),
+        array("npy-times", lambda: values((3, 7, 6, 5), np.uint8), (2, 0)),
+        array("npy-halves", lambda: values((7, 6, 5), np.float16), (3, 0)),
         array("npy-flags", lambda: values((7, 6, 5)) > 60),
-        brick("bov"), brick("bov-nodal", dtype=np.uint8, zonal=False, file="a.values.gz"), brick("bov-vectors", dtype=np.float64, components=3),
+        brick("bov"),
+        brick("bov-nodal", dtype=np.uint8, zonal=False, file="a.values.gz"),
+        brick("bov-vectors", dtype=np.float64, components=3),
         brick("bov-big", dtype=np.dtype(">i4")),
-        raw("raw", "<i2"), raw("raw-big", ">f4", b"\1" * 16), raw("raw-bytes", "u1"),
+        raw("raw", "<i2"),
+        raw("raw-big", ">f4", b"\1" * 16),
+        raw("raw-bytes", "u1"),
     ]

@@ -1,4 +1,5 @@
 """TIFF by tifffile: plain pages, tifffile's own stacks, ImageJ's hyperstacks, OME-TIFF in one and in several files, levels, GeoTIFF."""
+
 import uuid
 
 import lxml.etree
@@ -18,20 +19,41 @@ def values(shape, dtype=np.uint16, low=1, high=120, seed=5):
 
 # Writers.
 
+
 def plain(folder, dtype=np.uint8, count=5, **options):
     with tifffile.TiffWriter(folder / "a.tif", byteorder=options.pop("byteorder", "<"), bigtiff=options.pop("bigtiff", False)) as writer:
         for k in range(count):
-            writer.write(values((6, 7), dtype, seed=k), photometric=options.get("photometric", "minisblack"), metadata=None,
-                         resolution=(4.0, 2.0), resolutionunit="CENTIMETER", software="scanner", datetime="2024:01:02 10:11:12",
-                         description="made by a scanner" if k == 0 else None,
-                         **{key: value for key, value in options.items() if key != "photometric"})
+            writer.write(
+                values((6, 7), dtype, seed=k),
+                photometric=options.get("photometric", "minisblack"),
+                metadata=None,
+                resolution=(4.0, 2.0),
+                resolutionunit="CENTIMETER",
+                software="scanner",
+                datetime="2024:01:02 10:11:12",
+                description="made by a scanner" if k == 0 else None,
+                **{key: value for key, value in options.items() if key != "photometric"},
+            )
 
 
 def scanned(folder):
     """A page as scanners and libtiff's users write it, with the tags that they add."""
-    extra = [(271, 2, 0, "Maker", True), (272, 2, 0, "Model", True), (315, 2, 0, "Who", True), (266, 3, 1, 1, True), (274, 3, 1, 1, True),
-             (269, 2, 0, "doc", True), (285, 2, 0, "page", True), (297, 3, 2, (0, 5), True), (280, 3, 1, 0, True), (281, 3, 1, 255, True),
-             (286, 5, 1, (10, 1), True), (287, 5, 1, (20, 1), True), (316, 2, 0, "host", True), (33432, 2, 0, "(c)", True)]
+    extra = [
+        (271, 2, 0, "Maker", True),
+        (272, 2, 0, "Model", True),
+        (315, 2, 0, "Who", True),
+        (266, 3, 1, 1, True),
+        (274, 3, 1, 1, True),
+        (269, 2, 0, "doc", True),
+        (285, 2, 0, "page", True),
+        (297, 3, 2, (0, 5), True),
+        (280, 3, 1, 0, True),
+        (281, 3, 1, 255, True),
+        (286, 5, 1, (10, 1), True),
+        (287, 5, 1, (20, 1), True),
+        (316, 2, 0, "host", True),
+        (33432, 2, 0, "(c)", True),
+    ]
     plain(folder, np.uint8, extratags=extra)
 
 
@@ -49,23 +71,41 @@ def rgb(folder, planar="contig"):
 
 def geo(folder):
     """As GDAL writes it: a page for each band is unusual, a grid of one band is not."""
-    extra = [(33550, 12, 3, (30.0, 20.0, 0.0), True), (33922, 12, 6, (0, 0, 0, 500000.0, 4000000.0, 0), True),
-             (34735, 3, 12, (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9001), True), (42113, 2, 0, "-9999", True),
-             (42112, 2, 0, '<GDALMetadata><Item name="OFFSET" sample="0" role="offset">3</Item>'
-                           '<Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>', True)]
+    extra = [
+        (33550, 12, 3, (30.0, 20.0, 0.0), True),
+        (33922, 12, 6, (0, 0, 0, 500000.0, 4000000.0, 0), True),
+        (34735, 3, 12, (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9001), True),
+        (42113, 2, 0, "-9999", True),
+        (
+            42112,
+            2,
+            0,
+            '<GDALMetadata><Item name="OFFSET" sample="0" role="offset">3</Item>'
+            '<Item name="SCALE" sample="0" role="scale">2</Item></GDALMetadata>',
+            True,
+        ),
+    ]
     stored = values((6, 7), np.float32)
     stored[2, 3] = -9999
     tifffile.imwrite(folder / "a.tif", stored, metadata=None, extratags=extra)
 
 
 def shaped(folder, shape, axes, dtype=np.float32, **options):
-    tifffile.imwrite(folder / "a.tif", values(shape, dtype), photometric="minisblack", metadata={"axes": axes, "spacing": 2.5, "unit": "um"},
-                     resolution=(4.0, 2.0), **options)
+    tifffile.imwrite(
+        folder / "a.tif",
+        values(shape, dtype),
+        photometric="minisblack",
+        metadata={"axes": axes, "spacing": 2.5, "unit": "um"},
+        resolution=(4.0, 2.0),
+        **options,
+    )
 
 
 def imagej(folder, shape, dtype=np.uint16, extra=None, **metadata):
     """As Fiji saves it, in big endian. Fiji writes 1 / width of a pixel with six digits behind the point."""
-    tifffile.imwrite(folder / "a.tif", values(shape, dtype), imagej=True, byteorder=">", resolution=(4.0, 2.0), metadata=metadata, **(extra or {}))
+    tifffile.imwrite(
+        folder / "a.tif", values(shape, dtype), imagej=True, byteorder=">", resolution=(4.0, 2.0), metadata=metadata, **(extra or {})
+    )
 
 
 def luts(count):
@@ -74,9 +114,28 @@ def luts(count):
 
 
 def hyperstack(folder):
-    imagej(folder, (3, 5, 2, 6, 7), axes="TZCYX", spacing=2.5, unit="micron", finterval=0.5, fps=2.0, tunit="sec", loop=False, mode="composite",
-           min=10.0, max=90.0, xorigin=3.0, yorigin=2.0, zorigin=1.0, hyperstack=True, Ranges=(1.0, 100.0, 5.0, 60.0), LUTs=luts(2),
-           Labels=[f"c:{i}" for i in range(30)], Info="Scaling: 1\n")
+    imagej(
+        folder,
+        (3, 5, 2, 6, 7),
+        axes="TZCYX",
+        spacing=2.5,
+        unit="micron",
+        finterval=0.5,
+        fps=2.0,
+        tunit="sec",
+        loop=False,
+        mode="composite",
+        min=10.0,
+        max=90.0,
+        xorigin=3.0,
+        yorigin=2.0,
+        zorigin=1.0,
+        hyperstack=True,
+        Ranges=(1.0, 100.0, 5.0, 60.0),
+        LUTs=luts(2),
+        Labels=[f"c:{i}" for i in range(30)],
+        Info="Scaling: 1\n",
+    )
 
 
 def calibrated(folder):
@@ -90,44 +149,81 @@ def imagej_floats(folder):
 
 def ome(folder, shape, axes, dtype=np.uint16, subifds=0, name="a.ome.tif", **metadata):
     stored = values(shape, dtype)
-    given = {"axes": axes, "PhysicalSizeX": 250, "PhysicalSizeXUnit": "nm", "PhysicalSizeY": 0.0005, "PhysicalSizeYUnit": "mm",
-             "PhysicalSizeZ": 1500, "PhysicalSizeZUnit": "nm", "UUID": "urn:uuid:11111111-2222-3333-4444-555555555555", **metadata}
+    given = {
+        "axes": axes,
+        "PhysicalSizeX": 250,
+        "PhysicalSizeXUnit": "nm",
+        "PhysicalSizeY": 0.0005,
+        "PhysicalSizeYUnit": "mm",
+        "PhysicalSizeZ": 1500,
+        "PhysicalSizeZUnit": "nm",
+        "UUID": "urn:uuid:11111111-2222-3333-4444-555555555555",
+        **metadata,
+    }
     with tifffile.TiffWriter(folder / name, ome=True, bigtiff=subifds > 0) as writer:
         options = dict(photometric="minisblack", resolution=(40000, 20000), resolutionunit="CENTIMETER")
         writer.write(stored, subifds=subifds, metadata=given, **options)
         for level in range(1, subifds + 1):
-            writer.write(stored[..., ::2 ** level, ::2 ** level], subfiletype=1, **options)
+            writer.write(stored[..., :: 2**level, :: 2**level], subfiletype=1, **options)
 
 
 def ome_hyperstack(folder):
-    ome(folder, (3, 2, 5, 6, 7), "TCZYX", Channel={"Name": ["DAPI", "GFP"], "Color": [-16776961, 16711935]}, TimeIncrement=500,
-        TimeIncrementUnit="ms", SignificantBits=12, Name="embryo", Description="an embryo", AcquisitionDate="2024-01-02T10:11:12",
-        Plane={"DeltaT": [0.1 * i for i in range(30)], "DeltaTUnit": ["s"] * 30, "ExposureTime": [0.05] * 30,
-               "PositionX": [10.0] * 30, "PositionXUnit": ["µm"] * 30, "PositionY": [20.0] * 30, "PositionYUnit": ["µm"] * 30,
-               "PositionZ": [1.5 * (i % 5) for i in range(30)], "PositionZUnit": ["µm"] * 30})
+    ome(
+        folder,
+        (3, 2, 5, 6, 7),
+        "TCZYX",
+        Channel={"Name": ["DAPI", "GFP"], "Color": [-16776961, 16711935]},
+        TimeIncrement=500,
+        TimeIncrementUnit="ms",
+        SignificantBits=12,
+        Name="embryo",
+        Description="an embryo",
+        AcquisitionDate="2024-01-02T10:11:12",
+        Plane={
+            "DeltaT": [0.1 * i for i in range(30)],
+            "DeltaTUnit": ["s"] * 30,
+            "ExposureTime": [0.05] * 30,
+            "PositionX": [10.0] * 30,
+            "PositionXUnit": ["µm"] * 30,
+            "PositionY": [20.0] * 30,
+            "PositionYUnit": ["µm"] * 30,
+            "PositionZ": [1.5 * (i % 5) for i in range(30)],
+            "PositionZUnit": ["µm"] * 30,
+        },
+    )
 
 
 def bio_formats_xml(names):
     """As Bio-Formats writes it: two channels, each in a file of its own, planes of a channel named one by one."""
-    channels = "".join(f'<Channel ID="Channel:0:{c}" Name="{n}" Color="{color}" SamplesPerPixel="1" EmissionWavelength="{e}" '
-                       f'EmissionWavelengthUnit="nm" ExcitationWavelength="{e - 30}" ExcitationWavelengthUnit="nm" Fluor="{n}" '
-                       f'AcquisitionMode="LaserScanningConfocalMicroscopy"><LightPath/></Channel>'
-                       for c, (n, color, e) in enumerate([("DAPI", 65535, 461), ("GFP", 16711935, 509)]))
-    planes = "".join(f'<TiffData FirstC="{c}" FirstT="0" FirstZ="{z}" IFD="{z}" PlaneCount="1"><UUID FileName="{names[c]}">{IDS[c]}</UUID></TiffData>'
-                     for c in range(2) for z in range(5))
-    places = "".join(f'<Plane TheC="{c}" TheT="0" TheZ="{z}" DeltaT="{z / 10}" DeltaTUnit="s" ExposureTime="0.05" ExposureTimeUnit="s" '
-                     f'PositionX="100.0" PositionXUnit="µm" PositionY="200.0" PositionYUnit="µm" PositionZ="{z * 1.5}" PositionZUnit="µm"/>'
-                     for c in range(2) for z in range(5))
-    return (f'<?xml version="1.0" encoding="UTF-8" standalone="no"?><OME xmlns="{NAMESPACE}" Creator="OME Bio-Formats 7.3.0" UUID="%s">'
-            '<Instrument ID="Instrument:0"><Objective ID="Objective:0" LensNA="1.2" NominalMagnification="40.0" Immersion="Water"/></Instrument>'
-            '<Image ID="Image:0" Name="embryo"><AcquisitionDate>2024-01-02T10:11:12</AcquisitionDate><Description>an embryo</Description>'
-            '<InstrumentRef ID="Instrument:0"/><ObjectiveSettings ID="Objective:0" RefractiveIndex="1.33"/>'
-            '<StageLabel Name="stage" X="10.0" XUnit="µm" Y="20.0" YUnit="µm" Z="3.0" ZUnit="µm"/>'
-            '<Pixels ID="Pixels:0" BigEndian="true" DimensionOrder="XYZCT" Interleaved="false" PhysicalSizeX="0.25" PhysicalSizeXUnit="µm" '
-            'PhysicalSizeY="0.5" PhysicalSizeYUnit="µm" PhysicalSizeZ="1.5" PhysicalSizeZUnit="µm" SignificantBits="16" SizeC="2" SizeT="1" '
-            f'SizeX="7" SizeY="6" SizeZ="5" TimeIncrement="2.0" TimeIncrementUnit="s" Type="uint16">{channels}{planes}{places}</Pixels></Image>'
-            '<StructuredAnnotations><XMLAnnotation ID="Annotation:0" Namespace="openmicroscopy.org/OriginalMetadata"><Value><OriginalMetadata>'
-            '<Key>Gain</Key><Value>3</Value></OriginalMetadata></Value></XMLAnnotation></StructuredAnnotations></OME>')
+    channels = "".join(
+        f'<Channel ID="Channel:0:{c}" Name="{n}" Color="{color}" SamplesPerPixel="1" EmissionWavelength="{e}" '
+        f'EmissionWavelengthUnit="nm" ExcitationWavelength="{e - 30}" ExcitationWavelengthUnit="nm" Fluor="{n}" '
+        f'AcquisitionMode="LaserScanningConfocalMicroscopy"><LightPath/></Channel>'
+        for c, (n, color, e) in enumerate([("DAPI", 65535, 461), ("GFP", 16711935, 509)])
+    )
+    planes = "".join(
+        f'<TiffData FirstC="{c}" FirstT="0" FirstZ="{z}" IFD="{z}" PlaneCount="1"><UUID FileName="{names[c]}">{IDS[c]}</UUID></TiffData>'
+        for c in range(2)
+        for z in range(5)
+    )
+    places = "".join(
+        f'<Plane TheC="{c}" TheT="0" TheZ="{z}" DeltaT="{z / 10}" DeltaTUnit="s" ExposureTime="0.05" ExposureTimeUnit="s" '
+        f'PositionX="100.0" PositionXUnit="µm" PositionY="200.0" PositionYUnit="µm" PositionZ="{z * 1.5}" PositionZUnit="µm"/>'
+        for c in range(2)
+        for z in range(5)
+    )
+    return (
+        f'<?xml version="1.0" encoding="UTF-8" standalone="no"?><OME xmlns="{NAMESPACE}" Creator="OME Bio-Formats 7.3.0" UUID="%s">'
+        '<Instrument ID="Instrument:0"><Objective ID="Objective:0" LensNA="1.2" NominalMagnification="40.0" Immersion="Water"/></Instrument>'
+        '<Image ID="Image:0" Name="embryo"><AcquisitionDate>2024-01-02T10:11:12</AcquisitionDate><Description>an embryo</Description>'
+        '<InstrumentRef ID="Instrument:0"/><ObjectiveSettings ID="Objective:0" RefractiveIndex="1.33"/>'
+        '<StageLabel Name="stage" X="10.0" XUnit="µm" Y="20.0" YUnit="µm" Z="3.0" ZUnit="µm"/>'
+        '<Pixels ID="Pixels:0" BigEndian="true" DimensionOrder="XYZCT" Interleaved="false" PhysicalSizeX="0.25" PhysicalSizeXUnit="µm" '
+        'PhysicalSizeY="0.5" PhysicalSizeYUnit="µm" PhysicalSizeZ="1.5" PhysicalSizeZUnit="µm" SignificantBits="16" SizeC="2" SizeT="1" '
+        f'SizeX="7" SizeY="6" SizeZ="5" TimeIncrement="2.0" TimeIncrementUnit="s" Type="uint16">{channels}{planes}{places}</Pixels></Image>'
+        '<StructuredAnnotations><XMLAnnotation ID="Annotation:0" Namespace="openmicroscopy.org/OriginalMetadata"><Value><OriginalMetadata>'
+        "<Key>Gain</Key><Value>3</Value></OriginalMetadata></Value></XMLAnnotation></StructuredAnnotations></OME>"
+    )
 
 
 IDS = [uuid.uuid5(uuid.NAMESPACE_URL, str(c)).urn for c in range(2)]
@@ -144,8 +240,12 @@ def companion(folder):
     names = ["a_c0.tif", "a_c1.tif"]
     (folder / "a.companion.ome").write_bytes((bio_formats_xml(names) % uuid.uuid5(uuid.NAMESPACE_URL, "xml").urn).encode())
     for c, name in enumerate(names):
-        write_pages(folder / name, f'<OME xmlns="{NAMESPACE}" UUID="{IDS[c]}"><BinaryOnly MetadataFile="a.companion.ome" '
-                    f'UUID="{uuid.uuid5(uuid.NAMESPACE_URL, "xml").urn}"/></OME>'.encode(), 2 + c)
+        write_pages(
+            folder / name,
+            f'<OME xmlns="{NAMESPACE}" UUID="{IDS[c]}"><BinaryOnly MetadataFile="a.companion.ome" '
+            f'UUID="{uuid.uuid5(uuid.NAMESPACE_URL, "xml").urn}"/></OME>'.encode(),
+            2 + c,
+        )
 
 
 def write_pages(path, description, seed):
@@ -163,6 +263,7 @@ def reduced_pages(folder):
 
 
 # The foreign reader.
+
 
 def by_time_and_channel(stored, axes, names):
     """Voxels [x, y, z] by (time, channel). `names`: axes that are times, channels and slices."""
@@ -220,7 +321,9 @@ def read_shaped(path):
         series = file.shaped_metadata and file.series[0]
         if not series:
             raise ValueError("not shaped")
-        return Answer(fields=by_time_and_channel(series.asarray(), series.axes, ("T", "C", "ZQI")), affine=affine_of(ratio_spacing(file.pages[0])))
+        return Answer(
+            fields=by_time_and_channel(series.asarray(), series.axes, ("T", "C", "ZQI")), affine=affine_of(ratio_spacing(file.pages[0]))
+        )
 
 
 def read_imagej(path):
@@ -269,14 +372,15 @@ def samples(_):
 
     def jpeg(folder):
         return [ImageJLines(folder / "a.tif"), TagsDocument(folder / "a.tif", "tags", hidden=(270, 50838, 50839))] + (
-            [ImageJBlock(folder / "a.tif")] if 50839 in tifffile.TiffFile(folder / "a.tif").pages[0].tags else [])
+            [ImageJBlock(folder / "a.tif")] if 50839 in tifffile.TiffFile(folder / "a.tif").pages[0].tags else []
+        )
 
     def ome_documents(folder):
         return [OmeDocument(folder / "a.ome.tif"), TagsDocument(folder / "a.ome.tif", "tags")]
 
     def several(folder):
-        return [OmeDocument(folder / "a_c0.ome.tif"),
-                TagsDocument(folder / "a_c1.ome.tif", "page-tags")]
+        return [OmeDocument(folder / "a_c0.ome.tif"), TagsDocument(folder / "a_c1.ome.tif", "page-tags")]
+
     return [
         sample("plain", scanned, pages_of, read_pages),
         sample("rgb", rgb, pages_of, read_pages),
@@ -285,7 +389,9 @@ def samples(_):
         sample("ome", ome_hyperstack, ome_documents, read_ome, "a.ome.tif"),
         sample("ome-rgb", lambda folder: ome_rgb(folder), ome_documents, read_ome, "a.ome.tif"),
         sample("geo", geo, tags("tags"), read_pages),
-        sample("shaped", lambda folder: shaped(folder, (5, 6, 7), "ZYX"), lambda f: [ShapedJson(f / "a.tif"), *tags("tags")(f)], read_shaped),
+        sample(
+            "shaped", lambda folder: shaped(folder, (5, 6, 7), "ZYX"), lambda f: [ShapedJson(f / "a.tif"), *tags("tags")(f)], read_shaped
+        ),
         sample("calibrated", calibrated, jpeg, read_imagej),
         sample("bio-formats", bio_formats, several, read_ome, "a_c0.ome.tif", ("a_c1.ome.tif",)),
         sample("white", lambda folder: plain(folder, photometric="miniswhite"), pages_of, read_pages),
@@ -295,17 +401,36 @@ def samples(_):
         sample("rgb-planes", lambda folder: rgb(folder, "separate"), pages_of, read_pages),
         sample("halves", lambda folder: plain(folder, np.float16), pages_of, read_pages),
         sample("reduced", reduced_pages, lambda folder: [TagsDocument(folder / "a.tif", "reduced-tags", 1)], read_pages),
-        sample("shaped-times", lambda folder: shaped(folder, (3, 2, 5, 6, 7), "TCZYX", np.uint16), lambda f: [ShapedJson(f / "a.tif")], read_shaped),
+        sample(
+            "shaped-times",
+            lambda folder: shaped(folder, (3, 2, 5, 6, 7), "TCZYX", np.uint16),
+            lambda f: [ShapedJson(f / "a.tif")],
+            read_shaped,
+        ),
         sample("imagej-times", imagej_floats, jpeg, read_imagej),
         sample("imagej-rgb", lambda folder: imagej(folder, (5, 6, 7, 3), np.uint8, axes="ZYXS", spacing=3.0, unit="nm"), jpeg, read_imagej),
         sample("ome-levels", lambda folder: ome(folder, (5, 64, 48), "ZYX", subifds=2), ome_documents, read_ome, "a.ome.tif"),
-        Sample("companion", "a.companion.ome", companion, lambda folder: [OmeDocument(folder / "a.companion.ome", xml=True),
-                                                                       OmeDocument(folder / "a_c0.tif", "binary-only")], None, ("a_c1.tif",)),
+        Sample(
+            "companion",
+            "a.companion.ome",
+            companion,
+            lambda folder: [OmeDocument(folder / "a.companion.ome", xml=True), OmeDocument(folder / "a_c0.tif", "binary-only")],
+            None,
+            ("a_c1.tif",),
+        ),
     ]
 
 
 def ome_rgb(folder):
     with tifffile.TiffWriter(folder / "a.ome.tif", ome=True) as writer:
-        writer.write(values((5, 6, 7, 3), np.uint8), photometric="rgb", metadata={"axes": "ZYXS", "PhysicalSizeX": 0.25, "PhysicalSizeY": 0.5,
-                                                                                 "PhysicalSizeZ": 1.5,
-                                                                                 "UUID": "urn:uuid:11111111-2222-3333-4444-555555555556"})
+        writer.write(
+            values((5, 6, 7, 3), np.uint8),
+            photometric="rgb",
+            metadata={
+                "axes": "ZYXS",
+                "PhysicalSizeX": 0.25,
+                "PhysicalSizeY": 0.5,
+                "PhysicalSizeZ": 1.5,
+                "UUID": "urn:uuid:11111111-2222-3333-4444-555555555556",
+            },
+        )
