@@ -22,6 +22,14 @@ class RenderTurnsTest : public WorkerMachineTest {
     a.setup.dataset = dataset == 0 ? DatasetId(client) : dataset;
     return a;
   }
+  // The same with images that have a size.
+  GroupAssignment Sized(ClientId client, DatasetId dataset = 0) {
+    GroupAssignment a = FrameOf(client, FrameId(client), dataset);
+    SetRenderer(*FindRenderer("raycast"), a.setup);
+    a.setup.sheets = {};
+    a.setup.camera = MakeCamera({}, {16, 16}, a.setup.description.geometry);
+    return a;
+  }
   Actions Assign(const GroupAssignment& assignment) { return Feed(Tell(assignment)); }
 };
 
@@ -69,14 +77,7 @@ TEST_F(RenderTurnsTest, ClientsOfTheSameDatasetTakeTurnsToo) {
 }
 
 TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnother) {
-  const auto sized = [this](ClientId client) {  // without a renderer images have no size
-    GroupAssignment a = FrameOf(client, client, 7);
-    SetRenderer(*FindRenderer("raycast"), a.setup);
-    a.setup.sheets = {};
-    a.setup.camera = MakeCamera({}, {16, 16}, a.setup.description.geometry);
-    return a;
-  };
-  const GroupAssignment frame = sized(1);
+  const GroupAssignment frame = Sized(1, 7);
   const Box padded = PaddedBox(frame.group.placements.at(0).box, frame.setup);
   const std::uint64_t images = GroupImageBytes(frame.setup, frame.group.placements) + PictureBytes(frame.setup);
   WorkerConfig config = Config();
@@ -84,7 +85,7 @@ TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnot
   Start(config);
   const StartRender first = All<StartRender>(Assign(frame)).at(0);
   now += std::chrono::seconds(1);
-  const Actions same = Assign(sized(2));
+  const Actions same = Assign(Sized(2, 7));
   EXPECT_THAT(All<PauseRender>(same), IsEmpty());
   EXPECT_THAT(All<StartRender>(same), IsEmpty());
   EXPECT_THAT(All<StartRender>(Rendered(first)), SizeIs(1));
@@ -97,13 +98,13 @@ TEST_F(RenderTurnsTest, NoneBeginsBesideAnotherWhileTheProcessHoldsTooMuch) {
   config.memory_bytes = std::uint64_t{1} << 32;
   config.spare_for_images = [&spare] { return spare; };
   Start(config);
-  const StartRender first = All<StartRender>(Assign(FrameOf(1, 1))).at(0);
-  EXPECT_THAT(All<StartRender>(Assign(FrameOf(2, 2))), IsEmpty());
+  const StartRender first = All<StartRender>(Assign(Sized(1))).at(0);
+  EXPECT_THAT(All<StartRender>(Assign(Sized(2))), IsEmpty());
   EXPECT_THAT(All<StartRender>(After(std::chrono::seconds(3))), IsEmpty());
   const auto second = All<StartRender>(Feed(Rendered(first)));
   ASSERT_THAT(second, SizeIs(1));
   EXPECT_EQ(second[0].client, 2U);
-  EXPECT_THAT(All<StartRender>(Assign(FrameOf(3, 3))), IsEmpty());
+  EXPECT_THAT(All<StartRender>(Assign(Sized(3))), IsEmpty());
   spare = std::int64_t{1} << 30;
   EXPECT_THAT(All<StartRender>(Feed(After(std::chrono::seconds(1)))), SizeIs(1)) << "there is room again";
 }
