@@ -1,5 +1,12 @@
-#include "client/cli/annotate.h"
-
+// `annotate`, for the Python package: puts pixels over a background and draws annotations onto them, or makes a file of them, so that its
+// pictures are those of the command line.
+//
+// stdin: a line of JSON, and behind it the pixels: width * height * 4 floats of this machine, premultiplied, row 0 first.
+//   {"size": [W, H], "panes": [the "geometry" of a picture's record, ...], "title", "scale_bar", "orientation_marker", "sides_only",
+//    "axes", "color_bar", "legend", "font_size", "dpi", "background": [R, G, B, A],
+//    "file": "jpg" or another ending, "depth", "quality",
+//    "key": {"bars": [{"name", "colors": [[value, r, g, b], ...]}, ...], "entries": [{"name", "color": [r, g, b]}, ...]}}
+// Only size and panes must be there. stdout: the file; without "file" the pixels that it would show.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -10,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/commands.h"
 #include "client/pictures/annotations.h"
 #include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"

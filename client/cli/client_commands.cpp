@@ -5,14 +5,12 @@
 #include <memory>
 #include <utility>
 
-#include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/completion.h"
 #include "client/cli/cores.h"
 #include "client/cli/laboratory.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/picture_orders.h"
-#include "client/cli/token.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
 #include "client/request/camera_file.h"

@@ -39,5 +39,11 @@ Status RunData(const DataOptions& options);
 Status RunSteer(const SteerOptions& options);
 Status RunLogs(const LogsOptions& options);
 Status RunSlurm(const SlurmOptions& options);
+// Prints the token, and if the gateway runs here a link with it. InvalidArgument: the gateway's own token is too short to sign others, or
+// there are too many datasets. Unavailable: no gateway of this user runs here, and no token file is named.
+Status RunToken(const TokenOptions& options);
+
+inline constexpr const char* kAnnotateCommand = "annotate";  // for the Python package; not shown in help texts
+Status RunAnnotate();
 
 }  // namespace slabstream

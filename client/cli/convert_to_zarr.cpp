@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <iostream>
 
-#include "client/cli/byte_progress.h"
-#include "client/cli/progress_bar.h"
-#include "client/cli/progress_text.h"
+#include "client/cli/progress.h"
 #include "data/open/read_volume.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 

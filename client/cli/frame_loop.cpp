@@ -11,8 +11,7 @@
 #include <utility>
 
 #include "client/cli/interrupt.h"
-#include "client/cli/progress_bar.h"
-#include "client/cli/progress_text.h"
+#include "client/cli/progress.h"
 #include "common/cli/program.h"
 
 namespace slabstream {

@@ -6,10 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/progress_bar.h"
+#include "client/cli/progress.h"
 #include "common/files/store_folder.h"
 #include "common/volume/memory_budget.h"
 #include "data/catalogue/catalogue.h"

@@ -6,10 +6,9 @@
 #include <memory>
 #include <span>
 
-#include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/progress_bar.h"
+#include "client/cli/progress.h"
 #include "data/isosurface/make_isosurface.h"
 #include "data/isosurface/mesh_file.h"
 #include "data/open/open_source.h"

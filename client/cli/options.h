@@ -235,6 +235,13 @@ struct LogsOptions {
   Duration since{};  // how long ago the first line may have been written; 0: any time
 };
 
+struct TokenOptions {
+  Duration lasts{};                   // at least a second
+  std::vector<std::string> datasets;  // empty: all
+  bool view_only = false;
+  std::string token_file;  // the gateway's; empty: the token of the gateway of this user that was started here last
+};
+
 struct SlurmOptions {
   int nodes = 1;                        // [1, kMaxJobNodes]
   int workers_per_node = 1;             // [1, kMaxWorkersPerNode]

@@ -1,12 +1,11 @@
-// `token`: a token of a gateway for others, which expires.
-#include "client/cli/token.h"
-
+// `token`: a token of a gateway for others, which expires (docs/http.md).
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <iostream>
 
+#include "client/cli/commands.h"
 #include "client/service/gateway_state.h"
 #include "common/base/time.h"
 #include "common/cli/program.h"

@@ -68,7 +68,7 @@ inline constexpr double kSample = 8e-9;
 inline constexpr double kMacrocellWork = 512;
 
 // A worker's combining thread, for each pixel that is not empty (CombiningCosts), if images travel in messages.
-//   simulation_bench CASE  (laboratory/measure/combining_costs.h)
+//   simulation_bench CASE  (laboratory/measure/calibrate.h)
 namespace combining {
 inline constexpr double kScan = 0.2e-9;     // searched for runs, empty or not
 inline constexpr double kEncode = 1.5e-9;   // copied into a message

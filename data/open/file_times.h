@@ -1,7 +1,9 @@
 // Files as times: "run/cell_*.tif" is one source with a time for each file, in natural order of their names ("cell_2" before "cell_10"),
-// and so is a file that names them (series_file.h). Microscopes and simulations write a file for each time, while somebody looks.
+// and so is a file that names a file for each time, as VTK's writers and simulations make them beside their output: ParaView's collections
+// (.pvd, XML) and series (.vti.series, JSON). Microscopes and simulations write a file for each time, while somebody looks.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,11 +11,15 @@
 
 #include "common/base/status.h"
 #include "common/volume/field_info.h"
-#include "data/open/series_file.h"
 #include "data/sources/volume_source.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
+
+struct TimeFile {
+  std::string file;
+  double time = 0;
+};
 
 inline constexpr std::size_t kMaxFileTimes = 100'000;
 
@@ -22,7 +28,8 @@ inline constexpr std::size_t kMaxFileTimes = 100'000;
 bool NamesFileTimes(const std::string& path);
 
 // The files of such a path, in order of their times, which are the numbers of the files if the path is a pattern; never none. NotFound:
-// there is none. ResourceExhausted: more than kMaxFileTimes. InvalidArgument: a series names another one. Errors of ReadSeriesFile.
+// there is none. ResourceExhausted: more than kMaxFileTimes. InvalidArgument, naming `path`: no such file of times, one without a file or
+// with more than kMaxFileTimes, a time that is no number, two files of one time, or a series that names another one.
 Result<std::vector<TimeFile>> FilesOfTimes(const std::string& path);
 Result<std::string> FirstFileOf(const std::string& path);
 TimeAxis TimesOf(const std::vector<TimeFile>& files);

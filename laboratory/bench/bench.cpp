@@ -10,7 +10,7 @@
 #include <span>
 #include <utility>
 
-#include "client/cli/picture_files.h"
+#include "client/cli/picture_sink.h"
 #include "client/cli/service_connection.h"
 #include "common/files/files.h"
 #include "common/renderers/registry.h"

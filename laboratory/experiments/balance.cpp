@@ -14,8 +14,7 @@
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/machines.h"
 #include "laboratory/experiments/policies.h"
-#include "laboratory/experiments/service_roster.h"
-#include "laboratory/experiments/service_walks.h"
+#include "laboratory/experiments/service_frames.h"
 #include "laboratory/experiments/subjects.h"
 #include "laboratory/experiments/track.h"
 

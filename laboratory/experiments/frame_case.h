@@ -35,7 +35,7 @@ const RendererKind* ZBuffer();
 
 FrameRequest RequestOf(const FrameCase& frame);
 
-// `columns`, and the columns of results that a frame fills (laboratory/results/columns.h). Those of the policy say what was asked for.
+// `columns`, and the columns of results that a frame fills (laboratory/results/results.h). Those of the policy say what was asked for.
 Json ColumnsOf(const FrameCase& frame, Json columns = Json::object());
 
 // The keys of trials hold all that decides their numbers (frame_keys.h).

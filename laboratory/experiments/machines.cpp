@@ -2,7 +2,6 @@
 
 #include "common/parallel/task_arena.h"
 #include "laboratory/measure/calibrate.h"
-#include "laboratory/measure/combining_costs.h"
 
 namespace slabstream {
 namespace {

@@ -17,7 +17,7 @@
 #include "common/transport/socket.h"
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
-#include "laboratory/experiments/service_roster.h"
+#include "laboratory/experiments/service_frames.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "laboratory/measure/other_load.h"
 

@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "client/cli/progress_bar.h"
+#include "client/cli/progress.h"
 #include "common/base/check.h"
 #include "common/base/time.h"
 #include "laboratory/measure/other_load.h"

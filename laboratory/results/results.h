@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,24 @@
 #include "laboratory/measure/statistics.h"
 
 namespace slabstream {
+
+// The columns and metrics: the only list of each. python/slabstream_lab reads what is written with them. Names stay; a column that changes
+// its meaning gets a new name and results a new kResultsVersion.
+inline constexpr int kResultsVersion = 1;
+
+struct Column {
+  std::string_view name, meaning;
+};
+// What a value was found for. A case leaves out the columns that do not apply to it.
+std::span<const Column> CaseColumns();
+// Around them: which run, the value itself, and who found it.
+std::span<const Column> RunColumns();
+std::span<const Column> ValueColumns();
+
+struct Metric {
+  std::string_view name, unit, meaning;
+};
+std::span<const Metric> Metrics();
 
 // The source of a number.
 enum class Origin : std::uint8_t {

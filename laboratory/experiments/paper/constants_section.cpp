@@ -5,7 +5,7 @@
 
 #include "common/parallel/task_arena.h"
 #include "laboratory/experiments/paper/setup.h"
-#include "laboratory/measure/combining_costs.h"
+#include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/cost_fit.h"
 #include "laboratory/measure/thread_time.h"
 

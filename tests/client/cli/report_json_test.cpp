@@ -3,8 +3,7 @@
 #include <map>
 #include <set>
 
-#include "client/cli/stats_json.h"
-#include "client/cli/trace_json.h"
+#include "client/cli/report_json.h"
 #include "common/json/json.h"
 
 namespace slabstream {

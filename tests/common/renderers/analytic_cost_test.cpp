@@ -13,7 +13,6 @@
 #include "common/planning/layout.h"
 #include "common/renderers/sampling_rate.h"
 #include "common/renderers/splat/splat_cost.h"
-#include "common/renderers/splat/splat_work.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/random_box.h"
 #include "tests/support/renderers.h"

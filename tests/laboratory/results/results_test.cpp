@@ -6,7 +6,6 @@
 #include <regex>
 
 #include "common/files/files.h"
-#include "laboratory/results/columns.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {

@@ -7,6 +7,7 @@
 #include "common/base/check.h"
 #include "common/parallel/parallel.h"
 #include "common/parallel/per_thread.h"
+#include "worker/renderers/brick_ranges.h"
 
 namespace slabstream {
 namespace {
@@ -58,6 +59,24 @@ Found FindInSlice(const OccupiedVoxels& cells, const Box& wanted, std::int32_t s
 }
 
 }  // namespace
+
+void BrickRecords::Need(const Index3& brick) {
+  std::atomic<std::uint8_t>& state = states_[grid_.Number(brick)];
+  std::uint8_t met = kNone;
+  if (state.compare_exchange_strong(met, kBeingMade, std::memory_order_acquire)) {
+    Make(brick);
+    state.store(kMade, std::memory_order_release);
+    state.notify_all();
+    return;
+  }
+  state.wait(kBeingMade, std::memory_order_acquire);
+}
+
+void BrickRecords::NeedAll() {
+  ForEachRowOfBricks(grid_, [&](Index3 brick) {
+    for (; brick.x < grid_.first.x + grid_.counts.x; ++brick.x) Need(brick);
+  });
+}
 
 std::size_t VoxelBeams::bytes() const {
   return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord) +

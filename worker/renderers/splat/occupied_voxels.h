@@ -4,15 +4,18 @@
 // In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels = 32
 // voxels of a beam from a global multiple of 32 on, stored as a 32-bit mask of the occupied ones. So a beam costs a bit per voxel and four
 // bytes per occupied voxel, for dense and sparse data alike. A voxel's record is found by counting bits from the beam's first cell on. Each
-// record has its place from the beginning, but is made when its brick is first needed (brick_records.h).
+// record has its place from the beginning, but is made when its brick is first needed (BrickRecords).
 //
 // Traversals along z and along y visit the same beams, those along x, in different orders. So VoxelBeams are kept for two directions only:
 // along x, found in the voxels (FindVoxelBeams), and along y, for traversal along x, made from those (TurnVoxelBeams).
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "common/memory/large_array.h"
 #include "common/view/sheet_grid.h"
@@ -20,9 +23,50 @@
 #include "worker/kernels/voxel_record.h"
 #include "worker/renderers/bin_lookup.h"
 #include "worker/renderers/brick_ranges.h"
-#include "worker/renderers/splat/brick_records.h"
 
 namespace slabstream {
+
+// Makes the records of a brick when a frame first needs one of them. Most voxels of an opaque volume lie behind others: their records are
+// never made, and memory for them is not taken.
+class BrickRecords {
+  enum State : std::uint8_t { kNone, kBeingMade, kMade };
+
+ public:
+  // Of the bricks that touch `box`, which lies in that of the voxels.
+  BrickRecords(const VoxelBricks& voxels, const Box& box) : voxels_(voxels), grid_(box), states_(grid_.size()) {}
+  virtual ~BrickRecords() = default;
+  BrickRecords(const BrickRecords&) = delete;
+  BrickRecords& operator=(const BrickRecords&) = delete;
+
+  // Call before a frame's first Need: the voxels may lie elsewhere than before. They must stay until its last Need.
+  void SetVoxels(const VoxelBricks& voxels) { voxels_ = voxels; }
+
+  // A row of bricks along x: a frame asks for each octet that it draws.
+  class Row {
+   public:
+    bool Has(std::int32_t x) const { return states_[x - first_x_].load(std::memory_order_acquire) == kMade; }
+
+   private:
+    friend class BrickRecords;
+    Row(const std::atomic<std::uint8_t>* states, std::int32_t first_x) : states_(states), first_x_(first_x) {}
+
+    const std::atomic<std::uint8_t>* states_;
+    std::int32_t first_x_;
+  };
+  Row RowAt(std::int32_t y, std::int32_t z) const { return {&states_[grid_.Number({grid_.first.x, y, z})], grid_.first.x}; }
+  void Need(const Index3& brick);  // any thread
+  void NeedAll();                  // parallel
+  std::size_t bytes() const { return states_.size(); }
+
+ protected:
+  virtual void Make(const Index3& brick) const = 0;  // one call for each brick
+  const VoxelBricks& voxels() const { return voxels_; }
+
+ private:
+  VoxelBricks voxels_;
+  const BrickGrid grid_;
+  std::vector<std::atomic<std::uint8_t>> states_;  // by brick
+};
 
 inline constexpr std::int32_t kCellVoxels = 32, kCellOctets = kCellVoxels / kOctet;
 

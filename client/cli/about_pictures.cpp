@@ -1,10 +1,13 @@
-#include "client/report/picture_warnings.h"
+#include "client/cli/about_pictures.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
+#include <string>
+#include <string_view>
 
+#include "common/cli/program.h"
 #include "common/view/clip_corners.h"
 
 namespace slabstream {
@@ -44,8 +47,7 @@ std::string VisibleText(const TransferFunction& transfer) {
   return fmt::format("shows values from {:g} to {:g}", (first - 1)->value, (last - 1)->value);
 }
 
-}  // namespace
-
+// Colours from `low` to `high` (data values), as `option` says, meet none of the volume's values. Nothing: they do.
 std::optional<std::string> RangeWarning(std::string_view option, double low, double high, const ValueRange& values) {
   if (high > double(values.min) && low < double(values.max)) return std::nullopt;
   if (values.min == values.max && low <= double(values.min) && double(values.max) <= high) return std::nullopt;
@@ -53,6 +55,7 @@ std::optional<std::string> RangeWarning(std::string_view option, double low, dou
                      values.max);
 }
 
+// Why the picture of `frame` is empty. `summary`: of its dataset, under its transfer function.
 std::string EmptyWarning(const FrameRequest& frame, const SummaryReply& summary) {
   const VolumeGeometry& geometry = summary.description.geometry;
   if (!LeavesSomething(frame.clipping, geometry)) {
@@ -77,6 +80,23 @@ std::string EmptyWarning(const FrameRequest& frame, const SummaryReply& summary)
     return fmt::format("the picture is empty: the transfer function {}, but {}", VisibleText(summary.transfer), run);
   }
   return "the picture is empty: nothing that the transfer function shows lies in it; --fit frames what is shown, and " + run;
+}
+
+}  // namespace
+
+void WarnOf(Client& client, const FrameRequest& frame, bool empty, const std::optional<ValueWindow>& window) {
+  const std::optional<ScalarRange>& range = frame.transfer.scalar_range;
+  if (!empty && !window && !range) return;
+  const Result<SummaryReply> summary = client.Summarize(SummaryOf(frame));
+  if (!summary.ok()) return;
+  std::optional<std::string> warning;
+  if (window) {
+    warning = RangeWarning("--window", window->low(), window->high(), summary->range);
+  } else if (range && !range->percentiles) {
+    warning = RangeWarning("--scalar-range", range->min, range->max, summary->range);
+  }
+  if (!warning && empty) warning = EmptyWarning(frame, *summary);
+  if (warning) PrintWarning(*warning);
 }
 
 }  // namespace slabstream

@@ -1,12 +1,22 @@
-#include "client/cli/movie.h"
+#include "client/cli/picture_sink.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
+#include "client/request/picture_record.h"
 #include "common/base/check.h"
 
 namespace slabstream {
+
+Status PictureFiles::Put(const Picture& picture, const FrameJob& job) {
+  PictureNotes notes{.geometry = picture.geometry, .key = picture.key, .record = {}};
+  if (record_) {
+    notes.record =
+        RecordText(job.source, AsMade(job.request, picture.statistics), format_, picture.geometry, layers_, picture.statistics.levels);
+  }
+  return WritePicture(picture.image, picture.size, job.output, format_, notes);
+}
 
 Status CheckCanEncode(const MovieOptions& options) {
   const MovieFormat* const format = MovieFormatOf(options.path);
