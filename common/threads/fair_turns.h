@@ -31,7 +31,10 @@ class FairTurns {
   };
 
   // The member has something to do, and had nothing before.
-  void Join(const Member& member) { turns_[member] = {TurnOf(member).used, ++count_}; }
+  void Join(const Member& member) {
+    const Duration used = TurnOf(member).used;
+    turns_[member] = {used, ++count_};
+  }
   Turn TurnOf(const Member& member) const {
     const auto known = turns_.find(member);
     return known == turns_.end() ? Turn{used_by_last_, 0} : Turn{std::max(known->second.used, used_by_last_ - credit_), known->second.last};

@@ -420,7 +420,7 @@ struct HttpTransfers::Impl {
     if (!answer.ok() && code != StatusCode::kNotFound && code != StatusCode::kCancelled)
       Count(owned->host, [](WebTraffic& count) { ++count.failures; });
     Close(owned->host);
-    for (Asker& asker : owned->askers) {
+    for (Transfer::Asker& asker : owned->askers) {
       if (!answer.ok() || owned->askers.size() == 1) {
         asker.done(answer);
         continue;
@@ -452,7 +452,7 @@ struct HttpTransfers::Impl {
         host.waiting.push_back(std::move(transfer));
       }
       for (Owned& transfer : host.waiting) {
-        for (Asker& asker : transfer->askers) asker.done(Status::Cancelled(transfer->get.url + ": the program ends"));
+        for (Transfer::Asker& asker : transfer->askers) asker.done(Status::Cancelled(transfer->get.url + ": the program ends"));
       }
     }
     for (CURL* const easy : idle) curl_easy_cleanup(easy);

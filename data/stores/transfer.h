@@ -24,14 +24,14 @@ std::string HostAndPort(const std::string& url);
 // The address of the same object in another region; the same address if it is none of Amazon's.
 std::string InRegion(const std::string& url, const std::string& region);
 
-// Who waits for an answer, and for which bytes of it.
-struct Asker {
-  std::optional<ByteSpan> span;  // bytes of the object; none: all of it
-  HttpTransfers::Done done;
-  std::function<bool()> wanted;
-};
-
 struct Transfer {
+  // Who waits for an answer, and for which bytes of it.
+  struct Asker {
+    std::optional<ByteSpan> span;  // bytes of the object; none: all of it
+    HttpTransfers::Done done;
+    std::function<bool()> wanted;
+  };
+
   Transfer(HttpGet what, HttpTransfers::Done done);
 
   HttpGet get;

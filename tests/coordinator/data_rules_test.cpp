@@ -170,7 +170,8 @@ TEST_F(DataRules, ALoadFromAServerIsGivenUpAWhileAfterTheLastOneWhoWaitsForItLea
   far.Client(kOther, Frame(3));
   ASSERT_THAT(far.loads, SizeIs(2));
   far.Step(DatasetLoaded{"block", far.loads[1].load, 7, BlockSummary()});
-  EXPECT_FALSE(far.loads[1].stop.stop_possible()) << "nothing stops what was loaded";
+  far.Client(kOther, DataOrder{.nonce = 1, .action = DataAction::kRemove, .items = {"block"}});
+  EXPECT_FALSE(far.loads[1].stop.stop_requested()) << "nothing stops what was loaded";
 }
 
 TEST_F(DataRules, ADatasetThatIsRemovedIsNotLoadedToTheEnd) {

@@ -537,7 +537,7 @@ class Endings(InAFolder):
             done = subprocess.run([PROGRAM, "value", "cells", "--at", "4,8,8", "--json", "--endpoint", f"ipc://{self.folder}/s"],
                                   capture_output=True, text=True, timeout=100)
             self.assertEqual((done.returncode, done.stderr), (0, ""))
-            return json.loads(done.stdout)["value"]
+            return json.loads(done.stdout)[0]["value"]
 
         for ask in (by_command, lambda: service.value("cells", (4, 8, 8), timeout=100).value):
             first = self.coordinator()

@@ -183,13 +183,10 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
       while (!padded.retired && !padded.missing.empty()) {
         const ChunkPlace chunk = padded.missing.back();
         const std::uint32_t bytes = padded.BytesOf(chunk);
-        // One chunk of each client is always allowed: what others wait for may not come.
-        const std::uint64_t of_all = in_flight_bytes_ + bytes, own = in_flight_bytes + bytes;
-        has_credit = of_all <= config_.credit_bytes && own <= config_.credit_bytes / std::uint64_t(clients);
-        if (padded.stored_at != nullptr) {
-          has_credit = has_credit && in_flight_.size() < kMostRequests && in_flight <= kMostRequests / std::uint64_t(clients);
-        }
-        has_credit = has_credit || in_flight == 0;
+        if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
+        if (padded.stored_at != nullptr && in_flight_.size() >= kMostRequests) return;
+        has_credit = in_flight == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        if (padded.stored_at != nullptr) has_credit = has_credit && in_flight <= kMostRequests / std::uint64_t(clients);
         if (!has_credit) break;
         padded.missing.pop_back();
         in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
