@@ -199,6 +199,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"spans", kMaxSpans},
       {"open", kMaxOpenRequests},
       {"known", kMaxOpenRequests},
+      {"asked", kMaxOpenRequests},
+      {"lost", kMaxOpenRequests},
       {"workers", kMaxListed},
       {"datasets", kMaxListed},
       {"keys", kMaxListed},
