@@ -6,16 +6,16 @@ from ablation import CannotWrite, Document, Node, numbers_in
 from documents import XmlDocument
 
 NAMES = {
-    "@WholeExtent": ("extent", "size", "samples"), "@Extent": ("extent", "piece", "samples", "voxels", "points"), "@NumberOfComponents": ("components", "samples"),
+    "@WholeExtent": ("extent", "size", "samples"), "@Extent": ("extent", "piece", "samples", "voxels", "points", "blocks"), "@NumberOfComponents": ("components", "samples"),
     "@NumberOfPoints": ("point", "samples"), "@NumberOfCells": ("cells", "samples"), "@NumberOfPolys": ("polys", "samples"),
     "@NumberOfLines": ("lines", "samples"), "@NumberOfStrips": ("strips", "samples"), "@NumberOfVerts": ("verts", "samples"),
     "@NumberOfTuples": ("tuples", "samples"), "PointData": ("array",), "CellData": ("array",), "PPointData": ("array",), "PCellData": ("array",),
     "@type": ("VTKFile", "type"), "@Name": ("array",), "@file": ("exist", "named"), "@timestep": ("time",), "Collection": ("files",), "vtkMultiBlockDataSet": ("files",), "@Source": ("exist",), "DataSet": ("data set", "file"), "DataArray(connectivity)": ("cell",), "DataArray(offsets)": ("cell", "vertex"), "DataArray(types)": ("type",),
-    "@Spacing": ("step",), "@compressor": ("compress",), "@byte_order": ("byte order", "bytes"), "@header_type": ("bytes",)}
+    "@Spacing": ("step",), "@compressor": ("compress", "bytes"), "@byte_order": ("byte order", "bytes"), "@header_type": ("bytes",)}
 ROLES = {"@Spacing": "spacing", "@Origin": "affine", "@Direction": "affine"}
 KINDS = {"@version": "version", "@RangeMin": "range", "@RangeMax": "range", "@Scalars": "active"}
 VOCABULARY = {"@byte_order": ("LittleEndian", "BigEndian"), "@header_type": ("UInt32", "UInt64")}
-HOW = ("@format", "@type", "@NumberOfTuples")
+HOW = ("@format", "@type", "@NumberOfTuples", "@offset")
 DATA = ("PointData", "CellData", "PPointData", "PCellData")
 
 
@@ -80,8 +80,10 @@ WORDS = {"POINTS": ("count", "type"), "SCALARS": ("name", "type", "components"),
          "METADATA": ()}
 ARRAY = re.compile(r"(\S+) (\d+) (\d+) (bit|(unsigned_)?(char|short|int|long)|float|double|string|vtkIdType|vtktype\w+)\s*")
 OPENS = {"SCALARS": ("LOOKUP_TABLE", "METADATA"), "POINTS": ("METADATA",), "CELLS": ("OFFSETS", "CONNECTIVITY"), "POLYGONS": ("OFFSETS", "CONNECTIVITY")}
+SECTIONS = ("POINT_DATA", "CELL_DATA")
 LEGACY_NAMES = {"DIMENSIONS": ("size", "samples"), "POINT_DATA": ("samples", "points"), "CELL_DATA": ("samples", "cells"),
-                "encoding": ("ASCII", "BINARY"), "SPACING": ("step",), "version": ("first line",)}
+                "encoding": ("ASCII", "BINARY"), "DATASET": ("COORDINATES", "POINTS", "CELLS"),
+                "CELLS": ("OFFSETS", "CONNECTIVITY"), "SCALARS": ("array",), "FIELD": ("array", "velocity"), "SPACING": ("step",), "version": ("first line",)}
 
 
 class LegacyLines(Document):
@@ -140,9 +142,10 @@ class LegacyLines(Document):
         for block in self.blocks:
             here = self._key(block)
             field = block if here == "FIELD" else field
-            if here == key or here in closes or (closes == "arrays" and here not in WORDS):
+            inside = {"arrays": here not in WORDS or here == "METADATA", "section": here not in SECTIONS}.get(closes, here in closes)
+            if here == key or inside:
                 if here == key:
-                    closes = "arrays" if here == "FIELD" else OPENS.get(here, ())
+                    closes = "section" if here in SECTIONS else "arrays" if here == "FIELD" else OPENS.get(here, ())
                     if here not in WORDS:
                         self._set(field, 2, int(field[0].split()[2]) - 1)
                         closes = ("METADATA",)

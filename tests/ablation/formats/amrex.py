@@ -131,6 +131,13 @@ def documents(folder):
             NumberedLines(cells, "Cell_H", cell_words(cells.read_text().split("\n"))), LastFab(folder / "plt" / "Level_0" / "Cell_D_00000")]
 
 
+def check_descriptors(path):
+    """yt takes the type and the byte order of the first box for those of all."""
+    data = path.read_bytes()
+    if len({line[:line.index(b"((", 4 + 2)] for line in data.split(b"\n") if line.startswith(b"FAB ((8")}) > 1:
+        raise ValueError("boxes of several types")
+
+
 def read(folder):
     data = yt.load(str(folder / "plt"))
     size = data.domain_dimensions * 2 ** data.max_level

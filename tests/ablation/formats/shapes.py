@@ -213,6 +213,7 @@ def table(name, file, text, separator=",", header=None):
                   lambda folder: [TableDocument(folder / file, name, separator, header)])
 
 
+READ = ("pressure", "Normals", "rgb", "cell number", "cell%20number", "LengthUnits", "Points", "connectivity", "offsets")  # not the temperature
 CELLS_OF = {"Polys": FACES, "Strips": [[0, 1, 2, 3]], "Lines": [[0, 1, 2], [2, 3]], "Verts": [[0], [1], [3]]}
 
 
@@ -255,7 +256,7 @@ def vtp(kind):
         writer.SetDataModeToAscii()
         writer.Write()
     read = None if kind in ("Lines", "Verts") else lambda folder: read_polydata(vtk.vtkXMLPolyDataReader(), folder / "a.vtp")  # vertices of each line
-    return Sample(f"vtp-{kind.lower()}", "a.vtp", write, lambda folder: [VtkXml(folder / "a.vtp", "vtp")], read)
+    return Sample(f"vtp-{kind.lower()}", "a.vtp", write, lambda folder: [VtkXml(folder / "a.vtp", "vtp", READ)], read)
 
 
 def legacy(_):
@@ -265,7 +266,7 @@ def legacy(_):
         writer.SetHeader("SPACE=LPS")
         writer.SetInputData(polydata())
         writer.Write()
-    return Sample("legacy", "a.vtk", write, lambda folder: [LegacyLines(folder / "a.vtk", "polydata")])
+    return Sample("legacy", "a.vtk", write, lambda folder: [LegacyLines(folder / "a.vtk", "polydata", READ)])
 
 
 def npy(name, columns):

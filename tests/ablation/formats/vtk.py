@@ -227,7 +227,7 @@ def collection(_):
             write_xml(vtk.vtkXMLImageDataWriter(), image(dtype=(np.float32, np.int16)[number]), folder / f"a_{number}.vti")
         (folder / "a.pvd").write_text(
             '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>'
-            '<DataSet timestep="0" group="" part="0" file="a_0.vti"/><DataSet timestep="2.5" group="" part="0" file="a_1.vti"/>'
+            '<DataSet timestep="1" group="" part="0" file="a_0.vti"/><DataSet timestep="2.5" group="" part="0" file="a_1.vti"/>'
             "</Collection></VTKFile>")
     return Sample("pvd", "a.pvd?array=rho", write, lambda folder: [VtkXml(folder / "a.pvd", "pvd")], None, ("a_1.vti",))
 
@@ -236,7 +236,7 @@ def series(_):
     def write(folder):
         for number in range(2):
             write_xml(vtk.vtkXMLImageDataWriter(), image(dtype=(np.float32, np.int16)[number]), folder / f"a_{number}.vti")
-        (folder / "a.vti.series").write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 0}, {"name": "a_1.vti", "time": 2.5}]}')
+        (folder / "a.vti.series").write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 1}, {"name": "a_1.vti", "time": 2.5}]}')
     return Sample("series", "a.vti.series?array=rho", write, lambda folder: [JsonDocument(folder / "a.vti.series", "series")], None, ("a_1.vti",))
 
 
