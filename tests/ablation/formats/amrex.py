@@ -1,5 +1,6 @@
 """AMReX plotfiles: written by hand as AMReX 24 writes them (no package of Debian or PyPI does), read by yt."""
 import pathlib
+import re
 
 import numpy as np
 import yt
@@ -133,12 +134,12 @@ def documents(folder):
 
 def check_descriptors(path):
     """yt takes the type and the byte order of the first box for those of all."""
-    data = path.read_bytes()
-    if len({line[:line.index(b"((", 4 + 2)] for line in data.split(b"\n") if line.startswith(b"FAB ((8")}) > 1:
+    if len(set(re.findall(rb"FAB (\(\(8, \([\d ]*\)\),\(\d, \([\d ]*\)\)\))", path.read_bytes()))) > 1:
         raise ValueError("boxes of several types")
 
 
 def read(folder):
+    check_descriptors(folder / "plt" / "Level_0" / "Cell_D_00000")
     data = yt.load(str(folder / "plt"))
     size = data.domain_dimensions * 2 ** data.max_level
     grid = data.covering_grid(data.max_level, data.domain_left_edge, size)
