@@ -1,4 +1,4 @@
-"""Documents of files of meshes, lines and points: headers of PLY, keywords of OBJ, the JSON of GLB, tables, the end of FreeSurfer's surfaces."""
+"""Documents of meshes, lines and points: headers of PLY, keywords of OBJ, the JSON of GLB, tables, the end of FreeSurfer's surfaces."""
 import json
 import pathlib
 import struct
@@ -11,7 +11,6 @@ from vtk_documents import as_numbers, as_words
 class KeywordLines(Document):
     """Lines that begin with a keyword, between two others. Lines with the same keyword (the first `words` words) are one node, which is
     removed as a whole; the value is that of the first one."""
-
     def __init__(self, path, name, end=None, words=1, separator=" ", leave=(), names=None):
         """`leave`: keywords that only hold lines together. `names`: words by which messages name a keyword."""
         self.path, self.name, self.words, self.separator = pathlib.Path(path), name, words, separator
@@ -32,8 +31,11 @@ class KeywordLines(Document):
                 continue
             key, value = self._split(line)
             if key not in nodes and key not in self.leave:
-                nodes[key] = Node(f"{self.name}/{key}", as_numbers(value), lambda new, n=number, k=key: self._set(n, k, new),
-                                  lambda k=key: self._remove(k), names=self.names.get(key, ()))
+                nodes[key] = Node(f"{self.name}/{key}",
+                                  as_numbers(value),
+                                  lambda new, n=number, k=key: self._set(n, k, new),
+                                  lambda k=key: self._remove(k),
+                                  names=self.names.get(key, ()))
         return list(nodes.values())
 
     def _set(self, number, key, value):
@@ -53,7 +55,6 @@ class KeywordLines(Document):
 
 class PlyHeader(Document):
     """Lines of a PLY header: `property float x` of the element before is vertex/x, of the value `float`."""
-
     def __init__(self, path):
         self.path = pathlib.Path(path)
         data = self.path.read_bytes()
@@ -66,10 +67,16 @@ class PlyHeader(Document):
             words = line.split()
             element = words[1] if words[0] == "element" else element
             if words[0] == "property":
-                nodes.append(self._node(number, f"{element}/{words[-1]}", words[1:-1], lambda v, w=words: ["property", *v, w[-1]], ("propert", element)))
-                nodes.append(self._node(number, f"{element}/{words[-1]}/name", [words[-1]], lambda v, w=words: [*w[:-1], *v], ("propert", element)))
+                nodes.append(
+                    self._node(number,
+                               f"{element}/{words[-1]}",
+                               words[1:-1],
+                               lambda v, w=words: ["property", *v, w[-1]], ("propert", element)))
+                nodes.append(
+                    self._node(number, f"{element}/{words[-1]}/name", [words[-1]], lambda v, w=words: [*w[:-1], *v], ("propert", element)))
             elif words[0] == "element":
-                nodes.append(self._node(number, f"{element}/count", [words[2]], lambda v, w=words: [*w[:2], *v], ("vertex", "face", "element")))
+                nodes.append(
+                    self._node(number, f"{element}/count", [words[2]], lambda v, w=words: [*w[:2], *v], ("vertex", "face", "element")))
             else:
                 nodes.append(self._node(number, "/".join(words[:1]), words[1:], lambda v, w=words: [w[0], *v]))
         return nodes
@@ -78,8 +85,12 @@ class PlyHeader(Document):
         kind = "comment" if path in ("comment", "obj_info") and "SPACE" not in " ".join(value) else ""
         path = "comment/space" if path == "comment" and not kind else path
         names = (*names, "truncated", "list of")  # then the samples do not fit any more
-        return Node(f"ply/{path}", " ".join(value), lambda new: self.lines.__setitem__(number, " ".join(line(str(new).split()))),
-                    lambda: self.lines.__setitem__(number, None), names=names, kind=kind)
+        return Node(f"ply/{path}",
+                    " ".join(value),
+                    lambda new: self.lines.__setitem__(number, " ".join(line(str(new).split()))),
+                    lambda: self.lines.__setitem__(number, None),
+                    names=names,
+                    kind=kind)
 
     def add(self, path, value):
         if not path.startswith("ply/comment"):
@@ -93,10 +104,23 @@ class PlyHeader(Document):
 class GlbJson(JsonDocument):
     """The JSON chunk of a binary glTF file."""
 
-    NAMES = {"byteOffset": ("bytes", "index"), "bufferView": ("index", "components"), "count": ("rows",), "buffer": ("numbers",),
-             "byteLength": ("bytes",), "primitives": ("vertex",), "attributes": ("index", "vertex"), "COLOR_0": ("accessor",),
-             "NORMAL": ("accessor",), "POSITION": ("accessor", "vertex"), "indices": ("accessor", "index"), "mode": ("vertex",),
-             "mesh": ("vertex",), "nodes": ("vertex",), "accessors": ("accessor",)}
+    NAMES = {
+        "byteOffset": ("bytes", "index"),
+        "bufferView": ("index", "components"),
+        "count": ("rows", ),
+        "buffer": ("numbers", ),
+        "byteLength": ("bytes", ),
+        "primitives": ("vertex", ),
+        "attributes": ("index", "vertex"),
+        "COLOR_0": ("accessor", ),
+        "NORMAL": ("accessor", ),
+        "POSITION": ("accessor", "vertex"),
+        "indices": ("accessor", "index"),
+        "mode": ("vertex", ),
+        "mesh": ("vertex", ),
+        "nodes": ("vertex", ),
+        "accessors": ("accessor", )
+    }
 
     def __init__(self, path):
         self.path, self.name = pathlib.Path(path), "glb"
@@ -119,7 +143,6 @@ class GlbJson(JsonDocument):
 
 class TableDocument(Document):
     """The columns of a table, by the names of its header; lines before it that begin with `#` say the rest."""
-
     def __init__(self, path, name, separator=",", header=None):
         self.path, self.name, self.separator = pathlib.Path(path), name, separator
         self.lines = self.path.read_text().splitlines()
@@ -133,13 +156,23 @@ class TableDocument(Document):
         for number, line in enumerate(self.lines[:self.at]):
             if "=" in line:
                 key, value = line.lstrip("# ").split("=", 1)
-                nodes.append(Node(f"{self.name}/{key.strip()}", value.strip(), lambda new, n=number, k=key: self.lines.__setitem__(n, f"# {k}= {new}"),
-                                  lambda n=number: self.lines.__setitem__(n, "#")))
+                nodes.append(
+                    Node(f"{self.name}/{key.strip()}",
+                         value.strip(),
+                         lambda new, n=number, k=key: self.lines.__setitem__(n, f"# {k}= {new}"),
+                         lambda n=number: self.lines.__setitem__(n, "#")))
         for i, column in enumerate(self.columns):
-            nodes.append(Node(f"{self.name}/{column}/name", column, lambda new, i=i: self.columns.__setitem__(i, str(new)), lambda i=i: self._remove(i),
-                              names=("column",)))
-            nodes.append(Node(f"{self.name}/{column}/rows", as_numbers(" ".join(row[i] for row in self.rows)), lambda new, i=i: self._set(i, new),
-                              names=("column", *(("radius",) if column == "r" else ()))))
+            nodes.append(
+                Node(f"{self.name}/{column}/name",
+                     column,
+                     lambda new, i=i: self.columns.__setitem__(i, str(new)),
+                     lambda i=i: self._remove(i),
+                     names=("column", )))
+            nodes.append(
+                Node(f"{self.name}/{column}/rows",
+                     as_numbers(" ".join(row[i] for row in self.rows)),
+                     lambda new, i=i: self._set(i, new),
+                     names=("column", *(("radius", ) if column == "r" else ()))))
         return nodes
 
     def _remove(self, column):
@@ -166,7 +199,6 @@ class TableDocument(Document):
 
 class SurfaceEnd(LinesDocument):
     """The geometry of the volume at the end of a FreeSurfer surface: `cras = 1 2 3`, behind the triangles."""
-
     def __init__(self, path):
         super().__init__(path, "surface", "=")
         data = self.path.read_bytes()
@@ -181,7 +213,6 @@ class SurfaceEnd(LinesDocument):
 
 class TckLines(LinesDocument):
     """The header of MRtrix tracks. `file: . 123` is where the places begin: it is moved with them, unless it is the change itself."""
-
     def __init__(self, *args):
         super().__init__(*args)
         self.length, self.file = len(self._head()), self._file()

@@ -6,12 +6,36 @@ from ablation import CannotWrite, Document, Node, numbers_in
 from documents import XmlDocument
 
 NAMES = {
-    "@WholeExtent": ("extent", "size", "samples"), "@Extent": ("extent", "piece", "samples", "voxels", "points", "blocks"), "@NumberOfComponents": ("components", "samples"),
-    "@NumberOfPoints": ("point", "samples"), "@NumberOfCells": ("cells", "samples"), "@NumberOfPolys": ("polys", "samples"),
-    "@NumberOfLines": ("lines", "samples"), "@NumberOfStrips": ("strips", "samples"), "@NumberOfVerts": ("verts", "samples"),
-    "@NumberOfTuples": ("tuples", "samples"), "PointData": ("array",), "CellData": ("array",), "PPointData": ("array",), "PCellData": ("array",),
-    "@type": ("VTKFile", "type"), "@Name": ("array",), "@file": ("exist", "named"), "@timestep": ("time",), "Collection": ("files",), "vtkMultiBlockDataSet": ("files",), "@Source": ("exist",), "DataSet": ("data set", "file"), "DataArray(connectivity)": ("cell",), "DataArray(offsets)": ("cell", "vertex"), "DataArray(types)": ("type",),
-    "@Spacing": ("step",), "@compressor": ("compress", "bytes"), "@byte_order": ("byte order", "bytes"), "@header_type": ("bytes",)}
+    "@WholeExtent": ("extent", "size", "samples"),
+    "@Extent": ("extent", "piece", "samples", "voxels", "points", "blocks"),
+    "@NumberOfComponents": ("components", "samples"),
+    "@NumberOfPoints": ("point", "samples"),
+    "@NumberOfCells": ("cells", "samples"),
+    "@NumberOfPolys": ("polys", "samples"),
+    "@NumberOfLines": ("lines", "samples"),
+    "@NumberOfStrips": ("strips", "samples"),
+    "@NumberOfVerts": ("verts", "samples"),
+    "@NumberOfTuples": ("tuples", "samples"),
+    "PointData": ("array", ),
+    "CellData": ("array", ),
+    "PPointData": ("array", ),
+    "PCellData": ("array", ),
+    "@type": ("VTKFile", "type"),
+    "@Name": ("array", ),
+    "@file": ("exist", "named"),
+    "@timestep": ("time", ),
+    "Collection": ("files", ),
+    "vtkMultiBlockDataSet": ("files", ),
+    "@Source": ("exist", ),
+    "DataSet": ("data set", "file"),
+    "DataArray(connectivity)": ("cell", ),
+    "DataArray(offsets)": ("cell", "vertex"),
+    "DataArray(types)": ("type", ),
+    "@Spacing": ("step", ),
+    "@compressor": ("compress", "bytes"),
+    "@byte_order": ("byte order", "bytes"),
+    "@header_type": ("bytes", )
+}
 ROLES = {"@Spacing": "spacing", "@Origin": "affine", "@Direction": "affine"}
 KINDS = {"@version": "version", "@RangeMin": "range", "@RangeMax": "range", "@Scalars": "active"}
 VOCABULARY = {"@byte_order": ("LittleEndian", "BigEndian"), "@header_type": ("UInt32", "UInt64")}
@@ -38,7 +62,6 @@ def array_in(path):
 class VtkXml(XmlDocument):
     """Elements of arrays have the arrays' names in their paths. `asked`: arrays that the source asks for; others are of the kind "unread",
     if it asks for any. A text of many numbers is one node."""
-
     def __init__(self, path, name, asked=()):
         super().__init__(path, name)
         self.asked = asked
@@ -72,23 +95,56 @@ class VtkXml(XmlDocument):
         node.set = lambda new, put=node.set: put(as_words(new))
 
 
-WORDS = {"POINTS": ("count", "type"), "SCALARS": ("name", "type", "components"), "FIELD": ("name", "count"), "CELLS": ("offsets", "size"),
-         "CELL_TYPES": ("count",), "X_COORDINATES": ("count", "type"), "Y_COORDINATES": ("count", "type"), "Z_COORDINATES": ("count", "type"),
-         "LOOKUP_TABLE": ("name",), "OFFSETS": ("type",), "CONNECTIVITY": ("type",), "POINT_DATA": ("count",), "CELL_DATA": ("count",),
-         "VERTICES": ("offsets", "size"), "LINES": ("offsets", "size"), "POLYGONS": ("offsets", "size"), "TRIANGLE_STRIPS": ("offsets", "size"),
-         "VECTORS": ("name", "type"), "NORMALS": ("name", "type"), "DATASET": ("kind",), "DIMENSIONS": (), "SPACING": (), "ORIGIN": (),
-         "METADATA": ()}
+WORDS = {
+    "POINTS": ("count", "type"),
+    "SCALARS": ("name", "type", "components"),
+    "FIELD": ("name", "count"),
+    "CELLS": ("offsets", "size"),
+    "CELL_TYPES": ("count", ),
+    "X_COORDINATES": ("count", "type"),
+    "Y_COORDINATES": ("count", "type"),
+    "Z_COORDINATES": ("count", "type"),
+    "LOOKUP_TABLE": ("name", ),
+    "OFFSETS": ("type", ),
+    "CONNECTIVITY": ("type", ),
+    "POINT_DATA": ("count", ),
+    "CELL_DATA": ("count", ),
+    "VERTICES": ("offsets", "size"),
+    "LINES": ("offsets", "size"),
+    "POLYGONS": ("offsets", "size"),
+    "TRIANGLE_STRIPS": ("offsets", "size"),
+    "VECTORS": ("name", "type"),
+    "NORMALS": ("name", "type"),
+    "DATASET": ("kind", ),
+    "DIMENSIONS": (),
+    "SPACING": (),
+    "ORIGIN": (),
+    "METADATA": ()
+}
 ARRAY = re.compile(r"(\S+) (\d+) (\d+) (bit|(unsigned_)?(char|short|int|long)|float|double|string|vtkIdType|vtktype\w+)\s*")
-OPENS = {"SCALARS": ("LOOKUP_TABLE", "METADATA"), "POINTS": ("METADATA",), "CELLS": ("OFFSETS", "CONNECTIVITY"), "POLYGONS": ("OFFSETS", "CONNECTIVITY")}
+OPENS = {
+    "SCALARS": ("LOOKUP_TABLE", "METADATA"),
+    "POINTS": ("METADATA", ),
+    "CELLS": ("OFFSETS", "CONNECTIVITY"),
+    "POLYGONS": ("OFFSETS", "CONNECTIVITY")
+}
 SECTIONS = ("POINT_DATA", "CELL_DATA")
-LEGACY_NAMES = {"DIMENSIONS": ("size", "samples"), "POINT_DATA": ("samples", "points"), "CELL_DATA": ("samples", "cells"),
-                "encoding": ("ASCII", "BINARY"), "DATASET": ("COORDINATES", "POINTS", "CELLS"),
-                "CELLS": ("OFFSETS", "CONNECTIVITY"), "SCALARS": ("array",), "FIELD": ("array", "velocity"), "SPACING": ("step",), "version": ("first line",)}
+LEGACY_NAMES = {
+    "DIMENSIONS": ("size", "samples"),
+    "POINT_DATA": ("samples", "points"),
+    "CELL_DATA": ("samples", "cells"),
+    "encoding": ("ASCII", "BINARY"),
+    "DATASET": ("COORDINATES", "POINTS", "CELLS"),
+    "CELLS": ("OFFSETS", "CONNECTIVITY"),
+    "SCALARS": ("array", ),
+    "FIELD": ("array", "velocity"),
+    "SPACING": ("step", ),
+    "version": ("first line", )
+}
 
 
 class LegacyLines(Document):
     """A legacy file in text: a block is a line with a keyword, or of an array of a FIELD, and its samples, which go with it."""
-
     def __init__(self, path, name, asked=()):
         self.path, self.name, self.asked, self.blocks = pathlib.Path(path), name, asked, []
         lines = self.path.read_text().split("\n")
@@ -106,8 +162,16 @@ class LegacyLines(Document):
         return found[1] if found else block[0].split(" ")[0].strip()
 
     def nodes(self):
-        nodes = [Node(f"{self.name}/{name}", line, lambda new, i=i: self.head.__setitem__(i, str(new)), names=LEGACY_NAMES.get(name, ()),
-                      kind={"version": "version", "title": "comment"}.get(name, "")) for i, (name, line) in enumerate(zip(("version", "title", "encoding"), self.head))]
+        nodes = [
+            Node(f"{self.name}/{name}",
+                 line,
+                 lambda new, i=i: self.head.__setitem__(i, str(new)),
+                 names=LEGACY_NAMES.get(name, ()),
+                 kind={
+                     "version": "version",
+                     "title": "comment"
+                 }.get(name, "")) for i, (name, line) in enumerate(zip(("version", "title", "encoding"), self.head))
+        ]
         seen = set()
         for block in self.blocks:
             if self._key(block) not in seen:
@@ -118,8 +182,12 @@ class LegacyLines(Document):
     def _nodes_of(self, block):
         key, words = self._key(block), block[0].split()
         is_array = key not in WORDS
-        more = dict(names=(key, *LEGACY_NAMES.get(key, ()), *(("array", "FIELD") if is_array else ())), kind="information" if key == "METADATA" else "",
-                    role={"SPACING": "spacing", "ORIGIN": "affine"}.get(key, ""))
+        more = dict(names=(key, *LEGACY_NAMES.get(key, ()), *(("array", "FIELD") if is_array else ())),
+                    kind="information" if key == "METADATA" else "",
+                    role={
+                        "SPACING": "spacing",
+                        "ORIGIN": "affine"
+                    }.get(key, ""))
         if is_array and self.asked and key not in (*self.asked, "vtkGhostType", "TimeValue", "CYCLE", "units"):
             more["kind"] = "unread"
         whole = Node(f"{self.name}/{key}", None, None, lambda: self._remove(key), **more)
@@ -128,8 +196,10 @@ class LegacyLines(Document):
             whole.set = lambda new: block.__setitem__(0, f"{key} {as_words(new)}")
             return [whole]
         names = ("components", "tuples", "type") if is_array else WORDS[key]
-        return [whole] + [Node(f"{self.name}/{key}/{name}", as_numbers(words[i]), lambda new, i=i: self._set(block, i, new), **more)
-                          for i, name in enumerate(names, 1) if i < len(words)]
+        return [whole] + [
+            Node(f"{self.name}/{key}/{name}", as_numbers(words[i]), lambda new, i=i: self._set(block, i, new), **more)
+            for i, name in enumerate(names, 1) if i < len(words)
+        ]
 
     @staticmethod
     def _set(block, index, value):
@@ -148,7 +218,7 @@ class LegacyLines(Document):
                     closes = "section" if here in SECTIONS else "arrays" if here == "FIELD" else OPENS.get(here, ())
                     if here not in WORDS:
                         self._set(field, 2, int(field[0].split()[2]) - 1)
-                        closes = ("METADATA",)
+                        closes = ("METADATA", )
             else:
                 closes = ()
                 kept.append(block)

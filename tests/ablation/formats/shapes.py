@@ -40,6 +40,7 @@ def ply(name, encoding, colors=False, comment=None):
         if comment:
             data = data.replace(b"\nelement vertex", f"\ncomment {comment}\nelement vertex".encode(), 1)
         (folder / "a.ply").write_bytes(data)
+
     return Sample(name, "a.ply", write, lambda folder: [PlyHeader(folder / "a.ply")],
                   lambda folder: read_mesh(folder / "a.ply", b"comment SPACE=LPS\n" in (folder / "a.ply").read_bytes()))
 
@@ -54,17 +55,29 @@ def stl(name, encoding, text=None):
 
     def documents(folder):
         if encoding == "stl_ascii":
-            return [KeywordLines(folder / "a.stl", "stl-text", leave=("outer", "endloop", "endfacet", "endsolid"), names={"vertex": ("corners",)})]
+            return [
+                KeywordLines(folder / "a.stl",
+                             "stl-text",
+                             leave=("outer", "endloop", "endfacet", "endsolid"),
+                             names={"vertex": ("corners", )})
+            ]
         facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")])
-        return [HeaderDocument(folder / "a.stl", "stl", np.dtype([("text", "S80"), ("triangles", "<u4")]),
-                               names={"text": ("header", "space"), "triangles": ("triangle", "vertex")}),
-                StlFacet(folder / "a.stl", "stl-facet", facet, 84)]
+        return [
+            HeaderDocument(folder / "a.stl",
+                           "stl",
+                           np.dtype([("text", "S80"), ("triangles", "<u4")]),
+                           names={
+                               "text": ("header", "space"),
+                               "triangles": ("triangle", "vertex")
+                           }),
+            StlFacet(folder / "a.stl", "stl-facet", facet, 84)
+        ]
+
     return Sample(name, "a.stl", write, documents)
 
 
 class StlFacet(HeaderDocument):
     """The first triangle of a binary file. It is written into the file as it is: the header may have been changed, too."""
-
     def save(self):
         data = bytearray(self.path.read_bytes())
         data[self.offset:self.offset + self.header.dtype.itemsize] = self.header.tobytes()
@@ -96,8 +109,10 @@ def obj(_):
     def write(folder):
         (folder / "a.obj").write_text(OBJ)
         (folder / "a.mtl").write_text(MTL)
-    return Sample("obj", "a.obj", write, lambda folder: [KeywordLines(folder / "a.obj", "obj", names={"vn": ("normal",)}), KeywordLines(folder / "a.mtl", "mtl")],
-                  lambda folder: read_mesh(folder / "a.obj"), ("a.mtl",))
+
+    return Sample("obj", "a.obj", write,
+                  lambda folder: [KeywordLines(folder / "a.obj", "obj", names={"vn": ("normal", )}),
+                                  KeywordLines(folder / "a.mtl", "mtl")], lambda folder: read_mesh(folder / "a.obj"), ("a.mtl", ))
 
 
 def glb(name, colors=False, moved=False):
@@ -105,6 +120,7 @@ def glb(name, colors=False, moved=False):
         scene = trimesh.Scene()
         scene.add_geometry(mesh(colors), transform=trimesh.transformations.translation_matrix([1, 2, 3]) if moved else np.eye(4))
         (folder / "a.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
+
     return Sample(name, "a.glb", write, lambda folder: [GlbJson(folder / "a.glb")],
                   lambda folder: Answer(vertices=np.asarray(trimesh.load(folder / "a.glb", process=False).to_geometry().vertices)))
 
@@ -112,8 +128,16 @@ def glb(name, colors=False, moved=False):
 class GiftiXml(XmlDocument):
     """What messages say of arrays, and which ones are named by their intent."""
 
-    NAMES = {"@Dim0": ("dimensions",), "@Dim1": ("dimensions",), "@Dimensionality": ("dimensions",), "@Encoding": ("numbers", "base64", "gzip"),
-             "@Intent": ("NIFTI_INTENT", "vertex"), "DataArray": ("array", "vertex"), "Data": ("numbers",), "text": ("numbers",)}
+    NAMES = {
+        "@Dim0": ("dimensions", ),
+        "@Dim1": ("dimensions", ),
+        "@Dimensionality": ("dimensions", ),
+        "@Encoding": ("numbers", "base64", "gzip"),
+        "@Intent": ("NIFTI_INTENT", "vertex"),
+        "DataArray": ("array", "vertex"),
+        "Data": ("numbers", ),
+        "text": ("numbers", )
+    }
 
     def nodes(self):
         nodes = super().nodes()
@@ -128,12 +152,21 @@ def gifti(name, space="NIFTI_XFORM_SCANNER_ANAT", values=False, encoding="B64GZ"
     def write(folder):
         matrix = np.diag([1.0, 1.0, 1.0, 1.0])
         matrix[:3, 3] = [5, 6, 7]
-        arrays = [nibabel.gifti.GiftiDataArray(POINTS.astype(np.float32), "NIFTI_INTENT_POINTSET", "NIFTI_TYPE_FLOAT32", encoding=encoding,
-                                               coordsys=nibabel.gifti.GiftiCoordSystem("NIFTI_XFORM_UNKNOWN", space, matrix),
-                                               meta={"AnatomicalStructurePrimary": "CortexLeft", "GeometricType": "Anatomical"}),
-                  nibabel.gifti.GiftiDataArray(FACES.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", encoding=encoding)]
+        arrays = [
+            nibabel.gifti.GiftiDataArray(POINTS.astype(np.float32),
+                                         "NIFTI_INTENT_POINTSET",
+                                         "NIFTI_TYPE_FLOAT32",
+                                         encoding=encoding,
+                                         coordsys=nibabel.gifti.GiftiCoordSystem("NIFTI_XFORM_UNKNOWN", space, matrix),
+                                         meta={
+                                             "AnatomicalStructurePrimary": "CortexLeft",
+                                             "GeometricType": "Anatomical"
+                                         }),
+            nibabel.gifti.GiftiDataArray(FACES.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32", encoding=encoding)
+        ]
         if values:
-            arrays.append(nibabel.gifti.GiftiDataArray(np.arange(4, dtype=np.float32), "NIFTI_INTENT_SHAPE", "NIFTI_TYPE_FLOAT32", encoding=encoding))
+            arrays.append(
+                nibabel.gifti.GiftiDataArray(np.arange(4, dtype=np.float32), "NIFTI_INTENT_SHAPE", "NIFTI_TYPE_FLOAT32", encoding=encoding))
         nibabel.save(nibabel.gifti.GiftiImage(darrays=arrays), folder / "a.surf.gii")
 
     def read(folder):
@@ -143,6 +176,7 @@ def gifti(name, space="NIFTI_XFORM_SCANNER_ANAT", values=False, encoding="B64GZ"
         if places.xformspace == 1 or nibabel.nifti1.xform_codes.code[places.xformspace] == 1:
             points = points @ places.xform[:3, :3].T + places.xform[:3, 3]
         return Answer(vertices=points)
+
     return Sample(name, "a.surf.gii", write, lambda folder: [GiftiXml(folder / "a.surf.gii", "gifti")], read)
 
 
@@ -150,8 +184,17 @@ TKRAS = np.array([[-1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # columns: axes of voxe
 
 
 def surface(_):
-    info = {"head": np.array([2, 0, 20], np.int32), "valid": "1  # volume info valid", "filename": "../mri/orig.mgz", "volume": [256, 256, 256],
-            "voxelsize": [1, 1, 1], "xras": [-1, 0, 0], "yras": [0, 0, -1], "zras": [0, 1, 0], "cras": [1.5, 2.5, 3.5]}
+    info = {
+        "head": np.array([2, 0, 20], np.int32),
+        "valid": "1  # volume info valid",
+        "filename": "../mri/orig.mgz",
+        "volume": [256, 256, 256],
+        "voxelsize": [1, 1, 1],
+        "xras": [-1, 0, 0],
+        "yras": [0, 0, -1],
+        "zras": [0, 1, 0],
+        "cras": [1.5, 2.5, 3.5]
+    }
 
     def write(folder):
         nibabel.freesurfer.write_geometry(folder / "lh.pial", POINTS, FACES, "made by a test", info)
@@ -162,6 +205,7 @@ def surface(_):
             return Answer(vertices=points)
         turn = np.stack([told[name] for name in ("xras", "yras", "zras")], axis=1) @ TKRAS.T
         return Answer(vertices=points @ turn.T + told["cras"])
+
     return Sample("surface", "lh.pial", write, lambda folder: [SurfaceEnd(folder / "lh.pial")], read)
 
 
@@ -179,12 +223,21 @@ def trk(name, order="RAS", scalars=False):
 
     def read(folder):
         return Answer(vertices=np.concatenate(list(nibabel.streamlines.load(str(folder / "a.trk")).streamlines)))
-    return Sample(name, "a.trk", write, lambda folder: [HeaderDocument(folder / "a.trk", "trk", nibabel.streamlines.trk.header_2_dtype,
-                                                                       names={
-                                                                           "magic_number": ("TRACK",), "hdr_size": ("header",),
-                                                                           "voxel_sizes": ("voxel_size",), "nb_streamlines": ("line",),
-                                                                           "nb_scalars_per_point": ("line", "scalars"),
-                                                                           "nb_properties_per_streamline": ("line", "properties")})], read)
+
+    return Sample(
+        name, "a.trk", write, lambda folder: [
+            HeaderDocument(folder / "a.trk",
+                           "trk",
+                           nibabel.streamlines.trk.header_2_dtype,
+                           names={
+                               "magic_number": ("TRACK", ),
+                               "hdr_size": ("header", ),
+                               "voxel_sizes": ("voxel_size", ),
+                               "nb_streamlines": ("line", ),
+                               "nb_scalars_per_point": ("line", "scalars"),
+                               "nb_properties_per_streamline": ("line", "properties")
+                           })
+        ], read)
 
 
 def tck(_):
@@ -194,6 +247,7 @@ def tck(_):
 
     def read(folder):
         return Answer(vertices=np.concatenate(list(nibabel.streamlines.load(str(folder / "a.tck")).streamlines)))
+
     return Sample("tck", "a.tck", write, lambda folder: [TckLines(folder / "a.tck", "tck", ":", rb"\nEND")], read)
 
 
@@ -213,7 +267,8 @@ def table(name, file, text, separator=",", header=None):
                   lambda folder: [TableDocument(folder / file, name, separator, header)])
 
 
-READ = ("pressure", "Normals", "rgb", "cell number", "cell%20number", "LengthUnits", "Points", "connectivity", "offsets")  # not the temperature
+READ = ("pressure", "Normals", "rgb", "cell number", "cell%20number", "LengthUnits", "Points", "connectivity", "offsets"
+        )  # not the temperature
 CELLS_OF = {"Polys": FACES, "Strips": [[0, 1, 2, 3]], "Lines": [[0, 1, 2], [2, 3]], "Verts": [[0], [1], [3]]}
 
 
@@ -225,9 +280,10 @@ def polydata(kind="Polys"):
         cells.InsertNextCell(len(cell), cell)
     made.SetPoints(points)
     getattr(made, f"Set{kind}")(cells)
-    for name, values, of_points in (("temperature", np.arange(7.0, 11.0), True), ("pressure", np.arange(4.0), True), ("Normals", np.tile([0, 0, 1.0], (4, 1)), True),
-                                    ("rgb", COLORS[:, :3].copy(), True), ("cell number", np.arange(len(CELLS_OF[kind])), False),
-                                    ("vtkGhostType", np.array([0, 0, 0, 2], np.uint8), True)):
+    for name, values, of_points in (("temperature", np.arange(7.0, 11.0), True), ("pressure", np.arange(4.0), True),
+                                    ("Normals", np.tile([0, 0, 1.0], (4, 1)), True), ("rgb", COLORS[:, :3].copy(), True),
+                                    ("cell number", np.arange(len(CELLS_OF[kind])), False), ("vtkGhostType", np.array([0, 0, 0, 2],
+                                                                                                                      np.uint8), True)):
         array = numpy_support.numpy_to_vtk(values, deep=True)
         array.SetName(name)
         (made.GetPointData() if of_points else made.GetCellData()).AddArray(array)
@@ -255,7 +311,9 @@ def vtp(kind):
         writer.SetInputData(polydata(kind))
         writer.SetDataModeToAscii()
         writer.Write()
-    read = None if kind in ("Lines", "Verts") else lambda folder: read_polydata(vtk.vtkXMLPolyDataReader(), folder / "a.vtp")  # vertices of each line
+
+    read = None if kind in (
+        "Lines", "Verts") else lambda folder: read_polydata(vtk.vtkXMLPolyDataReader(), folder / "a.vtp")  # vertices of each line
     return Sample(f"vtp-{kind.lower()}", "a.vtp", write, lambda folder: [VtkXml(folder / "a.vtp", "vtp", READ)], read)
 
 
@@ -266,26 +324,30 @@ def legacy(_):
         writer.SetHeader("SPACE=LPS")
         writer.SetInputData(polydata())
         writer.Write()
+
     return Sample("legacy", "a.vtk", write, lambda folder: [LegacyLines(folder / "a.vtk", "polydata", READ)])
 
 
 def npy(name, columns):
     def write(folder):
         np.save(folder / "a.npy", np.c_[POINTS, np.arange(1.0, 5.0)][:, :columns])
-    return Sample(name, "a.npy", write, lambda folder: [NpyHeader(folder / "a.npy")], lambda folder: Answer(vertices=np.load(folder / "a.npy")[:, :3]))
+
+    return Sample(name, "a.npy", write, lambda folder: [NpyHeader(folder / "a.npy")],
+                  lambda folder: Answer(vertices=np.load(folder / "a.npy")[:, :3]))
 
 
 class NpyHeader(Document):
     """The members of a NumPy header, with the numbers encoded again."""
-
     def __init__(self, path):
         self.path, self.array = path, np.load(path)
         self.order = "C"
 
     def nodes(self):
         types = [Change(f"as {dtype}", lambda dtype=dtype: self._cast(dtype), same=True) for dtype in ("<f4", ">f8", "<i4", ">i2")]
-        return [Node("npy/descr", None, names=("type",), more=types),
-                Node("npy/fortran_order", None, names=("order",), more=[Change("columns", lambda: setattr(self, "order", "F"), same=True)])]
+        return [
+            Node("npy/descr", None, names=("type", ), more=types),
+            Node("npy/fortran_order", None, names=("order", ), more=[Change("columns", lambda: setattr(self, "order", "F"), same=True)])
+        ]
 
     def _cast(self, dtype):
         self.array = self.array.astype(dtype)
@@ -296,11 +358,28 @@ class NpyHeader(Document):
 
 def samples(folder):
     return [
-        ply("ply-text", "ascii"), ply("ply-binary", "binary", colors=True), ply("ply-slicer", "ascii", comment="SPACE=LPS"),
-        stl("stl-text", "stl_ascii"), stl("stl-binary", "stl"), stl("stl-slicer", "stl", "3D Slicer output. SPACE=LPS"),
-        obj(folder), glb("glb"), glb("glb-colors", colors=True, moved=True),
-        gifti("gifti"), gifti("gifti-values", values=True, encoding="ASCII"), gifti("gifti-talairach", space="NIFTI_XFORM_TALAIRACH"),
-        surface(folder), trk("trk"), trk("trk-scalars", order="LPS", scalars=True), tck(folder),
-        table("fcsv", "a.fcsv", FCSV, header="# columns = "), table("tsv", "a.tsv", TSV, "\t"), table("csv-napari", "a.csv", CSV),
-        table("csv-cells", "b.csv", CELLS), *[vtp(kind) for kind in CELLS_OF], legacy(folder), npy("npy-3", 3), npy("npy-4", 4),
+        ply("ply-text", "ascii"),
+        ply("ply-binary", "binary", colors=True),
+        ply("ply-slicer", "ascii", comment="SPACE=LPS"),
+        stl("stl-text", "stl_ascii"),
+        stl("stl-binary", "stl"),
+        stl("stl-slicer", "stl", "3D Slicer output. SPACE=LPS"),
+        obj(folder),
+        glb("glb"),
+        glb("glb-colors", colors=True, moved=True),
+        gifti("gifti"),
+        gifti("gifti-values", values=True, encoding="ASCII"),
+        gifti("gifti-talairach", space="NIFTI_XFORM_TALAIRACH"),
+        surface(folder),
+        trk("trk"),
+        trk("trk-scalars", order="LPS", scalars=True),
+        tck(folder),
+        table("fcsv", "a.fcsv", FCSV, header="# columns = "),
+        table("tsv", "a.tsv", TSV, "\t"),
+        table("csv-napari", "a.csv", CSV),
+        table("csv-cells", "b.csv", CELLS),
+        *[vtp(kind) for kind in CELLS_OF],
+        legacy(folder),
+        npy("npy-3", 3),
+        npy("npy-4", 4),
     ]

@@ -148,7 +148,8 @@ def read_image(path, reader, begin=0):
     values, of_cells = array_of(data)
     values = hidden(data, of_cells, values)
     size = [max(n - of_cells, 1) for n in data.GetDimensions()]
-    steps = np.array([data.GetDirectionMatrix().GetElement(r, c) for r in range(3) for c in range(3)]).reshape(3, 3) * np.array(data.GetSpacing())
+    steps = np.array([data.GetDirectionMatrix().GetElement(r, c) for r in range(3)
+                      for c in range(3)]).reshape(3, 3) * np.array(data.GetSpacing())
     affine = np.eye(4)
     affine[:3, :3] = steps
     first = np.array(data.GetExtent()[::2]) + (0.5 if of_cells else 0) + [begin, 0, 0]
@@ -168,7 +169,8 @@ def read_rectilinear(path, reader):
 
 def xml_sample(name, file, writer, data, read=None, mode="ascii"):
     return Sample(name, f"{file}?array=rho", lambda folder: write_xml(writer(), data(), folder / file, mode),
-                  lambda folder: [VtkXml(folder / file, file.split(".")[-1], ASKED)], read and (lambda folder: read(folder / file)))
+                  lambda folder: [VtkXml(folder / file,
+                                         file.split(".")[-1], ASKED)], read and (lambda folder: read(folder / file)))
 
 
 def legacy_sample(name, data, reader=None, read=None):
@@ -177,8 +179,9 @@ def legacy_sample(name, data, reader=None, read=None):
         writer.SetFileName(str(folder / "a.vtk"))
         writer.SetInputData(data())
         writer.Write()
-    return Sample(name, "a.vtk?array=rho", write, lambda folder: [LegacyLines(folder / "a.vtk", "legacy", ASKED)],
-                  read and (lambda folder: read(folder / "a.vtk", reader())))
+
+    return Sample(name, "a.vtk?array=rho", write, lambda folder: [LegacyLines(folder / "a.vtk", "legacy", ASKED)], read
+                  and (lambda folder: read(folder / "a.vtk", reader())))
 
 
 def pieces(of_cells=False, ghost=0):
@@ -201,9 +204,11 @@ def pieces(of_cells=False, ghost=0):
             '<PImageData WholeExtent="0 4 0 5 0 6" GhostLevel="0" Origin="10 -20 30" Spacing="1.5 2 2.5">'
             f'<{at} Scalars="rho">{arrays}</{at}><Piece Extent="0 2 0 5 0 6" Source="a_0.vti"/><Piece Extent="2 4 0 5 0 6" Source="a_1.vti"/>'
             "</PImageData></VTKFile>")
+
     return Sample(f"pvti{'-ghosts' if ghost else ''}", "a.pvti?array=rho", write,
-                  lambda folder: [VtkXml(folder / "a.pvti", "pvti", ASKED), VtkXml(folder / "a_1.vti", "piece", ASKED)],
-                  lambda folder: read_image(folder / "a.pvti", vtk.vtkXMLPImageDataReader(), 3), ("a_1.vti",))  # 2 is in both
+                  lambda folder: [VtkXml(folder / "a.pvti", "pvti", ASKED),
+                                  VtkXml(folder / "a_1.vti", "piece", ASKED)],
+                  lambda folder: read_image(folder / "a.pvti", vtk.vtkXMLPImageDataReader(), 3), ("a_1.vti", ))  # 2 is in both
 
 
 def blocks(_):
@@ -218,7 +223,8 @@ def blocks(_):
         made.GetMetaData(0).Set(vtk.vtkCompositeDataSet.NAME(), "left")
         made.GetMetaData(1).Set(vtk.vtkCompositeDataSet.NAME(), "right")
         write_xml(vtk.vtkXMLMultiBlockDataWriter(), made, folder / "a.vtm")
-    return Sample("vtm", "a.vtm?array=rho", write, lambda folder: [VtkXml(folder / "a.vtm", "vtm")], None, ("a/a_1.vtu",))
+
+    return Sample("vtm", "a.vtm?array=rho", write, lambda folder: [VtkXml(folder / "a.vtm", "vtm")], None, ("a/a_1.vtu", ))
 
 
 def collection(_):
@@ -229,20 +235,23 @@ def collection(_):
             '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>'
             '<DataSet timestep="1" group="" part="0" file="a_0.vti"/><DataSet timestep="2.5" group="" part="0" file="a_1.vti"/>'
             "</Collection></VTKFile>")
-    return Sample("pvd", "a.pvd?array=rho", write, lambda folder: [VtkXml(folder / "a.pvd", "pvd")], None, ("a_1.vti",))
+
+    return Sample("pvd", "a.pvd?array=rho", write, lambda folder: [VtkXml(folder / "a.pvd", "pvd")], None, ("a_1.vti", ))
 
 
 def series(_):
     def write(folder):
         for number in range(2):
             write_xml(vtk.vtkXMLImageDataWriter(), image(dtype=(np.float32, np.int16)[number]), folder / f"a_{number}.vti")
-        (folder / "a.vti.series").write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 1}, {"name": "a_1.vti", "time": 2.5}]}')
-    return Sample("series", "a.vti.series?array=rho", write, lambda folder: [JsonDocument(folder / "a.vti.series", "series")], None, ("a_1.vti",))
+        (folder / "a.vti.series"
+         ).write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 1}, {"name": "a_1.vti", "time": 2.5}]}')
+
+    return Sample("series", "a.vti.series?array=rho", write, lambda folder: [JsonDocument(folder / "a.vti.series", "series")], None,
+                  ("a_1.vti", ))
 
 
 class Appended(Document):
     """The XML before appended raw bytes: attributes by a regular expression, since it is no XML as a whole."""
-
     def __init__(self, path):
         self.path = path
         data = path.read_bytes()
@@ -260,9 +269,14 @@ class Appended(Document):
                 name = f"@{attribute[1]}"
                 begin, names = match.start(2) + attribute.start(2), (*NAMES.get(name, ()), *((array[1], "array") if array else ()))
                 kind = KINDS.get(name, "") or ("unread" if array and (array[1] == "velocity" or array[1] != "rho" and name in HOW) else "")
-                nodes.append(Node(f"appended/{tag}/{name}", as_numbers(attribute[2]),
-                                  lambda new, b=begin, e=begin + len(attribute[2]): self._set(b, e, as_words(new)),
-                                  names=names, role=ROLES.get(name, ""), words=VOCABULARY.get(name, ()), kind=kind))
+                nodes.append(
+                    Node(f"appended/{tag}/{name}",
+                         as_numbers(attribute[2]),
+                         lambda new, b=begin, e=begin + len(attribute[2]): self._set(b, e, as_words(new)),
+                         names=names,
+                         role=ROLES.get(name, ""),
+                         words=VOCABULARY.get(name, ()),
+                         kind=kind))
         return nodes
 
     def _set(self, begin, end, value):
@@ -281,6 +295,7 @@ def appended(big):
         writer.EncodeAppendedDataOff()
         (writer.SetByteOrderToBigEndian if big else writer.SetByteOrderToLittleEndian)()
         writer.Write()
+
     return Sample(f"appended{'-big' if big else ''}", "a.vti?array=rho", write, lambda folder: [Appended(folder / "a.vti")],
                   lambda folder: read_image(folder / "a.vti", vtk.vtkXMLImageDataReader()))
 
@@ -304,6 +319,13 @@ def samples(folder):
         legacy_sample("legacy image", image, vtk.vtkStructuredPointsReader, read_image),
         legacy_sample("legacy cells", lambda: image(True), vtk.vtkStructuredPointsReader, read_image),
         legacy_sample("legacy rectilinear", rectilinear, vtk.vtkRectilinearGridReader, read_rectilinear),
-        legacy_sample("legacy unstructured", cells), legacy_sample("legacy structured", structured),
-        appended(False), appended(True), pieces(), pieces(True, ghost=1), blocks(folder), collection(folder), series(folder),
+        legacy_sample("legacy unstructured", cells),
+        legacy_sample("legacy structured", structured),
+        appended(False),
+        appended(True),
+        pieces(),
+        pieces(True, ghost=1),
+        blocks(folder),
+        collection(folder),
+        series(folder),
     ]
