@@ -20,13 +20,9 @@ import argparse
 import collections
 import importlib
 import itertools
-import os
 import pathlib
-import pickle
 import random
-import select
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -35,8 +31,9 @@ import numpy as np
 
 from ablation import CannotWrite, Change, Node, changes_of, same_value
 from control import run_control
+from foreign_reader import ForeignReader
 from judge import difference, judge
-from observer import SECONDS, Observer
+from observer import Observer
 
 HERE = pathlib.Path(__file__).resolve().parent
 FORMATS = sorted(path.stem for path in (HERE / "formats").glob("[a-z]*.py"))
@@ -77,31 +74,6 @@ def rows_of(format_name):
     return rows
 
 
-def in_child(read, work):
-    """What a reader answers that some files crash or hang, in a process of its own."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reading)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
-        try:
-            answer = pickle.dumps(read(work))
-        except Exception:  # it refuses the file
-            answer = b""
-        with os.fdopen(writing, "wb") as pipe:
-            pipe.write(answer)
-        os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as pipe:
-        ready, _, _ = select.select([pipe], [], [], SECONDS)
-        answer = pipe.read() if ready else b""
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return pickle.loads(answer)
-
-
 def is_whole(answer):
     """Foreign readers answer to odd files with odd shapes."""
     placed = answer.places is None or all([len(places) for places in answer.places] == list(field.shape) for field in answer.fields.values())
@@ -127,7 +99,7 @@ class FormatRun:
         self.rows = rows_of(name)
         self.counts = collections.Counter()
         self.failures = collections.defaultdict(list)  # (verdict, path) -> texts
-        self.samples, self.before, self.answers = [], {}, {}
+        self.samples, self.before, self.answers, self.reader = [], {}, {}, None
         self.noticed = collections.defaultdict(list)  # (path, sample) -> names of changes that somebody noticed
         self.names = {}  # (sample, number of a document) -> the first words of its paths
         self.nodes = self.changes = self.unwritable = 0
@@ -150,13 +122,15 @@ class FormatRun:
         if sample.read is None:
             return None
         try:
-            answer = in_child(sample.read, work) if getattr(self.module, "FOREIGN_READER_CRASHES", False) else sample.read(work)
+            answer = self.reader.read(sample.name, work) if self.reader else sample.read(work)
         except Exception:  # whatever a library raises: it refuses the file
             return None
-        return answer if is_whole(answer) else None
+        return answer if answer is not None and is_whole(answer) else None
 
     def make_samples(self):
-        for sample in self.module.samples(self.folder):
+        samples = self.module.samples(self.folder)
+        self.reader = ForeignReader(samples) if getattr(self.module, "FOREIGN_READER_CRASHES", False) else None
+        for sample in samples:
             made = self.folder / "samples" / sample.name
             made.mkdir(parents=True)
             sample.write(made)
@@ -219,7 +193,7 @@ class FormatRun:
         """`other`: what is compared instead of the sample as it was, of a pair: with one of both changes alone."""
         after = self.observer.observe(work, sample.source)
         before = other or self.before[sample.name]
-        answer = self.answers[sample.name] and self.foreign(sample, work)
+        answer = None if after.error or after.broken else self.answers[sample.name] and self.foreign(sample, work)
         return judge(node, change, before, after, answer, self.places())
 
     def count(self, path, node, change, sample, verdict, why):
@@ -355,6 +329,8 @@ class FormatRun:
         self.sidecars()
         self.pairs(sites)
         self.observer.close()
+        if self.reader:
+            self.reader.close()
         for row in self.rows.values():
             if not row.used and not self.word:
                 self.fail("ignored", row.path, "its row of harmless.tsv is not needed")

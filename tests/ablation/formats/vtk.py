@@ -7,16 +7,17 @@ import vtk
 from vtk.util import numpy_support
 
 from ablation import Answer, Document, Node, Sample
-from documents import JsonDocument, XmlDocument
-from shape_documents import KeywordLines
+from documents import JsonDocument
+from vtk_documents import HOW, KINDS, NAMES, ROLES, VOCABULARY, LegacyLines, VtkXml, as_numbers, as_words
 
 FOREIGN_READER_CRASHES = True
+ASKED = ("rho", "Points", "connectivity", "offsets", "types")
 SIZE = (5, 6, 7)
 X = np.array([0.0, 1.0, 2.5, 4.5, 7.0])
 
 
 def numbers(count, name, dtype=np.float32, components=1):
-    values = (np.arange(count * components) % 97 + 3).astype(dtype)
+    values = (np.arange(count * components) % 97 + 3.25).astype(dtype)
     array = numpy_support.numpy_to_vtk(values.reshape(count, components) if components > 1 else values, deep=True)
     array.SetName(name)
     return array
@@ -69,7 +70,9 @@ def rectilinear(of_cells=False):
     data = vtk.vtkRectilinearGrid()
     data.SetDimensions(*SIZE)
     for axis, places in zip("XYZ", (X, np.arange(6) * 2.0 + 1, np.arange(7) * 0.5)):
-        getattr(data, f"Set{axis}Coordinates")(numpy_support.numpy_to_vtk(places, deep=True))
+        array = numpy_support.numpy_to_vtk(places, deep=True)
+        array.SetName(axis.lower())
+        getattr(data, f"Set{axis}Coordinates")(array)
     return with_arrays(data, of_cells)
 
 
@@ -91,21 +94,6 @@ def cells(of_cells=False, ghost=0):
         corner = [x + y * 3 + z * 9 + i + 3 * j + 9 * k for k in (0, 1) for j, i in ((0, 0), (0, 1), (1, 1), (1, 0))]
         data.InsertNextCell(vtk.VTK_HEXAHEDRON, 8, corner)
     return with_arrays(data, of_cells, ghost=ghost)
-
-
-class VtkXml(XmlDocument):
-    """A file of VTK in XML, with the samples of the first array as another type."""
-
-    def nodes(self):
-        nodes = super().nodes()
-        for node in nodes:
-            last = node.path.split("/")[-1]
-            if last in ("@type", "@version"):
-                node.kind = "comment" if last == "@version" else ""
-            node.role = {"@Spacing": "spacing", "@Origin": "affine", "@Direction": "affine"}.get(last, "")
-            if last == "@Name":
-                node.names = ("array",)
-        return nodes
 
 
 def write_xml(writer, data, path, mode="ascii"):
@@ -144,20 +132,33 @@ def hidden(data, of_cells, values):
     return values
 
 
-def read_image(path, reader):
+def check_filled(path):
+    """VTK's readers leave voxels of no piece as the memory was: such a file is refused."""
+    text = path.read_bytes().split(b"<AppendedData")[0].decode("latin-1")
+    extents = [np.array(found[1].split(), int) for found in re.finditer(r'Extent="([^"]*)"', text)]
+    counts = [np.prod(extent[1::2] - extent[::2] + 1) for extent in extents]
+    if counts and sum(counts[1:]) < counts[0]:
+        raise ValueError("pieces do not fill the whole")
+
+
+def read_image(path, reader, begin=0):
+    """`begin`: voxels along x that are left out."""
+    check_filled(path)
     data = output(reader, path)
     values, of_cells = array_of(data)
     values = hidden(data, of_cells, values)
     size = [max(n - of_cells, 1) for n in data.GetDimensions()]
-    steps = np.array([data.GetDirectionMatrix().GetElement(r, c) for r in range(3) for c in range(3)]).reshape(3, 3) * np.array(data.GetSpacing())
+    steps = np.array([data.GetDirectionMatrix().GetElement(r, c) for r in range(3)
+                      for c in range(3)]).reshape(3, 3) * np.array(data.GetSpacing())
     affine = np.eye(4)
     affine[:3, :3] = steps
-    first = np.array(data.GetExtent()[::2]) + (0.5 if of_cells else 0)
+    first = np.array(data.GetExtent()[::2]) + (0.5 if of_cells else 0) + [begin, 0, 0]
     affine[:3, 3] = np.array(data.GetOrigin()) + steps @ first
-    return Answer(fields={(0, 0): values.reshape(size[::-1]).transpose(2, 1, 0)}, affine=affine)
+    return Answer(fields={(0, 0): values.reshape(size[::-1]).transpose(2, 1, 0)[begin:]}, affine=affine)
 
 
 def read_rectilinear(path, reader):
+    check_filled(path)
     data = output(reader, path)
     values, of_cells = array_of(data)
     size = [max(n - of_cells, 1) for n in data.GetDimensions()]
@@ -168,20 +169,8 @@ def read_rectilinear(path, reader):
 
 def xml_sample(name, file, writer, data, read=None, mode="ascii"):
     return Sample(name, f"{file}?array=rho", lambda folder: write_xml(writer(), data(), folder / file, mode),
-                  lambda folder: [VtkXml(folder / file, file.split(".")[-1])], read and (lambda folder: read(folder / file)))
-
-
-class LegacyLines(KeywordLines):
-    """Keywords of a legacy file in text."""
-
-    def nodes(self):
-        nodes = super().nodes()
-        for node in nodes:
-            word = node.path.split("/")[-1]
-            node.role = {"SPACING": "spacing", "ORIGIN": "affine"}.get(word, "")
-            if word in ("DIMENSIONS", "POINT_DATA", "CELL_DATA", "CELLS", "POINTS"):
-                node.names = ("size", "samples", "points", "cells")
-        return nodes
+                  lambda folder: [VtkXml(folder / file,
+                                         file.split(".")[-1], ASKED)], read and (lambda folder: read(folder / file)))
 
 
 def legacy_sample(name, data, reader=None, read=None):
@@ -190,12 +179,13 @@ def legacy_sample(name, data, reader=None, read=None):
         writer.SetFileName(str(folder / "a.vtk"))
         writer.SetInputData(data())
         writer.Write()
-    return Sample(name, "a.vtk?array=rho", write, lambda folder: [LegacyLines(folder / "a.vtk", name.replace(" ", "-"))],
-                  read and (lambda folder: read(folder / "a.vtk", reader())))
+
+    return Sample(name, "a.vtk?array=rho", write, lambda folder: [LegacyLines(folder / "a.vtk", "legacy", ASKED)], read
+                  and (lambda folder: read(folder / "a.vtk", reader())))
 
 
 def pieces(of_cells=False, ghost=0):
-    """Two files of pieces along x, which overlap by a layer of points, and their list."""
+    """Two files of pieces along x, which overlap by a layer of points, and their list. The second piece is changed."""
     def write(folder):
         for number, extent in enumerate(((0, 2, 0, 5, 0, 6), (2, 4, 0, 5, 0, 6))):
             whole = image(of_cells)
@@ -214,9 +204,11 @@ def pieces(of_cells=False, ghost=0):
             '<PImageData WholeExtent="0 4 0 5 0 6" GhostLevel="0" Origin="10 -20 30" Spacing="1.5 2 2.5">'
             f'<{at} Scalars="rho">{arrays}</{at}><Piece Extent="0 2 0 5 0 6" Source="a_0.vti"/><Piece Extent="2 4 0 5 0 6" Source="a_1.vti"/>'
             "</PImageData></VTKFile>")
+
     return Sample(f"pvti{'-ghosts' if ghost else ''}", "a.pvti?array=rho", write,
-                  lambda folder: [VtkXml(folder / "a.pvti", "pvti"), VtkXml(folder / "a_1.vti", "piece")],
-                  lambda folder: read_image(folder / "a.pvti", vtk.vtkXMLPImageDataReader()), ("a_1.vti",))
+                  lambda folder: [VtkXml(folder / "a.pvti", "pvti", ASKED),
+                                  VtkXml(folder / "a_1.vti", "piece", ASKED)],
+                  lambda folder: read_image(folder / "a.pvti", vtk.vtkXMLPImageDataReader(), 3), ("a_1.vti", ))  # 2 is in both
 
 
 def blocks(_):
@@ -231,31 +223,35 @@ def blocks(_):
         made.GetMetaData(0).Set(vtk.vtkCompositeDataSet.NAME(), "left")
         made.GetMetaData(1).Set(vtk.vtkCompositeDataSet.NAME(), "right")
         write_xml(vtk.vtkXMLMultiBlockDataWriter(), made, folder / "a.vtm")
-    return Sample("vtm", "a.vtm?array=rho", write, lambda folder: [VtkXml(folder / "a.vtm", "vtm")], None, ("a/a_1.vtu",))
+
+    return Sample("vtm", "a.vtm?array=rho", write, lambda folder: [VtkXml(folder / "a.vtm", "vtm")], None, ("a/a_1.vtu", ))
 
 
 def collection(_):
     def write(folder):
         for number in range(2):
-            write_xml(vtk.vtkXMLImageDataWriter(), image(), folder / f"a_{number}.vti")
+            write_xml(vtk.vtkXMLImageDataWriter(), image(dtype=(np.float32, np.int16)[number]), folder / f"a_{number}.vti")
         (folder / "a.pvd").write_text(
             '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian"><Collection>'
-            '<DataSet timestep="0" group="" part="0" file="a_0.vti"/><DataSet timestep="2.5" group="" part="0" file="a_1.vti"/>'
+            '<DataSet timestep="1" group="" part="0" file="a_0.vti"/><DataSet timestep="2.5" group="" part="0" file="a_1.vti"/>'
             "</Collection></VTKFile>")
-    return Sample("pvd", "a.pvd?array=rho", write, lambda folder: [VtkXml(folder / "a.pvd", "pvd")], None, ("a_1.vti",))
+
+    return Sample("pvd", "a.pvd?array=rho", write, lambda folder: [VtkXml(folder / "a.pvd", "pvd")], None, ("a_1.vti", ))
 
 
 def series(_):
     def write(folder):
         for number in range(2):
-            write_xml(vtk.vtkXMLImageDataWriter(), image(), folder / f"a_{number}.vti")
-        (folder / "a.vti.series").write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 0}, {"name": "a_1.vti", "time": 2.5}]}')
-    return Sample("series", "a.vti.series?array=rho", write, lambda folder: [JsonDocument(folder / "a.vti.series", "series")], None, ("a_1.vti",))
+            write_xml(vtk.vtkXMLImageDataWriter(), image(dtype=(np.float32, np.int16)[number]), folder / f"a_{number}.vti")
+        (folder / "a.vti.series"
+         ).write_text('{"file-series-version": "1.0", "files": [{"name": "a_0.vti", "time": 1}, {"name": "a_1.vti", "time": 2.5}]}')
+
+    return Sample("series", "a.vti.series?array=rho", write, lambda folder: [JsonDocument(folder / "a.vti.series", "series")], None,
+                  ("a_1.vti", ))
 
 
 class Appended(Document):
     """The XML before appended raw bytes: attributes by a regular expression, since it is no XML as a whole."""
-
     def __init__(self, path):
         self.path = path
         data = path.read_bytes()
@@ -263,13 +259,24 @@ class Appended(Document):
         self.text, self.tail = data[:at].decode(), data[at:]
 
     def nodes(self):
-        nodes, counts = [], {}
+        nodes = []
         for match in re.finditer(r"<(\w+)((?:\s+\w+=\"[^\"]*\")+)", self.text):
+            array = re.search(r"Name=\"([^\"]*)\"", match[2])
+            if match[1] in ("InformationKey", "Value"):
+                continue
+            tag = match[1] + (f"({array[1]})" if array else "")
             for attribute in re.finditer(r"(\w+)=\"([^\"]*)\"", match[2]):
-                path = f"appended/{match[1]}/@{attribute[1]}"
-                counts[path] = counts.get(path, 0) + 1
-                begin = match.start(2) + attribute.start(2)
-                nodes.append(Node(path, attribute[2], lambda new, b=begin, e=begin + len(attribute[2]): self._set(b, e, new)))
+                name = f"@{attribute[1]}"
+                begin, names = match.start(2) + attribute.start(2), (*NAMES.get(name, ()), *((array[1], "array") if array else ()))
+                kind = KINDS.get(name, "") or ("unread" if array and (array[1] == "velocity" or array[1] != "rho" and name in HOW) else "")
+                nodes.append(
+                    Node(f"appended/{tag}/{name}",
+                         as_numbers(attribute[2]),
+                         lambda new, b=begin, e=begin + len(attribute[2]): self._set(b, e, as_words(new)),
+                         names=names,
+                         role=ROLES.get(name, ""),
+                         words=VOCABULARY.get(name, ()),
+                         kind=kind))
         return nodes
 
     def _set(self, begin, end, value):
@@ -288,6 +295,7 @@ def appended(big):
         writer.EncodeAppendedDataOff()
         (writer.SetByteOrderToBigEndian if big else writer.SetByteOrderToLittleEndian)()
         writer.Write()
+
     return Sample(f"appended{'-big' if big else ''}", "a.vti?array=rho", write, lambda folder: [Appended(folder / "a.vti")],
                   lambda folder: read_image(folder / "a.vti", vtk.vtkXMLImageDataReader()))
 
@@ -311,6 +319,13 @@ def samples(folder):
         legacy_sample("legacy image", image, vtk.vtkStructuredPointsReader, read_image),
         legacy_sample("legacy cells", lambda: image(True), vtk.vtkStructuredPointsReader, read_image),
         legacy_sample("legacy rectilinear", rectilinear, vtk.vtkRectilinearGridReader, read_rectilinear),
-        legacy_sample("legacy unstructured", cells), legacy_sample("legacy structured", structured),
-        appended(False), appended(True), pieces(), pieces(True, ghost=1), blocks(folder), collection(folder), series(folder),
+        legacy_sample("legacy unstructured", cells),
+        legacy_sample("legacy structured", structured),
+        appended(False),
+        appended(True),
+        pieces(),
+        pieces(True, ghost=1),
+        blocks(folder),
+        collection(folder),
+        series(folder),
     ]
