@@ -57,7 +57,7 @@ REVERSALS = [
     Reversal("ome_zarr", "unit", "zarr/ome_axes.cpp", "LengthUnitNamed(*unit.Text())", "LengthUnit::kMicrometre"),
     Reversal("n5", "pixelResolution", "n5/n5_place.cpp", 'attributes["pixelResolution"]', 'attributes["pixelResolutio~"]'),
     Reversal("precomputed", "voxel_offset", "precomputed/precomputed.cpp", 'field["voxel_offset"].given()', "false"),
-    Reversal("vtk", "vtu/UnstructuredGrid/Piece/CellData/DataArray/", "volume_io/vtk_xml_grid.cpp", "!file.Find(piece.number, section, name).ok()", "true"),
+    Reversal("vtk", "vtu/UnstructuredGrid/Piece/CellData/DataArray(", "volume_io/vtk_xml_grid.cpp", "!file.Find(piece.number, section, name).ok()", "true"),
     Reversal("vtk", "Direction", "volume_io/vtk_image.cpp", 'file.Numbers(file.dataset(), "Direction", 9, {1, 0, 0, 0, 1, 0, 0, 0, 1})',
              'file.Numbers(file.dataset(), "Directio~", 9, {1, 0, 0, 0, 1, 0, 0, 0, 1})'),
     Reversal("shapes", "gifti", "shapes/gifti.cpp", "array.space.find(kScanner) != std::string_view::npos", "false"),
