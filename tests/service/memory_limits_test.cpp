@@ -153,9 +153,9 @@ TEST_F(MemoryLimitsTest, CachesOfManyLayoutsStayUnderTheLimit) {
 // heaps keep of all that. No formula counts it.
 TEST_F(MemoryLimitsTest, AMixOfFramesStaysUnderTheLimitAndAnIdleWorkerGivesBackWhatItKeeps) {
   if (kWatched) GTEST_SKIP() << "a sanitizer keeps what is freed";
-  constexpr std::uint64_t kLimit = std::uint64_t{256} << 20;
+  constexpr std::uint64_t kLimit = std::uint64_t{320} << 20;
   for (const char* name : {"a", "b", "c", "d"}) Write(name, Noise(192));
-  Start("256MiB", 2);
+  Start("320MiB", 2);
   const unsigned seed = 7;
   std::mt19937 random(seed);
   const auto any = [&](auto... of) {
