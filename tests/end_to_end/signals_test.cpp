@@ -35,14 +35,21 @@ TEST_F(SignalsTest, AProgramThatReadsWhatItNeedsEnds) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   int writer = -1;
   const auto pipe_is_open = [&] { writer = ::open(pipe.c_str(), O_WRONLY | O_CLOEXEC); };
-  const LoopbackListener server = ListenOnLoopback();
-  int connection = -1;
-  const auto server_is_asked = [&] {
-    connection = ::accept(server.socket, nullptr, nullptr);
-    char byte = 0;
-    EXPECT_EQ(::recv(connection, &byte, 1, MSG_PEEK), 1);
+  // Each has a server of its own: one that has ended may have connected twice.
+  const auto status_beside_a_server = [&](std::vector<std::string> command, int signal) {
+    const LoopbackListener server = ListenOnLoopback();
+    command.insert(command.end(), {"--listen", "ipc://" + Path("s"), "--data"});
+    command.push_back("far=http://127.0.0.1:" + std::to_string(server.port) + "/far.nrrd");
+    int connection = -1;
+    const int status = ExitStatusOf(command, signal, [&] {
+      connection = ::accept(server.socket, nullptr, nullptr);
+      char byte = 0;
+      EXPECT_EQ(::recv(connection, &byte, 1, MSG_PEEK), 1);
+    });
+    ::close(connection);
+    ::close(server.socket);
+    return status;
   };
-  const std::string far = "far=http://127.0.0.1:" + std::to_string(server.port) + "/far.nrrd";
   for (const int signal : {SIGTERM, SIGINT}) {
     SCOPED_TRACE(signal);
     for (const std::vector<std::string>& command : {std::vector<std::string>{Program("worker"), "--service", pipe},
@@ -51,13 +58,10 @@ TEST_F(SignalsTest, AProgramThatReadsWhatItNeedsEnds) {
       EXPECT_EQ(ExitStatusOf(command, signal, pipe_is_open), 0) << command[0];
       ::close(writer);
     }
-    EXPECT_EQ(ExitStatusOf({Program("coordinator"), "--listen", "ipc://" + Path("s"), "--data", far}, signal, server_is_asked), 0);
-    ::close(connection);
-    EXPECT_EQ(ExitStatusOf(Command({"up", "--listen", "ipc://" + Path("s"), "--data", far}), signal, server_is_asked), 130);
-    ::close(connection);
+    EXPECT_EQ(status_beside_a_server({Program("coordinator")}, signal), 0);
+    EXPECT_EQ(status_beside_a_server(Command({"up"}), signal), 130);
     EXPECT_TRUE(NothingIsLeft());
   }
-  ::close(server.socket);
 }
 
 // Whenever it comes. No signal can be handled before a program's first line, so they are blocked until there.

@@ -77,6 +77,9 @@ class Programs:
         return result
 
     def start(self, program, *arguments, **more):
+        """A gateway that names no service gets one that does not run."""
+        if program == "slabstream-gateway" and not {"--endpoint", "--service"} & set(arguments):
+            arguments += ("--endpoint", f"ipc://{self.folder}/nobody")
         child = subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL,
                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **{"env": self.environment, **more})
         self.children.append(child)
