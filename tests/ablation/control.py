@@ -48,7 +48,6 @@ REVERSALS = [
     forgets("netcdf", "hdf5/cf_values.cpp", "scale_factor"),
     forgets("netcdf", "hdf5/cf_values.cpp", "valid_range"),
     forgets("netcdf", "hdf5/cf_values.cpp", "_Unsigned"),
-    forgets("hdf5", "hdf5/described_axes.cpp", "element_size_um"),
     forgets("itk_minc", "hdf5/minc.cpp", "valid_range"),
     forgets("itk_minc", "hdf5/itk_image.cpp", "/Directions", "Directions"),
     forgets("vtkhdf", "hdf5/vtk_hdf.cpp", "Direction"),
