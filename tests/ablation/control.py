@@ -120,6 +120,6 @@ def run_control(failures_of):
             del os.environ[f"{VARIABLE}{number}"]
         missed += not new
         print(f"{'caught' if new else 'MISSED'}  {reversal.format} {reversal.word} (data/{reversal.file}): "
-              + ("; ".join(f"{verdict} {path}" for verdict, path in sorted(new)[:3]) if new else "nothing noticed that it is passed over"), flush=True)
+              + ("; ".join(f"{verdict} {path}: {text}" for verdict, path, text in sorted(new)[:2]) if new else "nothing noticed that it is passed over"), flush=True)
     print(f"control: {len(REVERSALS) - missed} of {len(REVERSALS)} reverted mends are caught")
     return missed

@@ -346,7 +346,8 @@ def run_format(name, options, word=""):
 def failures_of(options):
     def failures(program, name, word):
         options.program = program
-        return set(run_format(name, options, word).failures)
+        found = run_format(name, options, word).failures
+        return {(verdict, path, text) for (verdict, path), texts in found.items() for text in texts}
     return failures
 
 
