@@ -75,6 +75,23 @@ NAMES = {
 }
 
 
+def packed_nodes(here, part, fields, at, about, kind=""):
+    """Nodes of big-endian numbers one behind the other, from `at` on in part[1]. `about`: names and role of each, by its own name."""
+    nodes = []
+    for name, letter in fields:
+        (value,) = struct.unpack_from(">" + letter, part[1], at)
+        nodes.append(Node(f"{here}/{name}", value, lambda new, a=at, x=letter: set_packed(part, a, x, new), None, *about(name), kind))
+        at += struct.calcsize(letter)
+    return nodes
+
+
+def set_packed(part, at, letter, value):
+    try:
+        struct.pack_into(">" + letter, part[1], at, int(value))
+    except struct.error as error:
+        raise CannotWrite(str(error)) from error
+
+
 class PngDocument(Document):
     def __init__(self, path, name="png"):
         self.path, self.name = pathlib.Path(path), name
@@ -101,22 +118,8 @@ class PngDocument(Document):
                     kind=text,
                 )
             )
-            at = 0
-            for name, letter in PNG.get(kind, ()):
-                (value,) = struct.unpack_from(">" + letter, data, at)
-                key = f"{kind}/{name}"
-                nodes.append(
-                    Node(
-                        f"{self.name}/{key}",
-                        value,
-                        lambda new, c=chunk, a=at, x=letter: self._set(c, a, x, new),
-                        None,
-                        NAMES.get(key, ()),
-                        ROLES.get(key, ""),
-                        text,
-                    )
-                )
-                at += struct.calcsize(letter)
+            about = lambda name, kind=kind: (NAMES.get(f"{kind}/{name}", ()), ROLES.get(f"{kind}/{name}", ""))
+            nodes += packed_nodes(here, chunk, PNG.get(kind, ()), 0, about, text)
             if kind == "PLTE":
                 nodes.append(Node(f"{here}/colours", list(data), lambda new, c=chunk: c.__setitem__(1, bytearray(new)), names=("palette",)))
             elif kind == "tRNS":
@@ -124,13 +127,6 @@ class PngDocument(Document):
                     Node(f"{here}/alphas", list(data), lambda new, c=chunk: c.__setitem__(1, bytearray(new)), names=("alpha", "transparen"))
                 )
         return nodes
-
-    @staticmethod
-    def _set(chunk, at, letter, value):
-        try:
-            struct.pack_into(">" + letter, chunk[1], at, int(value))
-        except struct.error as error:
-            raise CannotWrite(str(error)) from error
 
     def add(self, path, value):
         kind = path.split("/")[-1]
@@ -204,19 +200,7 @@ class JpegDocument(Document):
 
     def _fields(self, kind, segment, fields, at):
         nodes = [Node(f"{self.name}/{kind}", None, None, lambda s=segment: self.segments.remove(s), ("jpeg",))]
-        for name, letter in fields:
-            (value,) = struct.unpack_from(">" + letter, segment[1], at)
-            nodes.append(
-                Node(
-                    f"{self.name}/{kind}/{name}",
-                    value,
-                    lambda new, s=segment, a=at, x=letter: PngDocument._set(s, a, x, new),
-                    None,
-                    JPEG_NAMES.get(name, ()),
-                    JPEG_ROLES.get(name, ""),
-                )
-            )
-            at += struct.calcsize(letter)
+        nodes += packed_nodes(f"{self.name}/{kind}", segment, fields, at, lambda name: (JPEG_NAMES.get(name, ()), JPEG_ROLES.get(name, "")))
         return nodes
 
     def _set_exif(self, tag, value):
